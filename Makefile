@@ -1,0 +1,34 @@
+PYTHON ?= python3.11
+BIN := .venv/bin
+STAMP := .venv/.installed
+
+.PHONY: run test test-long lint setup lock clean
+
+run: setup  ## plan, execute and measure the four-rooms mission
+	$(BIN)/sva-bench run worlds/four-rooms.yaml
+
+test: setup  ## the default test suite
+	$(BIN)/python -m pytest -n 2
+
+test-long: setup  ## everything, sweeps included
+	$(BIN)/python -m pytest -n 2 -m "long or not long"
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+setup: $(STAMP)
+
+$(STAMP): requirements.lock pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	touch $@
+
+lock: setup  ## pin the dependencies anew
+	$(BIN)/pip-compile --quiet --extra dev --all-build-deps --allow-unsafe --generate-hashes --strip-extras \
+	  --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-annotate --no-header \
+	  --output-file requirements.lock pyproject.toml
+
+clean:
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,0 +1,339 @@
+"""YAML and JSON files in, checked data out: every complaint names file, line and key.
+
+The only importer of ruamel.yaml. Aliases, duplicate keys and oversized files are refused at the door:
+no document of ours needs them, and an alias bomb can fill any memory.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from sva_bench.errors import BadFile, nearest
+
+MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
+MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 100 MB
+MAX_DEPTH = 32
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
+WholeNumber = Annotated[int, Field(strict=True, ge=0)]
+
+
+class Section(BaseModel):
+    """A part of a document: frozen, and an unknown key is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+SectionT = TypeVar("SectionT", bound=BaseModel)
+Loc = tuple[str | int, ...]
+
+
+class Document:
+    """Plain data read from a file, which knows the line of each key."""
+
+    def __init__(self, path: Path, data: Any, text: str, root: Node | None = None) -> None:
+        self.path, self.data = path, data
+        self._text, self._root = text, root
+
+    def error(self, loc: Loc, problem: str) -> BadFile:
+        """A complaint about the value at ``loc``, e.g. ``("sites", "pois", "p1")``."""
+        return BadFile(self.path, self.line(loc), dotted(loc), problem)
+
+    def line(self, loc: Loc) -> int | None:
+        """Line of the key at ``loc``, counted from 1; of the nearest parent where it is absent."""
+        if self._root is None:  # JSON: composed only now, since ruamel is slow on large matrices
+            try:
+                self._root = _compose(self._text)
+            except YAMLError:
+                return None
+        if self._root is None:
+            return None
+        node: Node = self._root
+        line = node.start_mark.line
+        for part in loc:
+            if isinstance(node, MappingNode):
+                found = next(((k, v) for k, v in node.value if k.value == str(part)), None)
+                if found is None:
+                    break
+                line, node = found[0].start_mark.line, found[1]
+            elif isinstance(node, SequenceNode) and isinstance(part, int) and part < len(node.value):
+                node = node.value[part]
+                line = node.start_mark.line
+            else:
+                break
+        return int(line) + 1
+
+
+def dotted(loc: Loc) -> str:
+    """``("map", "obstacles", 2)`` as ``map.obstacles[2]``."""
+    text = ""
+    for part in loc:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def read_yaml(path: Path) -> Document:
+    """Read a YAML 1.2 file without aliases, tags or duplicate keys.
+
+    Raises:
+        BadFile: If it cannot be read, is too large, or is not plain YAML.
+    """
+    text = _read(path, MAX_YAML_BYTES)
+    try:
+        root = _compose(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise BadFile(path, mark.line + 1 if mark else None, "", f"not valid YAML: {error.problem}") from None
+    except YAMLError as error:
+        raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}") from None
+    except RecursionError:
+        raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
+    if root is None:
+        raise BadFile(path, 1, "", "the file is empty")
+    return Document(path, _plain(root, path, ()), text, root)
+
+
+def read_json(path: Path) -> Document:
+    """Read a JSON file; NaN, infinities and duplicate keys are refused.
+
+    Raises:
+        BadFile: If it cannot be read, is too large, or is not JSON.
+    """
+    text = _read(path, MAX_JSON_BYTES)
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            keys = [key for key, _ in pairs]
+            key = next(key for key in keys if keys.count(key) > 1)
+            raise BadFile(path, _last_line_of(text, f'"{key}"'), key, "this key stands twice; remove one")
+        return found
+
+    def refuse(constant: str) -> float:
+        raise BadFile(path, _last_line_of(text, constant), "", f"{constant} is not a number that JSON or we know; "
+                      "use null where there is none")
+
+    try:
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+    except json.JSONDecodeError as error:
+        raise BadFile(path, error.lineno, "", f"not valid JSON: {error.msg} (column {error.colno})") from None
+    except RecursionError:
+        raise BadFile(path, None, "", "nested too deeply") from None
+    except ValueError as error:  # an integer of more than 4300 digits
+        raise BadFile(path, None, "", f"not valid JSON: {error}") from None
+    return Document(path, data, text)
+
+
+def validate(document: Document, schema: type[SectionT], kind: str) -> SectionT:
+    """Check a document against a schema.
+
+    Args:
+        document: What was read.
+        schema: A pydantic model.
+        kind: The format that the file must declare, e.g. ``sva-bench/world@1``.
+
+    Raises:
+        BadFile: For the first complaint, with file, line, key and what to change.
+    """
+    check_kind(document, kind)
+    try:
+        return schema.model_validate(document.data)
+    except ValidationError as error:
+        raise _first_complaint(document, schema, error) from None
+
+
+def check_kind(document: Document, kind: str) -> None:
+    """Refuse a document that is not a mapping of the declared kind."""
+    if not isinstance(document.data, dict):
+        raise document.error((), f"expected a mapping that starts with 'format: {kind}'")
+    found = document.data.get("format")
+    if found is None:
+        raise document.error((), f"the key 'format' is missing; add 'format: {kind}'")
+    if found != kind:
+        raise document.error(("format",), f"expected {kind!r}, found {found!r}")
+
+
+def _first_complaint(document: Document, schema: type[BaseModel], error: ValidationError) -> BadFile:
+    # An unknown key explains a missing one beside it better than the other way round.
+    details = sorted(error.errors(), key=lambda d: d["type"] != "extra_forbidden")
+    detail = details[0]
+    loc = _existing(document.data, detail["loc"])
+    if detail["type"] == "extra_forbidden":
+        key = str(detail["loc"][-1])
+        known = _keys_at(schema, detail["loc"][:-1])
+        return document.error(loc, f"unknown key {key!r}; {nearest(key, known)}")
+    if detail["type"] == "missing":
+        return document.error(loc, f"the key {detail['loc'][-1]!r} is missing; add it")
+    if detail["type"] == "string_pattern_mismatch":
+        name = _shown(detail["input"])
+        return document.error(
+            loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit")
+    message = detail["msg"].removeprefix("Value error, ")
+    found = detail["input"]
+    shown = f", found {_shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
+    return document.error(loc, message[:1].lower() + message[1:] + shown)
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _existing(data: Any, loc: Loc) -> Loc:
+    """``loc`` without the parts that pydantic adds for unions, keys of mappings and the like."""
+    kept: list[str | int] = []
+    for number, part in enumerate(loc):
+        if isinstance(data, dict) and part in data:
+            kept.append(part)
+            data = data[part]
+        elif isinstance(data, dict) and number == len(loc) - 1 and part not in ("[key]",) and "[" not in str(part):
+            kept.append(part)  # a missing key: shown, located at its parent
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            kept.append(part)
+            data = data[part]
+    return tuple(kept)
+
+
+def _keys_at(schema: type[BaseModel], loc: Loc) -> list[str]:
+    """Keys that the schema knows at ``loc``; those of every alternative of a union."""
+    found: set[type[BaseModel]] = {schema}
+    for part in loc:
+        inner: set[type[BaseModel]] = set()
+        for model in found:
+            field = next((f for n, f in model.model_fields.items() if part in (n, f.alias)), None)
+            inner |= _models_in(field.annotation) if field else set()
+        found = inner or found
+    return sorted({field.alias or name for model in found for name, field in model.model_fields.items()})
+
+
+def _models_in(annotation: Any) -> set[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return {annotation}
+    models: set[type[BaseModel]] = set()
+    for argument in getattr(annotation, "__args__", ()):
+        models |= _models_in(argument)
+    return models
+
+
+def _read(path: Path, limit: int) -> str:
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise BadFile(path, None, "", "not a file")
+        if size > limit:
+            raise BadFile(path, None, "", f"{size} bytes; at most {limit} are read")
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BadFile(path, None, "", "no such file") from None
+    except UnicodeDecodeError as error:
+        raise BadFile(path, None, "", f"not UTF-8 text (byte {error.start})") from None
+    except OSError as error:
+        raise BadFile(path, None, "", f"cannot be read: {error.strerror}") from None
+
+
+def _last_line_of(text: str, piece: str) -> int | None:
+    at = text.rfind(piece)
+    return None if at < 0 else text.count("\n", 0, at) + 1
+
+
+class _StrictComposer(Composer):
+    """Composes nodes, refusing aliases before they are followed."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        from ruamel.yaml.events import AliasEvent
+
+        if self.parser.check_event(AliasEvent):
+            event = self.parser.peek_event()
+            raise MarkedYAMLError(problem="aliases are not allowed; write the value out", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)
+
+
+def _compose(text: str) -> Node | None:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _StrictComposer
+    node: Node | None = yaml.compose(text)
+    return node
+
+
+def _plain(node: Node, path: Path, loc: Loc) -> Any:
+    """Python data of a node tree: mappings, lists and plain scalars only."""
+    line = node.start_mark.line + 1
+    if len(loc) > MAX_DEPTH:
+        raise BadFile(path, line, dotted(loc[:3]), f"nested deeper than {MAX_DEPTH} levels")
+    if isinstance(node, MappingNode):
+        data: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, ScalarNode):
+                raise BadFile(path, key_node.start_mark.line + 1, dotted(loc), "a key must be a plain word")
+            key = str(key_node.value)
+            if key in data:
+                raise BadFile(path, key_node.start_mark.line + 1, dotted((*loc, key)),
+                              "this key stands twice; remove one")
+            data[key] = _plain(value_node, path, (*loc, key))
+        return data
+    if isinstance(node, SequenceNode):
+        return [_plain(item, path, (*loc, number)) for number, item in enumerate(node.value)]
+    return _scalar(node, path, loc)
+
+
+def _scalar(node: Node, path: Path, loc: Loc) -> Any:
+    """The value of a plain YAML 1.2 scalar; what looks like a date stays text."""
+    text, kind = str(node.value), str(node.tag).rpartition(":")[2]
+    if not str(node.tag).startswith("tag:yaml.org,2002:") or kind not in _SCALARS:
+        raise BadFile(path, node.start_mark.line + 1, dotted(loc),
+                      f"the tag {node.tag} is not allowed; write a plain value")
+    try:
+        value = _SCALARS[kind](text)
+    except (ValueError, OverflowError):
+        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"{_shown(text)} is no valid {kind}") from None
+    if isinstance(value, float) and not math.isfinite(value):
+        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"expected a finite number, found {text}")
+    return value
+
+
+def _number(text: str) -> float:
+    return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+
+
+_SCALARS: dict[str, Callable[[str], Any]] = {
+    "str": str,
+    "timestamp": str,
+    "null": lambda _: None,
+    "bool": lambda text: text.lower() == "true",
+    "int": lambda text: int(text, 0) if text[:2].lower() in ("0x", "0o") else int(text),
+    "float": _number,
+}
+
+
+def pretty_json(data: Any, indent: int = 0, width: int = 116) -> str:
+    """JSON that a person can read: what fits on a line stays on it."""
+    flat = json.dumps(data, ensure_ascii=False, allow_nan=False)
+    if len(flat) + indent <= width or not isinstance(data, dict | list) or not data:
+        return flat + ("\n" if indent == 0 else "")
+    pad = " " * (indent + 1)
+    if isinstance(data, dict):
+        items = [f"{pad}{json.dumps(key)}: {pretty_json(value, indent + 1)}" for key, value in data.items()]
+        text = "{\n" + ",\n".join(items) + "\n" + " " * indent + "}"
+    else:
+        rows = [pad + (json.dumps(item) if not _deep(item) else pretty_json(item, indent + 1)) for item in data]
+        text = "[\n" + ",\n".join(rows) + "\n" + " " * indent + "]"
+    return text + ("\n" if indent == 0 else "")
+
+
+def _deep(item: Any) -> bool:
+    """Whether an item of a list holds more than numbers and words."""
+    return isinstance(item, dict) or (isinstance(item, list) and any(isinstance(x, dict | list) for x in item))

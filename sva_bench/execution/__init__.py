@@ -1,0 +1,1 @@
+"""Plans driven in physics, and what comes of them trial by trial."""

@@ -1,0 +1,1 @@
+"""The mission: instances, failures, plans and certificates. Knows no world and no solver."""

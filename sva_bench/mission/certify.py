@@ -1,0 +1,121 @@
+"""Certificate: whether a plan is feasible and what it is worth, from the instance alone.
+
+Shares no code with the solver, so a bug there cannot hide here.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+from sva_bench.mission.failures import route_value
+from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
+from sva_bench.mission.plan import Plan, Route
+
+VALUE_TOLERANCE = 1e-6  # relative; the gap at which a plan counts as optimal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certificate:
+    """What an independent check says of a plan.
+
+    Attributes:
+        feasible: Whether every vehicle can drive its route within its fuel and limit, and no POI is visited twice.
+        expected: Expected incentive under the instance's failure process; ``None`` if infeasible.
+        nominal: Incentive if every vehicle is available; ``None`` if infeasible.
+        fuel_s: Fuel that each vehicle burns [s of driving], as far as its legs exist.
+        duration_s: Driving and stops of each vehicle [s].
+        reasons: Why it is infeasible, or which of its own claims are wrong.
+    """
+
+    feasible: bool
+    expected: float | None
+    nominal: float | None
+    fuel_s: dict[str, float]
+    duration_s: dict[str, float]
+    reasons: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The certificate as ``sva-bench certify --json`` prints it."""
+        return {"format": "sva-bench/certificate@1", "feasible": self.feasible, "expected": self.expected,
+                "reasons": list(self.reasons)}
+
+
+def certify(instance: Instance, plan: Plan) -> Certificate:
+    """Check a plan against its instance.
+
+    Args:
+        instance: The instance.
+        plan: Any plan whose vehicles and sites the instance knows.
+
+    Source:
+        Constraints (1), (2), (5), (7), (9), (11) and (14a) of the paper, read as rules for a sequence of sites.
+    """
+    reasons: list[str] = []
+    visited: dict[str, str] = {}
+    fuel, duration = {}, {}
+    expected = nominal = 0.0
+    for vehicle in instance.vehicles:
+        route = plan.route(vehicle.name)
+        fuel[vehicle.name], duration[vehicle.name] = _drive(instance, vehicle, route, reasons)
+        earned = []
+        for name in route:
+            site = instance.sites.index(name)
+            if site == instance.base or site in instance.stations:
+                continue
+            if name in visited:
+                reasons.append(f"{vehicle.name}: POI {name} is visited already, by {visited[name]}")
+            visited[name] = vehicle.name
+            earned.append(float(vehicle.incentives[site]))
+        expected += route_value(earned, vehicle.availability, instance.failure)
+        nominal += sum(earned)
+    if reasons:
+        return Certificate(feasible=False, expected=None, nominal=None, fuel_s=fuel, duration_s=duration,
+                           reasons=tuple(reasons))
+    claims = _wrong_claims(plan, expected, nominal, fuel)
+    return Certificate(feasible=True, expected=expected + 0.0, nominal=nominal + 0.0, fuel_s=fuel, duration_s=duration,
+                       reasons=tuple(claims))
+
+
+def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str]) -> tuple[float, float]:
+    """Fuel burnt and time taken on a route; what breaks a rule is added to ``reasons``."""
+    if not route:
+        return 0.0, 0.0
+    sites = [instance.sites.index(name) for name in route]
+    name = vehicle.name
+    if sites[0] != instance.base or sites[-1] != instance.base or len(sites) < 2:
+        reasons.append(f"{name}: the route must start and end at the base {instance.sites[instance.base]}")
+    if instance.base in sites[1:-1]:
+        reasons.append(f"{name}: the base stands in the middle of the route; it is left and entered once")
+    since_refuel = fuel = duration = 0.0
+    for i, j in itertools.pairwise(sites):
+        leg = float(vehicle.fuel_s[i, j])
+        where = f"{instance.sites[i]} -> {instance.sites[j]}"
+        if i == j:
+            reasons.append(f"{name}: {instance.sites[i]} follows itself; name a stop once")
+        elif leg == float("inf"):
+            reasons.append(f"{name}: there is no way {where}")
+        since_refuel += leg
+        fuel += leg
+        duration += leg + float(instance.stop_s[j])
+        if since_refuel > vehicle.fuel_capacity_s + TOLERANCE_S:
+            reasons.append(f"{name}: {since_refuel:.3f} s of fuel burnt on arrival over {where}; "
+                           f"the capacity is {vehicle.fuel_capacity_s:.3f} s")
+            since_refuel = 0.0  # one complaint per filling is enough
+        if j in instance.stations:
+            since_refuel = 0.0
+    if duration > vehicle.mission_limit_s + TOLERANCE_S:
+        reasons.append(f"{name}: the mission takes {duration:.3f} s; the limit is {vehicle.mission_limit_s:.3f} s")
+    return fuel, duration
+
+
+def _wrong_claims(plan: Plan, expected: float, nominal: float, fuel: dict[str, float]) -> list[str]:
+    claims = []
+    worth = nominal if plan.objective == "deterministic" else expected
+    if plan.value is not None and plan.objective is not None and \
+            abs(plan.value - worth) > VALUE_TOLERANCE * max(1.0, abs(worth)):
+        claims.append(f"the plan claims a value of {plan.value:.6g}; it is worth {worth:.6g}")
+    claims += [f"{name}: the plan claims {claimed:.3f} s of fuel; it burns {fuel[name]:.3f} s"
+               for name, claimed in plan.fuel_s.items() if name in fuel and abs(claimed - fuel[name]) > TOLERANCE_S]
+    return claims

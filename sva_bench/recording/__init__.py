@@ -1,0 +1,1 @@
+"""Recordings: a view of traces, never the truth of a run."""

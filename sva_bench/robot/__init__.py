@@ -1,0 +1,1 @@
+"""The robot: its figures, its path follower, and the follower's kinematic twin."""

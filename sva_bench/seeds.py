@@ -1,0 +1,41 @@
+"""One stream of random numbers per purpose and item, independent of the order of drawing."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+
+
+class Stream(IntEnum):
+    """What a stream is for. Append only: a number keeps its meaning for good."""
+
+    FAILURE = 0
+    NOISE = 1
+    INCENTIVE = 2
+    ROADMAP = 3
+    JOINT_FAILURE = 4
+
+
+def seed_for(root: int, stream: Stream, *index: int) -> np.random.SeedSequence:
+    """The seed of one stream: the same whatever else was drawn before."""
+    return np.random.SeedSequence(root, spawn_key=(stream, *index))
+
+
+def rng_for(root: int, stream: Stream, *index: int) -> np.random.Generator:
+    """A generator for one purpose and item."""
+    return np.random.default_rng(seed_for(root, stream, *index))
+
+
+def uniforms(root: int, stream: Stream, *index: int, first: int = 0, count: int) -> FloatArray:
+    """Numbers ``first`` .. ``first + count - 1`` of a stream of uniforms on [0, 1).
+
+    Philox counts, so trial 17 can be drawn alone, and more trials never change earlier ones.
+    """
+    bits = np.random.Philox(seed_for(root, stream, *index))
+    # One Philox block is four 64-bit words; a double takes one word.
+    block, offset = divmod(first, 4)
+    bits.advance(block)
+    return np.random.Generator(bits).random(offset + count)[offset:]

@@ -1,0 +1,1 @@
+"""Plans from instances. Knows no world; whatever it returns is certified elsewhere."""

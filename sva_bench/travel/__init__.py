@@ -1,0 +1,1 @@
+"""Travel times between sites, and the fuel costs made of them."""

@@ -1,0 +1,1 @@
+"""The world: bounds, obstacles, sites, robots, scenarios, and how it is read from a file."""
