@@ -1,0 +1,110 @@
+"""The summary of a run: what was promised, what was executed, and what the stochastic plan is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sva_bench.analysis.statistics import Estimate, estimate
+from sva_bench.execution.execute import Executed
+from sva_bench.execution.outcome import ENDS
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Judged:
+    """A plan with its closed-form value and its execution.
+
+    Attributes:
+        expected: Closed-form value under the failure process executed.
+        executed: Its trials.
+    """
+
+    expected: float
+    executed: Executed
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ScenarioResult:
+    """Everything about one scenario.
+
+    Attributes:
+        stochastic, deterministic: The two plans.
+        modelled_range: Smallest and greatest modelled VSS over all deterministic plans that tie.
+        vss_mean_value: Birge's VSS, of the plan for the mean scenario; ``None`` under ``per_leg``.
+        evpi: Expected value of perfect information; ``None`` if not computed.
+    """
+
+    stochastic: Judged
+    deterministic: Judged
+    modelled_range: tuple[float, float] | None
+    vss_mean_value: float | None
+    evpi: float | None
+
+
+def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
+    """One entry of ``scenarios`` in ``summary.json``."""
+    s, d = result.stochastic, result.deterministic
+    scenario = s.executed.case.scenario
+    difference = estimate(_totals(s.executed) - _totals(d.executed), s.executed.rollout, noisy=noisy)
+    modelled = s.expected - d.expected
+    executed_mean = float(np.mean(_totals(s.executed)))
+    return {
+        "name": scenario.name,
+        "availability": {name: scenario.availability[name] for name in robots},
+        "plans": {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy) for judged in (s, d)},
+        "vss": {
+            "modelled": modelled + 0.0,
+            "modelled_pct": _percent(modelled, s.expected),
+            "modelled_range": None if result.modelled_range is None else [x + 0.0 for x in result.modelled_range],
+            "executed": difference.as_dict(),
+            "executed_pct": _percent(difference.mean, executed_mean),
+            "distinguishable": difference.distinguishable,
+        },
+        "vss_mean_value": result.vss_mean_value,
+        "evpi": result.evpi,
+    }
+
+
+def plan_summary(judged: Judged, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
+    """What one plan promised and what came of it."""
+    run, plan = judged.executed, judged.executed.case.plan
+    executed: Estimate = estimate(_totals(run), run.rollout, noisy=noisy)
+    counts = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
+    return {
+        "promised": plan.value,
+        "bound": plan.bound,
+        "status": plan.status,
+        "expected": judged.expected + 0.0,
+        "executed": executed.as_dict(),
+        "by_robot": {name: float(run.incentive[:, k].mean()) for k, name in enumerate(robots)},
+        "ends": {end: count for end, count in counts.items() if count},
+        "ledger": ledger(judged, executed.mean),
+    }
+
+
+def ledger(judged: Judged, executed: float) -> dict[str, float]:
+    """How the promise became what was executed; the entries between the two add up to their difference.
+
+    A POI that was not credited is charged to the end of the robot that planned it. What robots lost that failed by
+    draw, against what they were expected to lose, is ``draws``.
+    """
+    run = judged.executed
+    promised = judged.expected if run.case.plan.value is None else run.case.plan.value
+    lost = run.planned_incentive - run.incentive
+    charged = {end: -float(np.where(run.end == ENDS.index(end), lost, 0.0).sum(axis=1).mean()) + 0.0
+               for end in ("out_of_fuel", "late", "stuck")}
+    assumption = judged.expected - promised
+    draws = executed - promised - assumption - sum(charged.values())
+    return {"promised": promised, "assumption": assumption + 0.0, "draws": draws + 0.0, **charged, "executed": executed}
+
+
+def _totals(run: Executed) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    totals: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = run.incentive.sum(axis=1)
+    return totals
+
+
+def _percent(part: float, whole: float) -> float | None:
+    return 100.0 * part / whole + 0.0 if whole else None

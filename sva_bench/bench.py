@@ -1,0 +1,262 @@
+"""The bench on one screen: from a world to its summary. The composition root."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sva_bench.analysis.report import write_report
+from sva_bench.analysis.summary import Judged, ScenarioResult, scenario_summary
+from sva_bench.execution.execute import Case, Executed, Fidelity, Settings, execute
+from sva_bench.mission.certify import certify
+from sva_bench.mission.instance import Instance, Vehicle, write_instance
+from sva_bench.mission.plan import Plan, write_plan
+from sva_bench.recording.rerun import record
+from sva_bench.runs import (
+    manifest,
+    run_folder,
+    run_name,
+    write_json,
+    write_legs,
+    write_outcomes,
+    write_travel_times,
+)
+from sva_bench.solver.two_stage import (
+    Knowledge,
+    SolveLimits,
+    knowledge_of,
+    plan_deterministic,
+    plan_nominal,
+    plan_stochastic,
+    wait_and_see,
+)
+from sva_bench.travel.fuel import FuelCosts, fuel_costs
+from sva_bench.travel.roadmap import PlannerName
+from sva_bench.travel.times import plan_travel_times
+from sva_bench.world.load import world_as_dict
+from sva_bench.world.model import Scenario, World
+
+NOMINAL = "nominal"
+"""The scenario of the availabilities under ``robots:``."""
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Options:
+    """What a run can be told.
+
+    Attributes:
+        seed: Root of failures and noise; plans don't depend on it.
+        trials: Trials of each plan in each scenario.
+        rollouts: Noise draws; 1 is enough without noise.
+        fidelity: How plans are executed.
+        planner: How paths are planned.
+        limits: When a solve may stop.
+        evpi: Work out the value of perfect information however many outcomes there are.
+    """
+
+    seed: int = 0
+    trials: int = 1000
+    rollouts: int = 8
+    fidelity: Fidelity = "rollout"
+    planner: PlannerName = "prmstar"
+    limits: SolveLimits = field(default_factory=SolveLimits)
+    evpi: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything that changes results."""
+        return {"trials": self.trials, "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
+                "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run:
+    """A finished run: where it is, and its summary."""
+
+    folder: Path
+    summary: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Planned:
+    """Both plans of a scenario, with what the model says of them.
+
+    Attributes:
+        instance: What they were made for.
+        stochastic, deterministic: The plans.
+        vss_range: Least and greatest modelled VSS over all deterministic plans that tie, under ``mission``.
+        evpi: Expected value of perfect information under ``mission``; ``None`` if it wasn't worked out.
+    """
+
+    instance: Instance
+    stochastic: Plan
+    deterministic: Plan
+    vss_range: tuple[float, float]
+    evpi: float | None
+
+
+def run(world: World, options: Options, out: Path, executor: Executor | None, progress: Progress) -> Run:
+    """Plan, execute, record and measure a world's mission."""
+    started, clock = datetime.now(UTC).isoformat(timespec="seconds"), _Stopwatch()
+    resolved = world_as_dict(world)
+    with clock.phase("travel"):
+        costs = plan_costs(world, options.planner, progress)
+    with clock.phase("planning"):
+        planned = plan_scenarios(world, costs, options, progress)
+    if any(plan.status == "interrupted" for p in planned.values() for plan in (p.stochastic, p.deterministic)):
+        raise KeyboardInterrupt
+    settings = Settings(seed=options.seed, trials=options.trials, fidelity=options.fidelity,
+                        rollouts=1 if world.noise.silent else options.rollouts)
+    cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios for name, plan in (
+        ("stochastic", planned[scenario.name].stochastic), ("deterministic", planned[scenario.name].deterministic))]
+    with clock.phase("execution"):
+        executed = execute(world, costs, cases, settings, executor,
+                           lambda done, of: progress("driving routes", done, of))
+    summary = summarise(world, options, settings, costs, planned, executed)
+    name = run_name(world.name, options.seed, {"world": resolved, "options": options.as_dict()})
+    with run_folder(out, name) as folder:
+        (folder / "plans").mkdir()
+        (folder / "recordings").mkdir()
+        write_travel_times(folder / "travel_times.parquet", list(costs.values()))
+        for scenario, plans in planned.items():
+            write_instance(folder / f"instance-{scenario}.json", plans.instance)
+        with clock.phase("recording"):
+            for number, done in enumerate(executed):
+                stem = f"{done.case.scenario.name}-{done.case.planner}"
+                write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
+                record(folder / "recordings" / f"{stem}.rrd", world, done.traces, title=f"{world.name} {stem}")
+                progress("recording", number + 1, len(executed))
+        write_legs(folder / "legs.parquet", executed)
+        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots], options.fidelity)
+        write_json(folder / "summary.json", summary)
+        write_report(folder / "report.html", summary, {k: v.case.plan for k, v in _by_stem(executed).items()}, world)
+        write_json(folder / "manifest.json", manifest(
+            resolved, options.seed, options.as_dict(), started, clock.seconds))
+    return Run(folder=out / name, summary=summary)
+
+
+def plan_costs(world: World, planner: PlannerName, progress: Progress) -> dict[str, FuelCosts]:
+    """Fuel costs of each robot model in the world, by its name."""
+    models = {robot.model.name: robot.model for robot in world.robots}
+    costs = {}
+    for number, (name, model) in enumerate(models.items()):
+        progress("planning paths", number, len(models))
+        costs[name] = fuel_costs(plan_travel_times(world, model, planner), world.margin)
+        progress("planning paths", number + 1, len(models))
+    return costs
+
+
+def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario) -> Instance:
+    """The instance of one scenario: all that a solver needs, and no world."""
+    sites = tuple(site.name for site in world.sites)
+    return Instance(
+        name=world.name if scenario.name == NOMINAL else f"{world.name}-{scenario.name}", sites=sites, base=0,
+        stations=tuple(sites.index(site.name) for site in world.stations),
+        stop_s=np.array([site.stop_s for site in world.sites]), failure=world.plan_failure, joint=scenario.joint,
+        vehicles=tuple(Vehicle(
+            name=robot.name, fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s,
+            availability=scenario.availability[robot.name], fuel_s=costs[robot.model.name].cost_s,
+            incentives=np.array([robot.incentives.get(site, 0.0) for site in sites])) for robot in world.robots),
+    )
+
+
+def nominal_scenario(world: World) -> Scenario:
+    """The availabilities as they stand under ``robots:``."""
+    return Scenario(name=NOMINAL, availability={robot.name: robot.availability for robot in world.robots})
+
+
+def plan_scenarios(
+    world: World, costs: Mapping[str, FuelCosts], options: Options, progress: Progress
+) -> dict[str, Planned]:
+    """Both plans of each scenario. Scenarios share what doesn't depend on availabilities."""
+    known: Knowledge | None = None
+    nominal: Plan | None = None
+    planned: dict[str, Planned] = {}
+    for number, scenario in enumerate(world.scenarios):
+        progress("solving", number, len(world.scenarios))
+        # There is no exact solver for per_leg yet: such worlds are planned under mission, and the summary says so.
+        instance = replace(instance_of(world, costs, scenario), failure="mission")
+        if known is None or nominal is None:
+            known = knowledge_of(instance)
+            nominal = plan_nominal(instance, options.limits, known=known)
+        stochastic = plan_stochastic(instance, options.limits, known=known)
+        pair = plan_deterministic(instance, stochastic, options.limits, nominal=nominal, known=known)
+        rp = expected_value(instance, pair.stochastic)
+        foresight = wait_and_see(instance, options.limits, known, force=options.evpi)
+        planned[scenario.name] = Planned(
+            instance=instance, stochastic=pair.stochastic, deterministic=pair.plan,
+            vss_range=(rp - pair.most, rp - pair.least),
+            evpi=None if foresight is None else max(foresight - rp, 0.0))
+        progress("solving", number + 1, len(world.scenarios))
+    return planned
+
+
+def expected_value(instance: Instance, plan: Plan) -> float:
+    """Closed-form value of a plan under the instance's failure process, by the independent check."""
+    certificate = certify(instance, replace(plan, value=None))
+    if certificate.expected is None:
+        raise RuntimeError(f"a plan for {instance.name} fails its check: {'; '.join(certificate.reasons)}")
+    return certificate.expected
+
+
+def summarise(
+    world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts],
+    planned: Mapping[str, Planned], executed: list[Executed],
+) -> dict[str, Any]:
+    """The content of ``summary.json``."""
+    runs = _by_stem(executed)
+    mission = world.execute_failure == "mission"
+    robots = [robot.name for robot in world.robots]
+    scenarios = []
+    for scenario in world.scenarios:
+        plans = planned[scenario.name]
+        truth = replace(plans.instance, failure=world.execute_failure)
+        judged = {name: Judged(expected=expected_value(truth, plan), executed=runs[f"{scenario.name}-{name}"])
+                  for name, plan in (("stochastic", plans.stochastic), ("deterministic", plans.deterministic))}
+        scenarios.append(scenario_summary(ScenarioResult(
+            stochastic=judged["stochastic"], deterministic=judged["deterministic"],
+            modelled_range=plans.vss_range if mission else None,
+            # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
+            vss_mean_value=0.0 if mission else None, evpi=plans.evpi if mission else None,
+        ), robots, noisy=not world.noise.silent))
+    pairs = sum(cost.pairs for cost in costs.values())
+    changed = sum(cost.changed_pct * cost.pairs for cost in costs.values())
+    return {
+        "format": "sva-bench/summary@1", "world": world.name, "seed": options.seed, "trials": settings.trials,
+        "rollouts": settings.rollouts, "fidelity": settings.fidelity,
+        "failure": {"plan": "mission", "execute": world.execute_failure},
+        "reproducible": all(plan.status == "optimal" for p in planned.values()
+                            for plan in (p.stochastic, p.deterministic)),
+        "travel": {"pairs": pairs, "triangle_violations_pct": round(changed / pairs, 6) if pairs else 0.0,
+                   "max_excess_pct": round(max((c.max_excess_pct for c in costs.values()), default=0.0), 6)},
+        "scenarios": scenarios,
+    }
+
+
+def _by_stem(executed: list[Executed]) -> dict[str, Executed]:
+    return {f"{run.case.scenario.name}-{run.case.planner}": run for run in executed}
+
+
+class _Stopwatch:
+    """Wall-clock time of each phase, for the manifest alone."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        begun = time.monotonic()
+        try:
+            yield
+        finally:
+            self.seconds[name] = time.monotonic() - begun

@@ -1,0 +1,400 @@
+"""Commands: nothing but parsing, calling, printing."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import click
+import typer
+from rich.console import Console
+from rich.logging import RichHandler
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from sva_bench import __version__
+from sva_bench.errors import BadInput, ExitCode, SvaBenchError, nearest
+
+app = typer.Typer(
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
+    help="What is a multi-robot mission plan worth when robots fail? Plans missions, executes them in physics with "
+         "randomised failures, and measures the value of the stochastic solution (VSS).",
+    epilog="Exit codes: 0 done, 1 a fault of the program, 2 bad input or usage, 3 an infeasible plan, "
+           "4 some trials unfinished, 130 interrupted.")
+
+log = logging.getLogger(__name__)
+messages = Console(stderr=True)
+
+
+class FidelityChoice(StrEnum):
+    """How plans are executed."""
+
+    kinematic = "kinematic"
+    rollout = "rollout"
+
+
+class PlannerChoice(StrEnum):
+    """How paths are planned."""
+
+    prmstar = "prmstar"
+    rrtconnect = "rrtconnect"
+
+
+class ProcessChoice(StrEnum):
+    """Failure process."""
+
+    mission = "mission"
+    per_leg = "per_leg"
+
+
+class ObjectiveChoice(StrEnum):
+    """What a plan is made for."""
+
+    stochastic = "stochastic"
+    deterministic = "deterministic"
+
+
+class MethodChoice(StrEnum):
+    """How a plan is made."""
+
+    auto = "auto"
+    expected = "expected"
+
+
+WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
+PlannerOption = Annotated[PlannerChoice, typer.Option(help="OMPL planner: one PRM* roadmap, or RRTConnect pair by pair "
+                                                           "(noisy).")]
+MarginOption = Annotated[float | None, typer.Option(
+    min=0, max=1, help="Planning costs are twin times x (1 + margin); default: the world's.", show_default=False)]
+TimeLimit = Annotated[float | None, typer.Option(
+    metavar="S", min=0, help="Stop each solve after so many seconds and take its best plan.", show_default="none")]
+Gap = Annotated[float, typer.Option(min=0, help="Relative gap at which a plan counts as optimal.")]
+
+
+@app.command()
+def run(
+    world: WorldArgument,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")] = 0,
+    trials: Annotated[int, typer.Option(min=1, help="Trials of each plan in each scenario.")] = 1000,
+    rollouts: Annotated[int, typer.Option(min=1, help="Noise draws; trial t has number t mod ROLLOUTS.")] = 8,
+    fidelity: Annotated[FidelityChoice, typer.Option(help="Physics once per route and noise draw, or the kinematic "
+                                                          "twin alone.")] = FidelityChoice.rollout,
+    planner: PlannerOption = PlannerChoice.prmstar,
+    scenario: Annotated[list[str] | None, typer.Option(help="Only this scenario; may be repeated.")] = None,
+    margin: MarginOption = None,
+    plan_failure: Annotated[ProcessChoice | None, typer.Option(help="Failure process that plans are made for.")] = None,
+    execute_failure: Annotated[ProcessChoice | None, typer.Option(help="Failure process that is executed.")] = None,
+    time_limit: TimeLimit = None,
+    gap: Gap = 1e-6,
+    evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
+                                                      "takes.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder that receives the run folder.")] = Path("runs"),
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes that drive; default: all cores.",
+                                                show_default=False)] = None,
+    as_json: AsJson = False,
+    verbose: Verbose = False,
+) -> None:
+    """Plan, execute, record and measure a mission: the main job.
+
+    Writes a run folder with travel times, instances, plans, outcomes, recordings and a summary.
+    """
+    from sva_bench.bench import Options
+    from sva_bench.bench import run as run_bench
+    from sva_bench.solver.two_stage import SolveLimits
+    from sva_bench.world.load import load_world
+
+    _set_up_logging(verbose)
+    loaded = load_world(world)
+    if scenario:
+        loaded = replace(loaded, scenarios=tuple(loaded.scenario(name) for name in _known_scenarios(
+            scenario, [s.name for s in loaded.scenarios])))
+    if margin is not None:
+        loaded = replace(loaded, margin=margin)
+    if plan_failure is not None:
+        loaded = replace(loaded, plan_failure=plan_failure.value)
+    if execute_failure is not None:
+        loaded = replace(loaded, execute_failure=execute_failure.value)
+    if loaded.plan_failure == "per_leg":
+        log.warning("no exact solver for per_leg failures yet: plans are made under mission")
+    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
+                      limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi)
+    with _progress() as progress, _workers(workers) as executor:
+        result = run_bench(loaded, options, out, executor, progress)
+    if as_json:
+        print_json(result.summary)
+    else:
+        _print_summary(result.summary)
+        messages.print(f"written to [bold]{escape(str(result.folder))}[/bold]", highlight=False)
+
+
+@app.command()
+def times(
+    world: WorldArgument,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Instance file to write; default: standard "
+                                                "output.", show_default=False)] = None,
+    scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario; default: those under "
+                                                      "robots.", show_default=False)] = None,
+    planner: PlannerOption = PlannerChoice.prmstar,
+    margin: MarginOption = None,
+    verbose: Verbose = False,
+) -> None:
+    """Plan travel times and repair them into fuel costs: an instance for any solver."""
+    from sva_bench.mission.instance import instance_text
+
+    _set_up_logging(verbose)
+    with _progress() as progress:
+        instance = _instance_of_world(world, scenario, planner.value, margin, progress)
+    _write(output, instance_text(instance))
+
+
+@app.command()
+def plan(
+    source: Annotated[Path, typer.Argument(metavar="WORLD-or-INSTANCE", help="World (YAML) or instance (JSON).",
+                                           show_default=False)],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Plan file to write; default: standard output.",
+                                                show_default=False)] = None,
+    objective: Annotated[ObjectiveChoice, typer.Option(help="Plan for failures, or take every robot as "
+                                                            "available.")] = ObjectiveChoice.stochastic,
+    method: Annotated[MethodChoice, typer.Option(help="Solution method; auto chooses.")] = MethodChoice.auto,
+    scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
+                                                      "under robots.", show_default=False)] = None,
+    time_limit: TimeLimit = None,
+    gap: Gap = 1e-6,
+    verbose: Verbose = False,
+) -> None:
+    """Make one plan, proved optimal unless a limit stops it."""
+    from sva_bench.documents import pretty_json
+    from sva_bench.mission.instance import read_instance
+    from sva_bench.mission.plan import plan_as_dict
+    from sva_bench.solver.two_stage import SolveLimits, plan_deterministic, plan_stochastic
+
+    _set_up_logging(verbose)
+    assert method in MethodChoice  # one method so far: auto means expected
+    with _progress() as progress:
+        if source.suffix.lower() in (".yaml", ".yml"):
+            instance = _instance_of_world(source, scenario, "prmstar", None, progress)
+        elif scenario is not None:
+            raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
+        else:
+            instance = read_instance(source)
+        progress("solving", 0, 1)
+        limits = SolveLimits(time_limit_s=time_limit, gap=gap)
+        if objective is ObjectiveChoice.stochastic:
+            made = plan_stochastic(instance, limits)
+        else:
+            stochastic = plan_stochastic(replace(instance, failure="mission"), limits)
+            made = plan_deterministic(instance, stochastic, limits).plan
+        progress("solving", 1, 1)
+    _write(output, pretty_json(plan_as_dict(made)))
+    gap_left = 0.0 if made.value is None or made.bound is None else made.bound - made.value
+    messages.print(f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, gap {gap_left:.3g}, "
+                   f"{made.runtime_s:.2f} s", highlight=False)
+    if made.status == "interrupted":
+        raise typer.Exit(ExitCode.INTERRUPTED)
+
+
+@app.command()
+def certify(
+    instance: Annotated[Path, typer.Argument(metavar="INSTANCE", help="Instance file (JSON).", show_default=False)],
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="Plan file (JSON).", show_default=False)],
+    as_json: AsJson = False,
+) -> None:
+    """Check a plan independently: is it feasible, and what is it worth?
+
+    Exits with 3 if it is infeasible.
+    """
+    from sva_bench.mission.certify import certify as check
+    from sva_bench.mission.instance import read_instance
+    from sva_bench.mission.plan import read_plan
+
+    problem = read_instance(instance)
+    certificate = check(problem, read_plan(plan, problem))
+    if as_json:
+        print_json(certificate.as_dict())
+    else:
+        console = Console(width=_width())
+        verdict = f"feasible, expected incentive {certificate.expected:.6g}" if certificate.feasible else "infeasible"
+        console.print(verdict, highlight=False)
+        for reason in certificate.reasons:
+            console.print(f"  {reason}", highlight=False, markup=False)
+    if not certificate.feasible:
+        raise typer.Exit(ExitCode.INFEASIBLE_PLAN)
+
+
+@app.command()
+def view(
+    recording: Annotated[Path, typer.Argument(metavar="RUN-or-RRD", help="Run folder, or one recording.",
+                                              show_default=False)],
+    web: Annotated[bool, typer.Option("--web", help="Serve it to a browser, on this machine only.")] = False,
+    screenshot: Annotated[Path | None, typer.Option(metavar="OUT.png", help="Take a picture without a screen.",
+                                                    show_default=False)] = None,
+    at: Annotated[float | None, typer.Option(metavar="S", min=0, help="Mission time of the picture.",
+                                             show_default="the middle")] = None,
+) -> None:
+    """Open recordings in the Rerun viewer."""
+    from sva_bench.recording.viewer import view as open_viewer
+
+    open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
+
+
+@app.callback(invoke_without_command=True)
+def _main(version: Annotated[bool, typer.Option("--version", help="Print the version.", is_eager=True)] = False
+          ) -> None:
+    if version:
+        typer.echo(f"sva-bench {__version__}")
+        raise typer.Exit
+
+
+def run_command_line(arguments: Sequence[str]) -> int:
+    """Run one command and return its exit code; every failure becomes one message on standard error."""
+    try:
+        result = app(list(arguments), standalone_mode=False)
+    except SvaBenchError as error:
+        messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
+        return int(error.exit_code)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        messages.print("interrupted")
+        return int(ExitCode.INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whoever read standard output has gone; say no more
+        return int(ExitCode.DONE)
+    except Exception as error:
+        messages.print(f"[bold red]fault:[/bold red] {escape(type(error).__name__)}: {escape(str(error))}\n"
+                       "This is a fault of the program or its installation, not of your input; "
+                       "-v prints where it happened.", highlight=False, soft_wrap=True)
+        log.debug("where it happened", exc_info=True)
+        return int(ExitCode.FAULT)
+    return int(result) if isinstance(result, int) else int(ExitCode.DONE)
+
+
+def print_json(data: Any) -> None:
+    """Print a result as JSON on standard output."""
+    sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
+
+
+def _instance_of_world(path: Path, scenario: str | None, planner: Any, margin: float | None,
+                       progress: Callable[[str, int, int], None]) -> Any:
+    from sva_bench.bench import instance_of, nominal_scenario, plan_costs
+    from sva_bench.world.load import load_world
+
+    world = load_world(path)
+    if margin is not None:
+        world = replace(world, margin=margin)
+    chosen = nominal_scenario(world)
+    if scenario is not None:
+        chosen = world.scenario(_known_scenarios([scenario], [s.name for s in world.scenarios])[0])
+    costs = plan_costs(world, planner, progress)
+    for cost in costs.values():
+        log.info("%s: %d pairs, repair changed %.2f %% of them, by up to %.2f %%; longest leg %.3f s",
+                 cost.times.model.name, cost.pairs, cost.changed_pct, cost.max_excess_pct, cost.cost_s.max())
+    return instance_of(world, costs, chosen)
+
+
+def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
+    for name in names:
+        if name not in known:
+            raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
+    return list(dict.fromkeys(names))
+
+
+def _write(path: Path | None, text: str) -> None:
+    """Write a result to a file, whole or not at all, or to standard output."""
+    if path is None:
+        sys.stdout.write(text)
+        return
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(path)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another place with -o") from None
+
+
+def _set_up_logging(verbose: bool) -> None:
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,
+                        handlers=[RichHandler(console=messages, show_time=False, show_path=False)])
+    logging.getLogger("sva_bench").setLevel(logging.DEBUG if verbose else logging.WARNING)
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Progress bars on standard error; plain lines where that is no terminal."""
+    if not messages.is_terminal:
+        said: set[str] = set()
+
+        def say(what: str, done: int, of: int) -> None:
+            if what not in said and done < of:
+                said.add(what)
+                messages.print(f"{what} ...", highlight=False)
+
+        yield say
+        return
+    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                  console=messages, transient=True) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(what: str, done: int, of: int) -> None:
+            if what not in tasks:
+                tasks[what] = bars.add_task(what, total=of)
+            bars.update(tasks[what], completed=done, total=of)
+
+        yield show
+
+
+@contextmanager
+def _workers(count: int | None) -> Iterator[Any]:
+    """Processes that drive routes; ``None`` where one is enough."""
+    from sva_bench.workers import local_workers
+
+    with local_workers(count or len(os.sched_getaffinity(0))) as executor:
+        yield executor
+
+
+def _width() -> int | None:
+    """Tables keep their shape in a pipe."""
+    return None if sys.stdout.isatty() else 140
+
+
+def _print_summary(summary: Any) -> None:
+    from sva_bench.analysis.report import answer, with_interval
+
+    console = Console(width=_width())
+    travel = summary["travel"]
+    table = Table(title=f"{summary['world']}, seed {summary['seed']}: {summary['trials']} trials, "
+                        f"{summary['rollouts']} rollouts, {summary['fidelity']}", title_justify="left")
+    for heading in ("scenario", "plan", "promised", "expected", "executed [95 %]", *summary["scenarios"][0][
+            "availability"], "VSS executed [95 %]", "VSS modelled", "EVPI"):
+        table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
+    for scenario in summary["scenarios"]:
+        vss = scenario["vss"]
+        for name, plan in scenario["plans"].items():
+            first = name == "stochastic"
+            proof = "" if plan["status"] == "optimal" else f" ({plan['status']})"
+            worth = with_interval(vss["executed"]) if vss["distinguishable"] else "not distinguishable from zero"
+            table.add_row(
+                scenario["name"] if first else "", name + proof, f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
+                with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()),
+                worth if first else "", f"{vss['modelled']:.1f}" if first else "",
+                f"{scenario['evpi']:.1f}" if first and scenario["evpi"] is not None else "", end_section=not first)
+    console.print(table)
+    console.print(f"{travel['pairs']} travel times, {travel['triangle_violations_pct']:.1f} % repaired, by up to "
+                  f"{travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed under "
+                  f"{summary['failure']['execute']} failures.", highlight=False)
+    console.print(answer(summary), highlight=False)
+    if not summary["reproducible"]:
+        console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

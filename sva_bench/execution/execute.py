@@ -1,0 +1,323 @@
+"""Plans executed: each route driven once per noise draw, then each trial settled by its failures."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.execution.outcome import ENDS, Assignment, Driven, Outcome, Trace, settle, trace_of
+from sva_bench.execution.simulator import Simulator, downsampled
+from sva_bench.mission.failures import draw_failures
+from sva_bench.mission.plan import Plan, Route
+from sva_bench.robot.follower import Stretch
+from sva_bench.robot.model import RobotModel
+from sva_bench.robot.twin import drive as drive_twin
+from sva_bench.seeds import Stream, rng_for
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, World
+
+Fidelity = Literal["kinematic", "rollout"]
+FIDELITIES: tuple[Fidelity, ...] = get_args(Fidelity)
+TRACE_HZ = 20.0
+
+Hop = tuple[Stretch, ...]
+Leg = tuple[Hop, ...]
+"""A leg of a route: the hops of the chain that its repaired cost stands for."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Case:
+    """One plan under one scenario."""
+
+    scenario: Scenario
+    planner: str
+    plan: Plan
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Settings:
+    """How plans are executed.
+
+    Attributes:
+        seed: Root of failures and noise.
+        trials: Number of trials.
+        rollouts: Number of noise draws; trial t has that of rollout t mod ``rollouts``. 1 without noise.
+        fidelity: ``kinematic`` (the twin) or ``rollout`` (physics).
+    """
+
+    seed: int
+    trials: int
+    rollouts: int
+    fidelity: Fidelity
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LegTime:
+    """A leg as planned (the repaired twin time, without margin) and as driven [s]."""
+
+    rollout: int
+    robot: str
+    leg: int
+    origin: str
+    destination: str
+    planned_s: float
+    driven_s: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Executed:
+    """What came of one case, trial by trial. Arrays have shape (trials, robots) unless said otherwise.
+
+    Attributes:
+        case: Plan and scenario.
+        rollout: Noise draw of each trial, shape (trials,).
+        available: Whether the robot was never drawn to fail.
+        incentive: What it collected.
+        pois_reached, stops_reached: How far it got.
+        end: Index into ``ENDS``.
+        end_time_s, fuel_used_s: When it ended, and on how much.
+        planned_incentive: What each robot's route holds, shape (robots,).
+        legs: Every leg that was driven.
+        traces: Trial 0 over time, a trace for each robot.
+    """
+
+    case: Case
+    rollout: IntArray
+    available: BoolArray
+    incentive: FloatArray
+    pois_reached: IntArray
+    stops_reached: IntArray
+    end: IntArray
+    end_time_s: FloatArray
+    fuel_used_s: FloatArray
+    planned_incentive: FloatArray
+    legs: tuple[LegTime, ...]
+    traces: tuple[Trace, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DriveTask:
+    """One robot's route under one noise draw: all that a worker needs."""
+
+    obstacles: Obstacles
+    model: RobotModel
+    start: tuple[float, float, float]
+    legs: tuple[Leg, ...]
+    wheel_gains: tuple[float, float]
+    fidelity: Fidelity
+    traced: bool
+
+
+def drive_route(task: DriveTask) -> Driven:
+    """Drive a whole route, in physics or by the twin."""
+    if task.fidelity == "kinematic":
+        return _drive_legs(task, _twin_driver(task))
+    with Simulator(task.obstacles, task.model, task.start, task.wheel_gains) as simulator:
+        return _drive_legs(task, simulator.drive)
+
+
+Driver = Callable[[Hop, list[tuple[float, float, float]] | None], tuple[float, bool]]
+
+
+def _twin_driver(task: DriveTask) -> Driver:
+    pose = np.array(task.start)
+
+    def drive(hop: Hop, poses: list[tuple[float, float, float]] | None) -> tuple[float, bool]:
+        time_s, trace = drive_twin(task.model, hop, pose, task.wheel_gains, traced=poses is not None)
+        if poses is not None:
+            poses.extend((x, y, yaw) for x, y, yaw in trace.tolist())
+        return (time_s, True) if np.isfinite(time_s) else (0.0, False)
+
+    return drive
+
+
+def _drive_legs(task: DriveTask, drive: Driver) -> Driven:
+    times: list[float] = []
+    leg_of, clock, poses = [np.empty(0)], [np.empty(0)], [np.empty((0, 3))]
+    arrived = True
+    for number, leg in enumerate(task.legs):
+        kept: list[tuple[float, float, float]] | None = [] if task.traced else None
+        total = 0.0
+        for hop in leg:
+            time_s, arrived = drive(hop, kept)
+            total += time_s
+            if not arrived:
+                break
+        times.append(total)
+        if kept:
+            at, where = downsampled(kept, TRACE_HZ)
+            leg_of.append(np.full(len(at), float(number)))
+            clock.append(at)
+            poses.append(where)
+        if not arrived:
+            break
+    return Driven(leg_s=np.array(times), stuck=not arrived, leg_of=np.concatenate(leg_of),
+                  clock_s=np.concatenate(clock), pose=np.concatenate(poses))
+
+
+def wheel_gains(seed: int, rollout: int, robot: int, noise: Noise) -> tuple[float, float]:
+    """Gains of a robot's left and right wheel in a rollout, the same for every plan."""
+    if noise.silent:
+        return 1.0, 1.0
+    left, right = 1.0 + noise.wheel_gain_sd * rng_for(seed, Stream.NOISE, rollout, robot).standard_normal(2)
+    return float(left), float(right)
+
+
+Key = tuple[str, Route, int]
+"""Robot, route and rollout: what a drive depends on, the world and the seed given."""
+
+
+def execute(
+    world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings,
+    executor: Executor | None = None, progress: Callable[[int, int], None] | None = None,
+) -> list[Executed]:
+    """Execute plans over all trials.
+
+    Args:
+        world: The world.
+        costs: Fuel costs by the name of the robot model.
+        cases: Plans with their scenarios; drives that several of them share are made once.
+        settings: Seed, trials, rollouts, fidelity.
+        executor: Where drives run; ``None`` = here.
+        progress: Called with the number of drives done and of all.
+    """
+    orders = [[_orders(world, robot, case.plan.route(robot.name)) for robot in world.robots] for case in cases]
+    fails = [_failures(world, case, own, settings) for case, own in zip(cases, orders, strict=True)]
+    drives = _drive_all(_tasks(world, costs, settings, orders, fails), executor, progress)
+    return [_settle_all(world, costs, case, own, failed, settings, drives)
+            for case, own, failed in zip(cases, orders, fails, strict=True)]
+
+
+def _orders(world: World, robot: Robot, route: Route) -> Assignment:
+    return Assignment(
+        robot=robot.name, route=route, stations=frozenset(s.name for s in world.stations),
+        incentives=robot.incentives, stop_s={s.name: s.stop_s for s in world.sites},
+        fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s)
+
+
+def _failures(world: World, case: Case, orders: Sequence[Assignment], settings: Settings) -> IntArray:
+    most = max((sum(o.is_poi(site) for site in o.route) for o in orders), default=0)
+    return draw_failures(
+        settings.seed, [robot.name for robot in world.robots], case.scenario.availability, world.execute_failure,
+        trials=settings.trials, pois=most, joint=case.scenario.joint)
+
+
+def _tasks(
+    world: World, costs: Mapping[str, FuelCosts], settings: Settings, orders: Sequence[Sequence[Assignment]],
+    fails: Sequence[IntArray],
+) -> dict[Key, DriveTask]:
+    """The drives that some trial needs: a robot that fails at the base in all its trials drives none."""
+    tasks: dict[Key, DriveTask] = {}
+    base = world.sites[0]
+    for own, failed in zip(orders, fails, strict=True):
+        for number, (robot, order) in enumerate(zip(world.robots, own, strict=True)):
+            if not order.route:
+                continue
+            legs = _legs(costs[robot.model.name], order.route)
+            for rollout in range(min(settings.rollouts, settings.trials)):
+                key = (robot.name, order.route, rollout)
+                if key not in tasks and (failed[rollout :: settings.rollouts, number] > 0).any():
+                    tasks[key] = DriveTask(
+                        obstacles=world.obstacles, model=robot.model, start=(base.x_m, base.y_m, base.heading_rad),
+                        legs=legs, wheel_gains=wheel_gains(settings.seed, rollout, number, world.noise),
+                        fidelity=settings.fidelity, traced=rollout == 0)
+    return tasks
+
+
+def _legs(costs: FuelCosts, route: Route) -> tuple[Leg, ...]:
+    legs = []
+    for origin, destination in itertools.pairwise(route):
+        chain = costs.chain(origin, destination)
+        legs.append(tuple(costs.times.course(a, b) for a, b in itertools.pairwise(chain)))
+    return tuple(legs)
+
+
+def _drive_all(
+    tasks: Mapping[Key, DriveTask], executor: Executor | None, progress: Callable[[int, int], None] | None
+) -> dict[Key, Driven]:
+    drives: dict[Key, Driven] = {}
+    if executor is None:
+        for key, task in tasks.items():
+            drives[key] = drive_route(task)
+            if progress:
+                progress(len(drives), len(tasks))
+        return drives
+    # The longest first, so that no worker is left with one at the end.
+    order = sorted(tasks, key=lambda key: -len(tasks[key].legs))
+    futures = {executor.submit(drive_route, tasks[key]): key for key in order}
+    try:
+        for future in as_completed(futures):
+            drives[futures[future]] = future.result()
+            if progress:
+                progress(len(drives), len(tasks))
+    finally:
+        for future in futures:
+            future.cancel()
+    return drives
+
+
+def _settle_all(
+    world: World, costs: Mapping[str, FuelCosts], case: Case, orders: Sequence[Assignment], fails: IntArray,
+    settings: Settings, drives: Mapping[Key, Driven],
+) -> Executed:
+    shape = fails.shape
+    rollout = np.arange(settings.trials) % settings.rollouts
+    incentive, end_time, fuel = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    pois, stops, end = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+    traces = []
+    for number, order in enumerate(orders):
+        settled: dict[tuple[int, int], Outcome] = {}
+        for trial in range(settings.trials):
+            k, failed = int(rollout[trial]), int(fails[trial, number])
+            if (k, failed) not in settled:
+                settled[k, failed] = settle(order, _drive_of(drives, order, k), failed)
+            outcome = settled[k, failed]
+            incentive[trial, number], end_time[trial, number] = outcome.incentive, outcome.end_time_s
+            fuel[trial, number], end[trial, number] = outcome.fuel_used_s, ENDS.index(outcome.end)
+            pois[trial, number], stops[trial, number] = outcome.pois_reached, outcome.stops_reached
+        traces.append(_trace(world, costs[world.robots[number].model.name], order, drives,
+                             settled[0, int(fails[0, number])]))
+    return Executed(
+        case=case, rollout=rollout, available=fails == np.iinfo(np.int64).max, incentive=incentive, pois_reached=pois,
+        stops_reached=stops, end=end, end_time_s=end_time, fuel_used_s=fuel,
+        planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
+        legs=tuple(_leg_times(world, costs, orders, settings, drives)), traces=tuple(traces))
+
+
+_NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
+
+
+def _drive_of(drives: Mapping[Key, Driven], order: Assignment, rollout: int) -> Driven:
+    """The drive of a robot in a rollout; nothing where it never leaves."""
+    return drives.get((order.robot, order.route, rollout), _NOTHING)
+
+
+def _trace(world: World, costs: FuelCosts, order: Assignment, drives: Mapping[Key, Driven], outcome: Outcome) -> Trace:
+    base = world.sites[0]
+    planned = [costs.times.path(a, b) for origin, destination in zip(order.route, order.route[1:], strict=False)
+               for chain in [costs.chain(origin, destination)] for a, b in itertools.pairwise(chain)]
+    return trace_of(order, _drive_of(drives, order, 0), outcome, (base.x_m, base.y_m, base.heading_rad),
+                    np.concatenate(planned) if planned else np.empty((0, 2)))
+
+
+def _leg_times(
+    world: World, costs: Mapping[str, FuelCosts], orders: Sequence[Assignment], settings: Settings,
+    drives: Mapping[Key, Driven],
+) -> list[LegTime]:
+    rows = []
+    for robot, order in zip(world.robots, orders, strict=True):
+        fuel = costs[robot.model.name]
+        sites = fuel.times.sites
+        for rollout in range(settings.rollouts):
+            for leg, driven_s in enumerate(_drive_of(drives, order, rollout).leg_s.tolist()):
+                origin, destination = order.route[leg], order.route[leg + 1]
+                planned_s = fuel.repaired_ms[sites.index(origin), sites.index(destination)] / 1000.0
+                rows.append(LegTime(rollout=rollout, robot=order.robot, leg=leg, origin=origin, destination=destination,
+                                    planned_s=float(planned_s), driven_s=driven_s))
+    return rows

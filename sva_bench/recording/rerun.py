@@ -1,0 +1,276 @@
+"""Stories written as Rerun recordings, and what of the Rerun viewer is driven from here."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+from rerun.chunk import RrdReader
+from rerun.experimental import ViewerClient
+
+from sva_bench.arrays import FloatArray
+from sva_bench.execution.outcome import Trace
+from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Solids, Story, story_of
+from sva_bench.world.model import World
+
+TIMELINE = "sim_time"
+
+_FLOOR: Color = (232, 232, 232)
+_WALLS: Color = (176, 176, 176)
+_BACKGROUND: Color = (28, 30, 34)  # as dark as the viewer's other panels
+_NAMES: Color = (255, 255, 255)  # the viewer writes them on dark shields
+_TOTAL: Color = (190, 190, 190)
+
+_OBSTACLE_M = 0.35  # shown height: low, so that little is hidden behind it
+_FLOOR_M = 0.02  # shown thickness
+_PLANNED_M, _DRIVEN_M = 0.015, 0.03  # heights of lines above the floor, and below the robots
+_NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
+_SETTLE_S, _SETTLE_TRIES = 0.5, 40  # between pictures; a third or fourth one is the last, on a slow machine a tenth
+_PLAY_S = 30.0  # a mission is played in about this time
+
+
+def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> None:
+    """Write one trial as a recording, with the layout that it is shown in.
+
+    Args:
+        path: The ``.rrd`` file; its folder exists. It appears under this name when it is complete.
+        world: The world.
+        traces: One per robot at most, of one trial.
+        title: What the viewer calls the recording.
+
+    Raises:
+        ValueError: If the traces don't belong to the world.
+    """
+    story = story_of(world, traces, title)
+    unfinished = path.with_name(path.name + ".tmp")
+    # Layouts are kept per application id, and one layout fits one world. The recording's id follows from its content:
+    # the same trial is the same recording, and two that are opened together stay apart.
+    recording = rr.RecordingStream(f"sva-bench {world.name}", recording_id=_identity(story), send_properties=False)
+    try:
+        recording.set_log_time_enabled(False)
+        recording.set_log_tick_enabled(False)
+        recording.save(unfinished, default_blueprint=_layout(story))
+        recording.send_recording_name(title)
+        _write_solids(recording, story.solids)
+        for marks in story.marks:
+            _write_marks(recording, marks, story.solids)
+        for robot in story.cast:
+            _write_robot(recording, robot)
+        _write_numbers(recording, story)
+        _write_log(recording, story)
+        recording.flush()
+        recording.disconnect()
+        os.replace(unfinished, path)
+    finally:
+        recording.disconnect()
+        unfinished.unlink(missing_ok=True)
+
+
+def end_s(path: Path) -> float:
+    """Last moment of a recording [s]."""
+    timed = (chunk.to_record_batch() for chunk in RrdReader(path).stream() if TIMELINE in chunk.timeline_names)
+    return max((int(rows.column(TIMELINE).cast("int64").to_numpy().max()) for rows in timed), default=0) / 1e9
+
+
+def photograph(port: int, path: Path, picture: Path, at_s: float) -> None:
+    """Have the viewer that listens at a port of this machine open a recording and save what it shows.
+
+    Raises:
+        RuntimeError: If the viewer doesn't answer, or can't.
+    """
+    client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+    client.open(str(path.resolve()))
+    client.set_time(TIMELINE, duration=at_s, play_state="paused")
+    # Charts, columns and notices settle over some frames: done when a picture is like the one before.
+    before = b""
+    for _ in range(_SETTLE_TRIES):
+        time.sleep(_SETTLE_S)
+        client.save_screenshot(str(picture.resolve()))
+        now = picture.read_bytes()
+        if now == before:
+            return
+        before = now
+    raise RuntimeError("its picture did not come to rest")
+
+
+def _identity(story: Story) -> str:
+    digest = hashlib.sha256(f"{story.world}\0{story.title}".encode())
+    for robot in story.cast:
+        digest.update(robot.name.encode())
+        digest.update(robot.time_s.tobytes() + robot.pose.tobytes())
+    for sentence in story.log:
+        digest.update(f"{sentence.time_s!r}{sentence.text}".encode())
+    return digest.hexdigest()[:32]
+
+
+def _times(time_s: Iterable[float] | FloatArray) -> rr.TimeColumn:
+    # Rounded here: rerun cuts off, and 0.29 s would become 0.289999999 s.
+    nanoseconds = np.round(np.asarray(time_s, dtype=np.float64) * 1e9).astype("timedelta64[ns]")
+    return rr.TimeColumn(TIMELINE, duration=nanoseconds)
+
+
+def _column(recording: rr.RecordingStream, entity: str, time_s: Iterable[float] | FloatArray, columns: Any) -> None:
+    recording.send_columns(entity, [_times(time_s)], columns, strict=True)
+
+
+def _constant(recording: rr.RecordingStream, entity: str, *shapes: Any) -> None:
+    recording.log(entity, *shapes, static=True, strict=True)
+
+
+def _deep(points: FloatArray, z_m: float) -> NDArray[np.float32]:
+    """Points of the floor at a height: shape (..., 2) to (..., 3)."""
+    return np.concatenate([points, np.full((*points.shape[:-1], 1), z_m)], axis=-1).astype(np.float32)
+
+
+def _about_z(yaw_rad: FloatArray) -> NDArray[np.float32]:
+    """Quaternions x, y, z, w of turns about the vertical, shape (n, 4)."""
+    nought = np.zeros_like(yaw_rad)
+    return np.stack([nought, nought, np.sin(yaw_rad / 2), np.cos(yaw_rad / 2)], axis=-1).astype(np.float32)
+
+
+def _pale(color: Color) -> Color:
+    r, g, b = (round(c + (255 - c) * 0.45) for c in color)
+    return r, g, b
+
+
+def _write_solids(recording: rr.RecordingStream, solids: Solids) -> None:
+    x0, y0, x1, y1 = solids.bounds_m.tolist()
+    _constant(recording, "world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    _constant(recording, "world/floor", rr.Boxes3D(
+        centers=[[(x0 + x1) / 2, (y0 + y1) / 2, -_FLOOR_M / 2]],
+        half_sizes=[[(x1 - x0) / 2, (y1 - y0) / 2, _FLOOR_M / 2]], colors=[_FLOOR], fill_mode="solid"))
+    boxes = solids.boxes
+    _constant(recording, "world/boxes", rr.Boxes3D(
+        centers=_deep(boxes[:, :2], _OBSTACLE_M / 2),
+        half_sizes=_deep(boxes[:, 2:4], _OBSTACLE_M / 2), quaternions=_about_z(boxes[:, 4]),
+        colors=[_WALLS], fill_mode="solid"))
+    if len(solids.cylinders):
+        _constant(recording, "world/cylinders", rr.Cylinders3D(
+            centers=_deep(solids.cylinders[:, :2], _OBSTACLE_M / 2), radii=solids.cylinders[:, 2],
+            lengths=[_OBSTACLE_M] * len(solids.cylinders), colors=[_WALLS], fill_mode="solid"))
+
+
+def _write_marks(recording: rr.RecordingStream, marks: Marks, solids: Solids) -> None:
+    """Sites as plates on the floor: POIs round, stations square, the base a square on its corner."""
+    x0, y0, x1, y1 = solids.bounds_m.tolist()
+    half, thick = max(0.3, max(x1 - x0, y1 - y0) / 60), 0.02  # large enough to be seen in a large world
+    n = len(marks.names)
+    entity = {"base": "world/base", "station": "world/stations", "poi": "world/pois"}[marks.kind]
+    centers = _deep(marks.at_m, thick / 2)
+    if marks.kind == "poi":
+        _constant(recording, entity, rr.Cylinders3D.from_fields(
+            centers=centers, radii=[half] * n, lengths=[thick] * n, fill_mode="solid"))
+        colors = rr.Cylinders3D.columns(colors=marks.colors.reshape(-1, 3).astype(np.uint8))
+    else:
+        turn = math.radians(45) if marks.kind == "base" else 0.0
+        _constant(recording, entity, rr.Boxes3D.from_fields(
+            centers=centers, half_sizes=[[half, half, thick / 2]] * n, quaternions=_about_z(np.full(n, turn)),
+            fill_mode="solid"))
+        colors = rr.Boxes3D.columns(colors=marks.colors.reshape(-1, 3).astype(np.uint8))
+    _column(recording, entity, marks.time_s, colors.partition([n] * len(marks.time_s)))
+    _write_names(recording, f"{entity}/names", marks.names, _deep(marks.at_m - [0.0, half], 0.0))
+
+
+def _write_names(
+    recording: rr.RecordingStream, entity: str, names: Sequence[str], at_m: NDArray[np.floating[Any]]
+) -> None:
+    """Names, each just below its point; labels of solids would have the solid's colour, and be hard to read."""
+    _constant(recording, entity, rr.Points3D(
+        at_m, radii=rr.Radius.ui_points(0.0), colors=[_NAMES], labels=names, show_labels=True))
+
+
+def _write_robot(recording: rr.RecordingStream, robot: Cast) -> None:
+    here, r = f"world/robots/{robot.name}", robot.radius_m
+    height = 2 * r
+    # Place and heading apart: the name goes where the robot goes, but stays north of it.
+    _column(recording, here, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.pose[:, :2], 0.0)))
+    _column(recording, f"{here}/hull", robot.time_s, rr.Transform3D.columns(quaternion=_about_z(robot.pose[:, 2])))
+    _write_names(recording, f"{here}/name", [robot.name], np.array([[0.0, r + _NAME_M, height]]))
+    _constant(recording, f"{here}/hull/body", rr.Cylinders3D.from_fields(
+        centers=[[0, 0, height / 2]], radii=[r], lengths=[height], fill_mode="solid"))
+    times, colors = [0.0], [robot.color]
+    if robot.dies_s == 0:
+        colors = [DEAD]
+    elif robot.dies_s is not None:
+        times, colors = [0.0, robot.dies_s], [robot.color, DEAD]
+    _column(recording, f"{here}/hull/body", times, rr.Cylinders3D.columns(colors=colors))
+    # A white bar on top, from the centre to the front.
+    _constant(recording, f"{here}/hull/heading", rr.Boxes3D(
+        centers=[[r / 2, 0, height]], half_sizes=[[r / 2, r / 6, r / 10]], colors=[(255, 255, 255)], fill_mode="solid"))
+    if len(robot.planned):
+        _constant(recording, f"world/planned/{robot.name}", rr.LineStrips3D(
+            _deep(robot.planned, _PLANNED_M), colors=[_pale(robot.color)], radii=rr.Radius.ui_points(1.0)))
+    if len(robot.trail):
+        entity = f"world/driven/{robot.name}"
+        _constant(recording, entity, rr.LineStrips3D.from_fields(
+            colors=[robot.color], radii=rr.Radius.ui_points(1.75)))
+        _column(recording, entity, robot.trail_s, rr.LineStrips3D.columns(strips=_deep(robot.trail, _DRIVEN_M)))
+
+
+def _write_numbers(recording: rr.RecordingStream, story: Story) -> None:
+    def line(entity: str, series: Series, name: str, color: Color, *, steps: bool, width: float = 2.0) -> None:
+        _constant(recording, entity, rr.SeriesLines(
+            names=name, colors=[color], widths=width, interpolation_mode="StepAfter" if steps else "Linear"))
+        _column(recording, entity, series.time_s, rr.Scalars.columns(scalars=series.value))
+
+    if len(story.cast) > 1:
+        line("collected/total", story.total, "all", _TOTAL, steps=True, width=3.0)
+    for robot in story.cast:
+        line(f"collected/{robot.name}", robot.collected, robot.name, robot.color, steps=True)
+        if robot.fuel is not None:
+            line(f"fuel/{robot.name}", robot.fuel, robot.name, robot.color, steps=False)
+
+
+def _write_log(recording: rr.RecordingStream, story: Story) -> None:
+    if story.log:
+        _column(recording, "events", [s.time_s for s in story.log], rr.TextLog.columns(
+            text=[s.text for s in story.log], level=[s.level for s in story.log],
+            color=[_pale(s.color) for s in story.log]))
+
+
+def _layout(story: Story) -> rrb.Blueprint:
+    """The world at the left; fuel, incentive and log at the right."""
+    whole_trail = rrb.VisibleTimeRanges(
+        timeline=TIMELINE, start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.cursor_relative())
+    space = rrb.Spatial3DView(
+        origin="world", name=story.title, background=rrb.Background(kind="SolidColor", color=_BACKGROUND),
+        line_grid=False, eye_controls=rrb.EyeControls3D(
+            kind="Orbital", position=story.eye_m, look_target=story.target_m, eye_up=(0, 0, 1)),
+        overrides={f"world/driven/{robot.name}": whole_trail for robot in story.cast if len(robot.trail)})
+    axis = rrb.TimeAxis(view_range=rr.TimeRange(
+        start=rr.TimeRangeBoundary.absolute(seconds=0.0),
+        end=rr.TimeRangeBoundary.absolute(seconds=max(story.duration_s, 1.0))))
+    most_fuel = max((float(robot.fuel.value.max()) for robot in story.cast if robot.fuel is not None), default=0.0)
+    right: list[rrb.View] = []
+    shares = []
+    if any(robot.fuel is not None for robot in story.cast):
+        right.append(rrb.TimeSeriesView(origin="fuel", name="Fuel left [s of driving]", axis_x=axis,
+                                        axis_y=_from_zero(most_fuel), plot_legend=rrb.Corner2D.LeftBottom))
+        shares.append(3)
+    right.append(rrb.TimeSeriesView(origin="collected", name="Incentive collected", axis_x=axis,
+                                    axis_y=_from_zero(float(story.total.value[-1])),
+                                    plot_legend=rrb.Corner2D.LeftTop))
+    right.append(rrb.TextLogView(
+        origin="events", name="Events", columns=rrb.TextLogColumns(
+            timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"]),
+        rows=rrb.TextLogRows(filter_by_log_level=["INFO", "WARN", "ERROR"])))
+    return rrb.Blueprint(
+        rrb.Horizontal(space, rrb.Vertical(*right, row_shares=[*shares, 3, 4]), column_shares=[13, 7]),
+        rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing",
+                      playback_speed=max(1.0, round(story.duration_s / _PLAY_S))),
+        auto_layout=False, auto_views=False)
+
+
+def _from_zero(most: float) -> rrb.ScalarAxis:
+    """An axis from nought to ``most``, with a little room so that no line runs along the frame."""
+    return rrb.ScalarAxis(range=(-0.03 * most, 1.06 * most) if most > 0 else (0.0, 1.0))

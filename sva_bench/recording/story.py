@@ -1,0 +1,369 @@
+"""What a recording shows, as arrays: solids, robots over time, series and sentences. Knows nothing of the viewer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
+from sva_bench.execution.outcome import Event, Trace
+from sva_bench.world.model import Obstacles, Site, SiteKind, World
+
+Color = tuple[int, int, int]
+Level = Literal["DEBUG", "INFO", "WARN", "ERROR"]
+
+# Colours that colour-blind readers tell apart too. Source: Okabe and Ito (2002), Color Universal Design.
+BLACK: Color = (0, 0, 0)
+BLUE: Color = (0, 114, 178)
+VERMILLION: Color = (213, 94, 0)
+PURPLE: Color = (204, 121, 167)
+SKY_BLUE: Color = (86, 180, 233)
+ORANGE: Color = (230, 159, 0)
+YELLOW: Color = (240, 228, 66)
+GREEN: Color = (0, 158, 115)
+
+ROBOT_COLORS = (BLUE, VERMILLION, PURPLE, SKY_BLUE, ORANGE)  # the sixth robot has the first one's again
+SITE_COLORS: dict[SiteKind, Color] = {"base": BLACK, "station": GREEN, "poi": YELLOW}
+DEAD: Color = (45, 45, 45)  # a robot that goes nowhere any more
+
+_DASH_M, _GAP_M = 0.25, 0.2  # of planned paths
+_TRAIL_STEP_S = 0.25  # a robot at 0.65 m/s is 0.16 m past the end of its trail then: less than its radius
+_SLOPE_TOLERANCE = 1e-6  # slopes of a fuel line [s/s] nearer than this are rounding, not a corner
+_WALL_M = 0.12  # shown thickness of the walls about the bounds
+_VIEW_RAD = math.radians(55)  # vertical field of view of the viewer's camera
+_SLANT_RAD = math.radians(62)  # of the line of sight, from the horizontal
+_ASPECT = 1.25  # width to height of the 3D view in the layout
+_MARGIN = 0.07  # of the view, left free at its edges
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solids:
+    """What stands in the world, walls about the bounds included.
+
+    Attributes:
+        bounds_m: x_min, y_min, x_max, y_max; shape (4,).
+        boxes: Centre x, y, half length, half width [m], yaw [rad]; shape (k, 5).
+        cylinders: Centre x, y, radius [m]; shape (c, 3).
+    """
+
+    bounds_m: FloatArray
+    boxes: FloatArray
+    cylinders: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bounds_m", frozen(self.bounds_m, (4,)))
+        object.__setattr__(self, "boxes", frozen(self.boxes, (None, 5)))
+        object.__setattr__(self, "cylinders", frozen(self.cylinders, (None, 3)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Marks:
+    """The sites of one kind.
+
+    Attributes:
+        kind: Base, station or POI.
+        names: Their names, length n.
+        at_m: Where they are, shape (n, 2).
+        time_s: When their colours change, ascending from 0; shape (m,).
+        colors: Red, green, blue of each site from each of these times on, shape (m, n, 3).
+    """
+
+    kind: SiteKind
+    names: tuple[str, ...]
+    at_m: FloatArray
+    time_s: FloatArray
+    colors: IntArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at_m", frozen(self.at_m, (len(self.names), 2)))
+        object.__setattr__(self, "time_s", frozen(self.time_s, (None,)))
+        object.__setattr__(self, "colors", frozen_int(self.colors, (len(self.time_s), len(self.names), 3)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Series:
+    """A number over time: ``value`` at ``time_s`` [s], both of shape (n,)."""
+
+    time_s: FloatArray
+    value: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time_s", frozen(self.time_s, (None,)))
+        object.__setattr__(self, "value", frozen(self.value, (len(self.time_s),)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Cast:
+    """One robot over time.
+
+    Attributes:
+        name: Its name.
+        radius_m: Radius of its hull.
+        color: Its colour.
+        time_s: Mission clock of the poses, shape (n,).
+        pose: x, y [m], yaw [rad], shape (n, 3).
+        dies_s: When it stopped for good, away from home; ``None`` = it didn't.
+        planned: Dashes of the path that was planned, each two ends [m], shape (d, 2, 2).
+        trail_s: When each piece of its trail is complete, shape (t,).
+        trail: Pieces of the driven path, each two ends [m], shape (t, 2, 2).
+        fuel: Fuel left [s of driving]; ``None`` = it has no limit.
+        collected: Incentive collected, a step at each POI.
+    """
+
+    name: str
+    radius_m: float
+    color: Color
+    time_s: FloatArray
+    pose: FloatArray
+    dies_s: float | None
+    planned: FloatArray
+    trail_s: FloatArray
+    trail: FloatArray
+    fuel: Series | None
+    collected: Series
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "planned", frozen(self.planned, (None, 2, 2)))
+        object.__setattr__(self, "trail_s", frozen(self.trail_s, (None,)))
+        object.__setattr__(self, "trail", frozen(self.trail, (len(self.trail_s), 2, 2)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sentence:
+    """One line of the mission's log, in the colour of the robot it is about."""
+
+    time_s: float
+    level: Level
+    text: str
+    color: Color
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Story:
+    """All that a recording shows.
+
+    Attributes:
+        title: What it is called.
+        world: Name of the world.
+        duration_s: When the last robot came to its end.
+        solids: What stands in the world.
+        marks: The sites, one entry per kind that occurs.
+        cast: The robots.
+        total: Incentive collected by all robots together.
+        log: What happened, in order of time.
+        eye_m: Where to look from, x, y, z.
+        target_m: Where to look at, x, y, z.
+    """
+
+    title: str
+    world: str
+    duration_s: float
+    solids: Solids
+    marks: tuple[Marks, ...]
+    cast: tuple[Cast, ...]
+    total: Series
+    log: tuple[Sentence, ...]
+    eye_m: tuple[float, float, float]
+    target_m: tuple[float, float, float]
+
+
+def story_of(world: World, traces: Sequence[Trace], title: str) -> Story:
+    """What a recording of one trial shows.
+
+    Args:
+        world: The world.
+        traces: One per robot at most, of one trial.
+        title: What the recording is called.
+
+    Raises:
+        ValueError: If there is no trace, one without poses or of a robot that the world doesn't have, or two of
+            one robot.
+    """
+    names = [trace.orders.robot for trace in traces]
+    known = {robot.name: k for k, robot in enumerate(world.robots)}
+    if not names or len(set(names)) < len(names) or not set(names) <= set(known):
+        raise ValueError(f"expected one trace per robot out of {sorted(known)}, got {names}")
+    if empty := [trace.orders.robot for trace in traces if not len(trace.time_s)]:
+        raise ValueError(f"no poses of {empty}: a trace begins with the pose at the base")
+    traces = sorted(traces, key=lambda trace: known[trace.orders.robot])
+    colors = {name: ROBOT_COLORS[k % len(ROBOT_COLORS)] for name, k in known.items()}
+    duration_s = max(max(float(trace.time_s[-1]), trace.outcome.end_time_s) for trace in traces)
+    cast = tuple(
+        _cast(trace, world.robots[known[trace.orders.robot]].model.radius_m, colors[trace.orders.robot], duration_s)
+        for trace in traces)
+    gains = [_gains(trace) for trace in traces]
+    eye, target = _eye(world.obstacles.bounds_m)
+    return Story(
+        title=title, world=world.name, duration_s=duration_s, solids=_solids(world.obstacles),
+        marks=_marks(world.sites, traces, colors), cast=cast,
+        total=_staircase(np.concatenate(gains), duration_s), log=_log(traces, colors), eye_m=eye, target_m=target)
+
+
+def dashes(path: FloatArray, dash_m: float, gap_m: float) -> FloatArray:
+    """A polyline cut into dashes: the ends of each, straight from end to end.
+
+    Args:
+        path: Its corners [m], shape (k, 2).
+        dash_m: Length of a dash.
+        gap_m: Length of a gap.
+
+    Returns:
+        Ends of each dash, shape (d, 2, 2); a dash that turns a corner is two.
+    """
+    if len(path) < 2:
+        return np.zeros((0, 2, 2))
+    lengths = np.hypot(*np.diff(path, axis=0).T)
+    arc = np.concatenate([[0.0], np.cumsum(lengths)])
+    starts = np.arange(0.0, arc[-1], dash_m + gap_m)
+    ends = np.minimum(starts + dash_m, arc[-1])
+    # Cut at the corners too; a stretch between neighbouring cuts is drawn if it lies within a dash.
+    cuts = np.unique(np.concatenate([starts, ends, arc]))
+    middles = (cuts[:-1] + cuts[1:]) / 2
+    drawn = middles % (dash_m + gap_m) < dash_m
+    points = np.stack([np.interp(cuts, arc, path[:, 0]), np.interp(cuts, arc, path[:, 1])], axis=1)
+    pieces: FloatArray = np.stack([points[:-1][drawn], points[1:][drawn]], axis=1)
+    return pieces
+
+
+def corners(time_s: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
+    """Which points of a line chart it takes to draw the same lines, shape (n,).
+
+    Args:
+        time_s: Ascending, shape (n,).
+        value: Shape (n,).
+    """
+    kept = np.ones(len(time_s), dtype=np.bool_)
+    steps = np.diff(time_s)
+    slopes = np.divide(np.diff(value), steps, out=np.full(len(steps), np.inf), where=steps > 0)
+    with np.errstate(invalid="ignore"):  # two jumps in a row: inf - inf is no corner to leave out
+        kept[1:-1] = ~(np.abs(np.diff(slopes)) <= _SLOPE_TOLERANCE)
+    return kept
+
+
+def _solids(obstacles: Obstacles) -> Solids:
+    x0, y0, x1, y1 = obstacles.bounds_m.tolist()
+    cx, cy, hx, hy, t = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2, _WALL_M / 2
+    walls = [[cx, y0 - t, hx + 2 * t, t, 0.0], [cx, y1 + t, hx + 2 * t, t, 0.0],
+             [x0 - t, cy, t, hy, 0.0], [x1 + t, cy, t, hy, 0.0]]
+    return Solids(bounds_m=obstacles.bounds_m, boxes=np.concatenate([walls, obstacles.boxes]),
+                  cylinders=obstacles.cylinders)
+
+
+def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[Marks, ...]:
+    marks = []
+    for kind in SITE_COLORS:
+        mine = [site for site in sites if site.kind == kind]
+        index = {site.name: k for k, site in enumerate(mine)}
+        now = np.tile(np.array(SITE_COLORS[kind], dtype=np.int64), (len(mine), 1))
+        times, rows = [0.0], [now.copy()]
+        taken: set[str] = set()
+        for event, trace in _events(traces):
+            if event.kind == "collected" and event.site in index and event.site not in taken:  # the first one's colour
+                taken.add(event.site)
+                now[index[event.site]] = colors[trace.orders.robot]
+                times.append(event.time_s)
+                rows.append(now.copy())
+        if mine:
+            marks.append(Marks(kind=kind, names=tuple(index), at_m=np.array([[s.x_m, s.y_m] for s in mine]),
+                               time_s=np.array(times), colors=np.array(rows)))
+    return tuple(marks)
+
+
+def _cast(trace: Trace, radius_m: float, color: Color, duration_s: float) -> Cast:
+    outcome, time, pose = trace.outcome, trace.time_s, trace.pose
+    # The first pose at or after each step, and the last pose: the trail is as long as the drive.
+    marks = np.searchsorted(time, np.arange(time[0], time[-1], _TRAIL_STEP_S))
+    at = np.unique(np.append(marks, len(time) - 1))
+    moved = np.any(pose[at[1:], :2] != pose[at[:-1], :2], axis=1)
+    pieces = np.stack([pose[at[:-1], :2], pose[at[1:], :2]], axis=1)[moved]
+    fuel = None
+    if math.isfinite(trace.orders.fuel_capacity_s):
+        when, left = time, trace.fuel_s
+        if when[-1] < duration_s:
+            when, left = np.append(when, duration_s), np.append(left, left[-1])
+        kept = corners(when, left)
+        fuel = Series(time_s=when[kept], value=left[kept])
+    return Cast(
+        name=trace.orders.robot, radius_m=radius_m, color=color, time_s=time, pose=pose,
+        dies_s=outcome.end_time_s if outcome.end in ("failed", "out_of_fuel", "stuck") else None,
+        planned=dashes(trace.planned, _DASH_M, _GAP_M), trail_s=time[at[1:]][moved], trail=pieces, fuel=fuel,
+        collected=_staircase(_gains(trace), duration_s))
+
+
+def _gains(trace: Trace) -> FloatArray:
+    """When the robot collected and what: time [s], incentive; shape (c, 2)."""
+    gains = [[event.time_s, event.incentive] for event in trace.outcome.events if event.kind == "collected"]
+    return np.array(gains, dtype=np.float64).reshape(-1, 2)
+
+
+def _staircase(gains: FloatArray, duration_s: float) -> Series:
+    """Running sum of gains from 0 s to the end of the mission."""
+    gains = gains[np.argsort(gains[:, 0], kind="stable")]
+    time, value = np.append(0.0, gains[:, 0]), np.append(0.0, np.cumsum(gains[:, 1]))
+    if time[-1] < duration_s:
+        time, value = np.append(time, duration_s), np.append(value, value[-1])
+    return Series(time_s=time, value=value)
+
+
+def _events(traces: Sequence[Trace]) -> list[tuple[Event, Trace]]:
+    return sorted(((event, trace) for trace in traces for event in trace.outcome.events), key=lambda e: e[0].time_s)
+
+
+def _log(traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[Sentence, ...]:
+    at_home = [
+        Sentence(time_s=0.0, level="INFO", text=f"{trace.orders.robot} stays home", color=colors[trace.orders.robot])
+        for trace in traces if not trace.outcome.events]
+    told = []
+    for event, trace in _events(traces):
+        level, text = _sentence(event, trace)
+        told.append(Sentence(time_s=event.time_s, level=level, text=text, color=colors[trace.orders.robot]))
+    return (*at_home, *told)
+
+
+def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
+    robot, site = trace.orders.robot, event.site
+    earned = f"{round(trace.outcome.incentive, 2):g}"
+    match event.kind:
+        case "departed":
+            return "INFO", f"{robot} left {site}"
+        case "arrived":
+            return "DEBUG", f"{robot} reached {site}"
+        case "collected":
+            return "INFO", f"{robot} collected {site}: {round(event.incentive, 2):g}"
+        case "refuelled":
+            return "INFO", f"{robot} refuelled at {site}"
+        case "failed":
+            return "ERROR", f"{robot} failed at {site}, with {earned} collected"
+        case "out_of_fuel":
+            return "ERROR", f"{robot} ran out of fuel on the way to {site}, with {earned} collected"
+        case "stuck":
+            return "ERROR", f"{robot} got stuck on the way to {site}, with {earned} collected"
+        case "late" if event is trace.outcome.events[-1]:
+            return "WARN", f"{robot} came home late, with {earned} collected"
+        case "late":
+            return "WARN", f"{robot} passed its limit of {trace.orders.mission_limit_s:g} s at {site}: earns no more"
+        case "home":
+            return "INFO", f"{robot} came home, with {earned} collected"
+
+
+def _eye(bounds_m: FloatArray) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Where to stand and what to look at, from the south and above, so that the floor fills the view."""
+    x0, y0, x1, y1 = bounds_m.tolist()
+    back = np.array([0.0, -math.cos(_SLANT_RAD), math.sin(_SLANT_RAD)])
+    up = np.array([0.0, math.sin(_SLANT_RAD), math.cos(_SLANT_RAD)])
+    middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2, 0.0])
+    half_x, half_y = (x1 - x0) / 2, (y1 - y0) / 2
+    top, nearness = half_y * up[1], half_y * -back[1]  # the north edge: height in view, farness
+    tall = math.tan(_VIEW_RAD / 2) * (1 - _MARGIN)
+    # The camera at the distance d, moved by s in its picture plane, sees the north edge at (top - s) / (d + nearness)
+    # and the south edge at (-top - s) / (d - nearness); the south edge is the wider one.
+    distance = max(top / tall, half_x / (tall * _ASPECT) + nearness)
+    shift = -top * nearness / distance  # as much room above as below
+    eye = middle + back * distance + up * shift
+    target = eye - back * (eye[2] / back[2])  # on the floor, so that the view turns about a point of it
+    return (float(eye[0]), float(eye[1]), float(eye[2])), (float(target[0]), float(target[1]), float(target[2]))

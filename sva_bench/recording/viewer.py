@@ -1,0 +1,230 @@
+"""Recordings shown: in the viewer's window, in a browser, or as a picture without a screen."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+
+from sva_bench.errors import BadFile, BadInput, ExitCode, SvaBenchError
+
+LAVAPIPE = Path("/usr/share/vulkan/icd.d/lvp_icd.x86_64.json")  # Mesa's Vulkan driver that needs no graphics card
+_DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+_DRIVER_VARIABLES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
+_NOTHING_TO_DRAW_WITH = ("graphics adapter", "render context")  # in what the viewer says when it ends
+_START_S = 30.0  # longest wait until the viewer listens; it takes about a second
+_STOP_S = 5.0  # longest wait until it has ended, before it is killed
+_PICTURE_SIZE = "1600x900"
+
+_DISCREET = {"CI": "true"}  # where the viewer sends no usage statistics: nothing leaves this machine
+
+
+class NoVulkanDriver(SvaBenchError):
+    """No driver to draw a picture with, or none that works."""
+
+    exit_code = ExitCode.FAULT
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def __str__(self) -> str:
+        return ("no Vulkan driver to draw with: install the Debian package mesa-vulkan-drivers, or set "
+                "VK_ICD_FILENAMES to the .json file of an installed driver")
+
+
+class ViewerFailed(SvaBenchError):
+    """The viewer ended, or gave no answer."""
+
+    exit_code = ExitCode.FAULT
+
+    def __init__(self, said: str) -> None:
+        super().__init__(said)
+        self.said = said
+
+    def __str__(self) -> str:
+        return f"the Rerun viewer failed: {self.said}"
+
+
+def view(path: Path, *, web: bool, screenshot: Path | None, at_s: float | None) -> None:
+    """Show a recording, or all recordings of a run, until the viewer is closed or interrupted.
+
+    Nothing but this machine can reach the viewer, and it is gone when this returns.
+
+    Args:
+        path: An ``.rrd`` file or a run folder.
+        web: In a browser rather than in a window.
+        screenshot: Draw a picture into this file instead; of a run, its first stochastic recording.
+        at_s: Moment of the picture [s]; ``None`` = the end of the mission.
+
+    Raises:
+        BadInput: If ``path`` is neither, or the options contradict each other.
+        BadFile: If a recording is damaged.
+        NoVulkanDriver: If a picture is wanted and there is nothing to draw it with.
+        ViewerFailed: If the viewer ended by itself with an error.
+    """
+    if web and screenshot is not None:
+        raise BadInput("--web and --screenshot exclude each other: leave one out")
+    if at_s is not None and screenshot is None:
+        raise BadInput("a moment is for a picture: add --screenshot OUT.png, or leave it out")
+    files = recordings_of(path)
+    if screenshot is not None:
+        _picture(files[0], screenshot, at_s)
+        return
+    if not web and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise BadInput("there is no screen here: use --web, or --screenshot OUT.png")
+    for file in files:
+        verify(file)
+    _show(files, web=web)
+
+
+def recordings_of(path: Path) -> tuple[Path, ...]:
+    """The recordings that a path stands for, those of stochastic plans first.
+
+    Args:
+        path: An ``.rrd`` file, or a run folder with ``recordings/``.
+
+    Raises:
+        BadInput: If it is neither.
+    """
+    if path.is_dir():
+        files = sorted((path / "recordings").glob("*.rrd"))
+        if not files:
+            raise BadInput(f"{path} holds no recordings/*.rrd: name a run folder or an .rrd file")
+        return tuple(sorted(files, key=lambda file: not file.stem.endswith("-stochastic")))
+    if not path.exists():
+        raise BadInput(f"there is no {path}: name a run folder or an .rrd file")
+    if path.suffix != ".rrd":
+        raise BadInput(f"{path} is no recording: name a run folder or an .rrd file")
+    return (path,)
+
+
+def verify(path: Path) -> None:
+    """Check that a recording is whole.
+
+    Raises:
+        BadFile: If it is cut off or damaged.
+    """
+    done = subprocess.run([*program(), "rrd", "verify", str(path)], env={**os.environ, **_DISCREET},
+                          capture_output=True, check=False)
+    if done.returncode:
+        raise BadFile(path, None, "", "the recording is cut off or damaged: record it again with `sva-bench replay`")
+
+
+def drawing_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """An environment in which the viewer finds a Vulkan driver.
+
+    Raises:
+        NoVulkanDriver: If there is none, or the one that is asked for doesn't exist.
+    """
+    for variable in _DRIVER_VARIABLES:
+        if asked := environment.get(variable):
+            if not any(Path(file).exists() for file in asked.split(":")):
+                raise NoVulkanDriver
+            return dict(environment)
+    if LAVAPIPE.exists():
+        return {**environment, "VK_ICD_FILENAMES": str(LAVAPIPE)}
+    if not any(list(folder.glob("*.json")) for folder in _DRIVER_FOLDERS):
+        raise NoVulkanDriver
+    return dict(environment)
+
+
+def _picture(path: Path, picture: Path, at_s: float | None) -> None:
+    if not picture.resolve().parent.is_dir():
+        raise BadInput(f"there is no folder {picture.resolve().parent} for the picture")
+    if picture.suffix.lower() != ".png":
+        raise BadInput(f"{picture} is no name for a picture: let it end in .png")
+    environment = {**drawing_environment(os.environ), "RUST_LOG": "error"}  # notices would cover the picture
+    verify(path)
+    from sva_bench.recording import rerun  # takes half a second to import: only once it is needed
+
+    port = _free_port()
+    command = [*program(), "--headless", "--hide-welcome-screen", "--window-size", _PICTURE_SIZE, *_at(port)]
+    with (tempfile.TemporaryFile() as said, tempfile.TemporaryDirectory() as folder,
+          _running(command, environment, said.fileno()) as process):
+        unfinished = Path(folder) / "picture.png"
+        try:
+            _await(process, port)
+            rerun.photograph(port, path, unfinished, rerun.end_s(path) if at_s is None else at_s)
+        except (OSError, RuntimeError) as error:
+            said.seek(0)
+            words = said.read().decode(errors="replace")
+            if any(complaint in words for complaint in _NOTHING_TO_DRAW_WITH):
+                raise NoVulkanDriver from error
+            raise ViewerFailed(words.split("stack backtrace")[0].strip()[:500] or str(error)) from error
+        shutil.move(unfinished, picture)
+
+
+def _show(files: Sequence[Path], *, web: bool) -> None:
+    port = _free_port()
+    command = [*program(), *map(str, files), *_at(port)]
+    if web:
+        command += ["--web-viewer", "--web-viewer-port", str(_free_port())]  # it opens the page, and names it
+    with _running(command, os.environ, None) as process:
+        try:
+            status = process.wait()
+        except KeyboardInterrupt:  # the way to close it
+            return
+    if status:
+        raise ViewerFailed(f"it ended with status {status}" + ("" if web else "; --web needs no window"))
+
+
+def program() -> list[str]:
+    """The viewer's own program: the ``rerun`` command is a wrapper that leaves it running when it is ended itself."""
+    package = find_spec("rerun_cli")
+    if package is None or package.origin is None:
+        raise ViewerFailed("the package rerun-sdk is not installed whole: install it again")
+    return [str(Path(package.origin).with_name("rerun"))]
+
+
+def _at(port: int) -> list[str]:
+    return ["--bind", "127.0.0.1", "--port", str(port)]  # it would listen on all interfaces
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextmanager
+def _running(
+    command: Sequence[str], environment: Mapping[str, str], output: int | None
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that ends with the block, and with this program even if that is killed."""
+    bound = ["setpriv", "--pdeathsig", "KILL"] if shutil.which("setpriv") else []
+    process = subprocess.Popen([*bound, *command], env={**environment, **_DISCREET}, stdin=subprocess.DEVNULL,
+                               stdout=output, stderr=output)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _await(process: subprocess.Popen[bytes], port: int) -> None:
+    """Wait until the viewer listens.
+
+    Raises:
+        RuntimeError: If it ends, or takes too long.
+    """
+    deadline = time.monotonic() + _START_S
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            raise RuntimeError(f"it ended with status {process.returncode}")
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        time.sleep(0.05)
+    raise RuntimeError(f"it did not listen within {_START_S:g} s")

@@ -1,0 +1,193 @@
+"""Path follower: regulated pure pursuit with rotation in place, compiled.
+
+One control step is a pure function of path, pose and a small state, so the kinematic twin and the physics
+are driven by the very same code. A path is cut into stretches at its sharp corners, by geometry alone, so that
+no small error of a pose decides between stopping at a corner and driving round it. A stretch is driven in three
+phases: turn towards the path, drive it, turn into the heading in which it ends.
+
+Source:
+    Macenski et al. (2023), Regulated Pure Pursuit for Robot Path Tracking; Coulter (1992).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numba import njit
+
+from sva_bench.arrays import FloatArray
+
+CONTROL_HZ = 60.0
+
+TURN_TO_PATH, DRIVE, TURN_TO_HEADING, ARRIVED = 0.0, 1.0, 2.0, 3.0
+
+_LOOKAHEAD_M = 0.25  # shorter oscillates at 24 Hz, longer cuts corners by more than the planning margin forgives
+_LATERAL_M_S2 = 0.5  # lateral acceleration in curves: slows the robot where the path bends
+_CORNER_RAD = 0.6  # a path that bends by more at a vertex is stopped at there and turned in place
+_ASTRAY_RAD = 1.4  # a lookahead point further aside than any path without corners brings it: turn to it first
+_ALIGNED_RAD = 0.02  # heading error at which a turn in place is over
+_REACHED_M = 0.01  # distance to the end of a stretch at which its driving is over
+_CREEP_M_S = 0.03  # slowest approach, so that the end is reached in finite time
+_SEARCH_M = 0.6  # how far ahead along the path the nearest point is looked for
+_BRAKING = 0.9  # share of the acceleration that approach profiles use; the rest absorbs the control delay
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A part of a path without sharp corners.
+
+    Attributes:
+        path: Vertices [m], shape (n, 2), n >= 2.
+        arc: Arc length at each vertex [m], shape (n,).
+        heading_rad: Heading in which the robot stops at its end.
+    """
+
+    path: FloatArray
+    arc: FloatArray
+    heading_rad: float
+
+
+def stretches(path: FloatArray, heading_rad: float) -> tuple[Stretch, ...]:
+    """Cut a path at its sharp corners.
+
+    Args:
+        path: Vertices [m], shape (n, 2), n >= 2.
+        heading_rad: Heading in which the robot stops at the end of the path.
+
+    Returns:
+        The stretches in order; each but the last ends in the direction in which the next begins.
+    """
+    moves = np.diff(path, axis=0)
+    path = path[np.r_[True, np.hypot(moves[:, 0], moves[:, 1]) > 1e-9]]
+    if len(path) < 2:
+        path = np.repeat(path, 2, axis=0)
+    bearings = np.arctan2(*np.diff(path, axis=0).T[::-1])
+    bends = np.abs((np.diff(bearings) + np.pi) % (2 * np.pi) - np.pi)
+    corners = [0, *(np.flatnonzero(bends > _CORNER_RAD) + 1).tolist(), len(path) - 1]
+    cut = []
+    for first, last in pairwise(corners):
+        part = np.ascontiguousarray(path[first : last + 1])
+        cut.append(Stretch(part, arc_lengths(part), heading_rad if last == len(path) - 1 else float(bearings[last])))
+    return tuple(cut)
+
+
+def new_state() -> FloatArray:
+    """State at the start of a stretch: phase, arc length travelled [m], commanded speed [m/s] and turn rate [rad/s]."""
+    return np.zeros(4)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def arc_lengths(path: FloatArray) -> FloatArray:
+    """Arc length at each vertex of a polyline, shape (n,)."""
+    arc = np.zeros(len(path))
+    for k in range(1, len(path)):
+        arc[k] = arc[k - 1] + math.hypot(path[k, 0] - path[k - 1, 0], path[k, 1] - path[k - 1, 1])
+    return arc
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def wrap(angle: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _point_at(path: FloatArray, arc: FloatArray, s: float) -> tuple[float, float]:
+    k = min(max(np.searchsorted(arc, s, side="right") - 1, 0), len(path) - 2)
+    length = arc[k + 1] - arc[k]
+    share = 0.0 if length <= 0.0 else min(max((s - arc[k]) / length, 0.0), 1.0)
+    return (path[k, 0] + share * (path[k + 1, 0] - path[k, 0]), path[k, 1] + share * (path[k + 1, 1] - path[k, 1]))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float) -> float:
+    """Arc length of the path point nearest to (x, y), looked for between ``s`` and a little ahead."""
+    best, best_s = np.inf, s
+    k = min(max(np.searchsorted(arc, s, side="right") - 1, 0), len(path) - 2)
+    while k < len(path) - 1 and arc[k] <= s + _SEARCH_M:
+        dx, dy = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
+        length = arc[k + 1] - arc[k]
+        if length > 0.0:
+            share = ((x - path[k, 0]) * dx + (y - path[k, 1]) * dy) / (length * length)
+            here = min(max(arc[k] + share * length, max(arc[k], s)), min(arc[k + 1], s + _SEARCH_M))
+            share = (here - arc[k]) / length
+            distance = math.hypot(path[k, 0] + share * dx - x, path[k, 1] + share * dy - y)
+            if distance < best - 1e-12:
+                best, best_s = distance, here
+        k += 1
+    return best_s
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _towards(now: float, wanted: float, step: float) -> float:
+    return min(max(wanted, now - step), now + step)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _turn(error: float, rate: float, dt: float, limits: FloatArray) -> float:
+    """Turn rate that brings a heading error to zero under the acceleration limit."""
+    # The braking curve is evaluated where the robot will be when the command has acted for half a step.
+    left = max(abs(error) - 0.5 * abs(rate) * dt, 0.0)
+    wanted = min(limits[1], math.sqrt(2.0 * _BRAKING * limits[3] * left), abs(error) / dt)
+    return _towards(rate, math.copysign(wanted, error), limits[3] * dt)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def control(
+    path: FloatArray, arc: FloatArray, heading: float, limits: FloatArray, state: FloatArray,
+    x: float, y: float, yaw: float, dt: float,
+) -> tuple[float, float]:
+    """One control step along one stretch.
+
+    Args:
+        path: Vertices from where the robot stands to where it is to stop [m], shape (n, 2).
+        arc: Arc length at each vertex, as ``arc_lengths`` gives it.
+        heading: Heading in which it is to stop [rad].
+        limits: ``RobotModel.limits``.
+        state: As ``new_state`` gives it; changed in place. ``state[0]`` is ``ARRIVED`` at the end.
+        x, y, yaw: Pose [m, rad].
+        dt: Time until the next control step [s].
+
+    Returns:
+        Speed [m/s] and turn rate [rad/s] to command until the next step.
+    """
+    phase, s, speed, rate = state[0], state[1], state[2], state[3]
+    end = arc[-1]
+    if phase == TURN_TO_PATH and end < _REACHED_M:
+        phase = TURN_TO_HEADING
+    if phase in (TURN_TO_PATH, DRIVE):
+        s = _nearest_arc(path, arc, s, x, y)
+        ahead_x, ahead_y = _point_at(path, arc, min(s + _LOOKAHEAD_M, end))
+        aside = wrap(math.atan2(ahead_y - y, ahead_x - x) - yaw)
+        left = end - s
+        if left < _REACHED_M:
+            phase = TURN_TO_HEADING
+        elif phase == TURN_TO_PATH and abs(aside) < _ALIGNED_RAD:
+            phase = DRIVE
+        elif phase == DRIVE and abs(aside) > _ASTRAY_RAD and left > _LOOKAHEAD_M / 2:
+            phase = TURN_TO_PATH
+    if phase == TURN_TO_PATH:
+        speed = _towards(speed, 0.0, limits[2] * dt)
+        rate = _turn(aside, rate, dt, limits)
+    elif phase == DRIVE:
+        distance = max(math.hypot(ahead_x - x, ahead_y - y), 0.05)
+        curvature = 2.0 * math.sin(aside) / distance
+        bend = max(abs(curvature), 1e-9)
+        remaining = max(left - 0.5 * speed * dt, 0.0)
+        wanted = min(limits[0], math.sqrt(2.0 * _BRAKING * limits[2] * remaining), math.sqrt(_LATERAL_M_S2 / bend),
+                     limits[1] / bend)
+        wanted = min(max(wanted, _CREEP_M_S), left / dt)
+        speed = _towards(speed, wanted, limits[2] * dt)
+        rate = _towards(rate, speed * curvature, 2.0 * limits[3] * dt)
+    if phase == TURN_TO_HEADING:
+        error = wrap(heading - yaw)
+        speed = _towards(speed, 0.0, limits[2] * dt)
+        if abs(error) < _ALIGNED_RAD and abs(speed) < 1e-9:
+            phase, rate = ARRIVED, 0.0
+        else:
+            rate = _turn(error, rate, dt, limits)
+    state[0], state[1], state[2], state[3] = phase, s, speed, rate
+    return speed, rate

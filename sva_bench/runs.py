@@ -1,0 +1,148 @@
+"""Run folders: manifest, tables, plans, summary. Written under a temporary name and renamed when complete."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from sva_bench import __version__
+from sva_bench.documents import pretty_json
+from sva_bench.errors import BadInput
+from sva_bench.execution.execute import Executed
+from sva_bench.execution.outcome import ENDS
+from sva_bench.travel.fuel import FuelCosts
+
+_PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
+
+
+def run_name(world: str, seed: int, identity: Mapping[str, Any]) -> str:
+    """Name of a run folder: equal runs get equal names.
+
+    Args:
+        world: The world's name.
+        seed: The seed.
+        identity: Everything that the results depend on: the resolved world, and the options that change results.
+    """
+    text = json.dumps({"version": __version__, "seed": seed, **identity}, sort_keys=True)
+    return f"{world}-seed{seed}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+
+@contextlib.contextmanager
+def run_folder(out: Path, name: str) -> Iterator[Path]:
+    """A folder that appears as ``out / name`` only when it is complete; it replaces an older one.
+
+    Raises:
+        BadInput: If ``out`` cannot be written to.
+    """
+    target, draft = out / name, out / f".{name}.{os.getpid()}.tmp"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        draft.mkdir()
+    except OSError as error:
+        raise BadInput(f"{out}: no folder can be made there ({error.strerror}); choose another with --out") from None
+    try:
+        yield draft
+        old = out / f".{name}.{os.getpid()}.old"
+        if target.exists():
+            target.rename(old)
+        draft.rename(target)
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        raise BadInput(f"{out}: cannot be written to ({error.strerror}); choose another with --out") from None
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
+             seconds: Mapping[str, float]) -> dict[str, Any]:
+    """What was run, with what, where and how long: the only place for wall-clock times."""
+    return {
+        "format": "sva-bench/manifest@1", "version": __version__, "seed": seed, "options": dict(options),
+        "command": ["sva-bench", *sys.argv[1:]], "started": started,
+        "seconds": {phase: round(taken, 3) for phase, taken in seconds.items()},
+        "machine": {"platform": platform.platform(), "python": platform.python_version(),
+                    "cpus": len(os.sched_getaffinity(0))},
+        "packages": {name: version(name) for name in _PACKAGES}, "world": dict(world),
+    }
+
+
+def write_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a JSON file that a person can read."""
+    path.write_text(pretty_json(dict(data)), encoding="utf-8")
+
+
+def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
+    """Write ``travel_times.parquet``: a row per robot model and directed pair."""
+    rows: dict[str, list[Any]] = {key: [] for key in ("origin", "destination", "model", "raw_s", "repaired_s", "via")}
+    for cost in costs:
+        sites = cost.times.sites
+        for i, origin in enumerate(sites):
+            for j, destination in enumerate(sites):
+                if i == j:
+                    continue
+                rows["origin"].append(origin)
+                rows["destination"].append(destination)
+                rows["model"].append(cost.times.model.name)
+                rows["raw_s"].append(int(cost.times.time_ms[i, j]) / 1000)
+                rows["repaired_s"].append(int(cost.repaired_ms[i, j]) / 1000)
+                rows["via"].append(sites[int(cost.via[i, j])])
+    _write(path, rows, {"raw_s": "s", "repaired_s": "s"})
+
+
+def write_legs(path: Path, executed: Sequence[Executed]) -> None:
+    """Write ``legs.parquet``: a row per leg that was driven."""
+    rows: dict[str, list[Any]] = {key: [] for key in (
+        "scenario", "planner", "rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s")}
+    for run in executed:
+        for leg in run.legs:
+            rows["scenario"].append(run.case.scenario.name)
+            rows["planner"].append(run.case.planner)
+            for key in ("rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s"):
+                rows[key].append(getattr(leg, key))
+    types = {key: pa.string() for key in ("scenario", "planner", "robot", "origin", "destination")}
+    types |= {"rollout": pa.int64(), "leg": pa.int64(), "planned_s": pa.float64(), "driven_s": pa.float64()}
+    _write(path, {key: pa.array(values, types[key]) for key, values in rows.items()},
+           {"planned_s": "s", "driven_s": "s"})
+
+
+def outcome_columns(run: Executed, robots: Sequence[str], fidelity: str) -> dict[str, Any]:
+    """One row per trial and robot, trial by trial."""
+    trials, count = run.incentive.shape
+    return {
+        "scenario": np.full(trials * count, run.case.scenario.name),
+        "planner": np.full(trials * count, run.case.planner),
+        "trial": np.repeat(np.arange(trials), count), "rollout": np.repeat(run.rollout, count),
+        "robot": np.tile(np.array(robots), trials), "available": run.available.ravel(),
+        "incentive": run.incentive.ravel(), "pois_reached": run.pois_reached.ravel(),
+        "stops_reached": run.stops_reached.ravel(), "end": np.array(ENDS)[run.end.ravel()],
+        "end_time_s": run.end_time_s.ravel(), "fuel_used_s": run.fuel_used_s.ravel(),
+        "fidelity": np.full(trials * count, fidelity),
+    }
+
+
+def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[str], fidelity: str) -> None:
+    """Write ``outcomes.parquet``: a row per scenario, plan, trial and robot."""
+    parts = [outcome_columns(run, robots, fidelity) for run in executed]
+    columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    _write(path, columns, {"end_time_s": "s", "fuel_used_s": "s"})
+
+
+def _write(path: Path, columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
+    """Write a Parquet table, units in the metadata of its columns."""
+    table = pa.table(dict(columns))
+    fields = [field.with_metadata({"unit": units[field.name]}) if field.name in units else field
+              for field in table.schema]
+    pq.write_table(table.cast(pa.schema(fields)), path)

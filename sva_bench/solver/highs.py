@@ -1,0 +1,183 @@
+"""HiGHS: linear and mixed-integer programs. The only importer of highspy; arrays in, arrays out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from threading import Event, Thread
+from typing import Any, Literal
+
+import highspy
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.solver.formulation import LinearModel, Rows
+
+SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
+INTEGRALITY = 1e-9
+"""How far from an integer a column may be, and a row from its side: legs last 20 s, and fuel must hold to 1e-6 s."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outcome:
+    """What a run came to.
+
+    Attributes:
+        status: How it ended.
+        values: The best point found, shape (columns,); ``None`` if none was.
+        objective: Its objective; ``-inf`` if none was found.
+        bound: Upper bound on the objective; ``inf`` if none is known.
+        nodes: Branch-and-bound nodes.
+    """
+
+    status: SolveStatus
+    values: FloatArray | None
+    objective: float
+    bound: float
+    nodes: int
+
+
+class Relaxation:
+    """The linear relaxation of a model, open for more rows."""
+
+    def __init__(self, model: LinearModel) -> None:
+        self._solver = _open(model)
+        self._columns = len(model.objective)
+
+    def add(self, rows: Rows) -> None:
+        """Add rows; the next solve starts from the last basis."""
+        _check(self._solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1],
+                                    rows.column, rows.value), "addRows")
+
+    def solve(self, time_limit_s: float) -> tuple[Outcome, FloatArray]:
+        """The optimum over the rows so far, and the activity of each row."""
+        _option(self._solver, "time_limit", time_limit_s)
+        _check(self._solver.run(), "run")
+        status = _status(self._solver)
+        if status != "optimal":
+            return Outcome(status=status, values=None, objective=-math.inf,
+                           bound=-math.inf if status == "infeasible" else math.inf, nodes=0), np.zeros(0)
+        solution = self._solver.getSolution()
+        value = float(self._solver.getInfo().objective_function_value)
+        return Outcome(status=status, values=np.array(solution.col_value), objective=value, bound=value, nodes=0), \
+            np.array(solution.row_value)
+
+
+def maximise(
+    model: LinearModel, rows: Rows, *, gap: float, absolute_gap: float, time_limit_s: float,
+    start: FloatArray | None = None,
+) -> Outcome:
+    """Solve a mixed-integer program by branch and bound; Ctrl-C ends it with what it has.
+
+    Args:
+        model: The program.
+        rows: More rows of it.
+        gap: Relative gap at which it may stop.
+        absolute_gap: Absolute gap at which it may stop.
+        time_limit_s: Wall-clock limit [s]; ``inf`` = none.
+        start: A feasible point to begin with, shape (columns,).
+    """
+    solver = _open(model)
+    if len(rows.lower):
+        _check(solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1], rows.column,
+                              rows.value), "addRows")
+    whole = np.flatnonzero(model.integer).astype(np.int32)
+    _check(solver.changeColsIntegrality(len(whole), whole,
+                                        np.full(len(whole), int(highspy.HighsVarType.kInteger), dtype=np.uint8)),
+           "changeColsIntegrality")
+    _option(solver, "mip_rel_gap", gap)
+    _option(solver, "mip_abs_gap", absolute_gap)
+    _option(solver, "mip_feasibility_tolerance", INTEGRALITY)
+    _option(solver, "mip_allow_restart", False)  # restarts cost up to five times the time here
+    _option(solver, "time_limit", time_limit_s)
+    if start is not None:
+        solution = highspy.HighsSolution()
+        solution.col_value = start.tolist()
+        _check(solver.setSolution(solution), "setSolution")
+    interrupted = _run_interruptibly(solver)
+    status: SolveStatus = "interrupted" if interrupted else _status(solver)
+    info = solver.getInfo()
+    found = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
+    bound = float(info.mip_dual_bound)
+    if not math.isfinite(bound) or status == "infeasible":
+        bound = -math.inf if status == "infeasible" else math.inf
+    return Outcome(
+        status=status, values=np.array(solver.getSolution().col_value) if found else None,
+        objective=float(info.objective_function_value) if found else -math.inf, bound=bound,
+        nodes=max(int(info.mip_node_count), 0),
+    )
+
+
+def _open(model: LinearModel) -> Any:
+    """A solver that holds the model's linear relaxation."""
+    solver = highspy.Highs()
+    _option(solver, "output_flag", False)  # first: a banner belongs on no one's standard output
+    _option(solver, "threads", 1)
+    _option(solver, "random_seed", 0)
+    _option(solver, "primal_feasibility_tolerance", INTEGRALITY)
+    columns, rows = len(model.objective), model.rows
+    program = highspy.HighsLp()
+    program.num_col_, program.num_row_ = columns, len(rows.lower)
+    program.sense_ = highspy.ObjSense.kMaximize
+    program.col_cost_ = model.objective
+    program.col_lower_, program.col_upper_ = np.zeros(columns), model.upper
+    program.row_lower_, program.row_upper_ = rows.lower, rows.upper
+    matrix = program.a_matrix_
+    matrix.format_ = highspy.MatrixFormat.kRowwise
+    matrix.num_col_, matrix.num_row_ = columns, len(rows.lower)
+    matrix.start_, matrix.index_, matrix.value_ = rows.start, rows.column, rows.value
+    _check(solver.passModel(program), "passModel")
+    return solver
+
+
+def _run_interruptibly(solver: Any) -> bool:
+    """Run in a thread, so that Ctrl-C reaches us at once and not after the solve; whether it did."""
+    solver.HandleUserInterrupt = True
+    ended: list[Any] = []
+    over = Event()  # not Thread.join: interrupted, it takes a running thread for a dead one (Python 3.11)
+
+    def run() -> None:
+        try:
+            ended.append(solver.run())
+        finally:
+            over.set()
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    interrupted = False
+    while True:
+        try:
+            if over.wait(0.2):
+                break
+        except KeyboardInterrupt:
+            interrupted = True
+            solver.cancelSolve()
+    thread.join()
+    if not ended:
+        raise RuntimeError("HiGHS: the solve ended without a status")
+    _check(ended[0], "run")
+    return interrupted
+
+
+def _status(solver: Any) -> SolveStatus:
+    status = solver.getModelStatus()
+    kinds = highspy.HighsModelStatus
+    if status in (kinds.kOptimal, kinds.kModelEmpty):
+        return "optimal"
+    if status == kinds.kInfeasible:
+        return "infeasible"
+    if status == kinds.kTimeLimit:
+        return "time_limit"
+    if status == kinds.kInterrupt:
+        return "interrupted"
+    raise RuntimeError(f"HiGHS: unexpected model status {solver.modelStatusToString(status)}")
+
+
+def _option(solver: Any, name: str, value: bool | int | float) -> None:
+    _check(solver.setOptionValue(name, value), f"option {name}")
+
+
+def _check(status: Any, what: str) -> None:
+    """Refuse an error; warnings are judged by the model status."""
+    if status == highspy.HighsStatus.kError:
+        raise RuntimeError(f"HiGHS: {what} failed")

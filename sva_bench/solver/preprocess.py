@@ -1,0 +1,142 @@
+"""What one vehicle may do in a solve: the sites and legs that some plan worth having can use.
+
+Every bound is a shortest path, so nothing here needs the triangle inequality but the one rule that says so.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scope:
+    """The legs that one vehicle may drive, and the bounds on its fuel.
+
+    Attributes:
+        legs: Whether the leg from site i to site j is of use, shape (n, n).
+        fuel_s: Fuel of a leg [s], shape (n, n).
+        time_s: Driving time of a leg and the stop at its end [s], shape (n, n).
+        since_refuel_s: Least fuel burnt since the last refuel on arrival at a site [s], ``s_i``, shape (n,).
+        to_refuel_s: Least fuel from a site to the next refuel or the base [s], ``t_i``, shape (n,).
+        since_start_s: Least time of a way to a site, the stop there included [s], shape (n,).
+        to_end_s: Least time from a site to the end [s], shape (n,).
+        capacity_s: Fuel capacity [s]; ``inf`` where fuel can't bind.
+        limit_s: Mission limit [s]; ``inf`` = none.
+    """
+
+    legs: BoolArray
+    fuel_s: FloatArray
+    time_s: FloatArray
+    since_refuel_s: FloatArray
+    to_refuel_s: FloatArray
+    since_start_s: FloatArray
+    to_end_s: FloatArray
+    capacity_s: float
+    limit_s: float
+
+
+def is_metric(cost: FloatArray, base: int) -> bool:
+    """Whether no detour is cheaper than a direct leg, but for detours over the base, which no route can take."""
+    for k in range(len(cost)):
+        if k != base:
+            excess = cost > cost[:, k, None] + cost[None, k, :] + TOLERANCE_S
+            np.fill_diagonal(excess, False)
+            if excess.any():
+                return False
+    return True
+
+
+def shortest_paths(cost: FloatArray, base: int) -> FloatArray:
+    """Cheapest chain of legs between two sites that doesn't run through the base, shape (n, n).
+
+    Source:
+        Floyd (1962), Algorithm 97.
+    """
+    shortest = cost.copy()
+    np.fill_diagonal(shortest, 0.0)
+    for k in range(len(cost)):
+        if k != base:
+            np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :], out=shortest)
+    return shortest
+
+
+def warn_of_unreachable(instance: Instance) -> None:
+    """Log the POIs that no vehicle can reach and come home from, however much fuel and time it has."""
+    for poi in instance.pois:
+        if instance.vehicles and not any(_way_there_and_back(v, instance.base)[poi] for v in instance.vehicles):
+            _log.warning("instance %s: POI %s cannot be reached and left again; it is left out of the plan",
+                         instance.name, instance.sites[poi])
+
+
+def _way_there_and_back(vehicle: Vehicle, base: int) -> BoolArray:
+    shortest = shortest_paths(vehicle.fuel_s, base)
+    found: BoolArray = np.isfinite(shortest[base]) & np.isfinite(shortest[:, base])
+    return found
+
+
+def scope_of(instance: Instance, vehicle: Vehicle, rewarded: BoolArray) -> Scope:
+    """The legs of use to one vehicle.
+
+    Args:
+        instance: The instance.
+        vehicle: One of its vehicles.
+        rewarded: Sites whose visit counts in an objective or a constraint of the solve, shape (n,).
+
+    Source:
+        Proposition 2 of the paper for ``s`` and ``t``. A leg is kept where a chain base .. q .. i j .. r .. base
+        exists that keeps the limit and, between the refuels q and r around the leg, the fuel capacity.
+    """
+    base, n = instance.base, len(instance.sites)
+    fuel = np.array(vehicle.fuel_s)
+    time = fuel + np.array(instance.stop_s)[None, :]
+    capacity = vehicle.fuel_capacity_s if vehicle.fuel_capacity_s < vehicle.mission_limit_s else np.inf
+    keep = np.zeros(n, dtype=np.bool_)
+    if rewarded.any():
+        keep[:] = True
+        if is_metric(fuel, base):  # then a stop that earns nothing never helps
+            keep[list(instance.pois)] = rewarded[list(instance.pois)]
+            keep[list(instance.stations)] = np.isfinite(capacity)
+        keep[base] = True
+    fuel[~keep], fuel[:, ~keep] = np.inf, np.inf
+    time[~keep], time[:, ~keep] = np.inf, np.inf
+    refuels = [base, *(r for r in instance.stations if keep[r])]
+    ahead, behind, arrival, departure = _fuel_and_time_around(fuel, time, base, refuels, capacity)
+    legs = np.zeros((n, n), dtype=np.bool_)
+    for q in range(len(refuels)):
+        for r in range(len(refuels)):
+            legs |= (behind[q][:, None] + fuel + ahead[r][None, :] <= capacity + TOLERANCE_S) \
+                & (arrival[q][:, None] + time + departure[r][None, :] <= vehicle.mission_limit_s + TOLERANCE_S) \
+                & np.isfinite(arrival[q][:, None] + time + departure[r][None, :])
+    np.fill_diagonal(legs, False)
+    return Scope(
+        legs=legs, fuel_s=fuel, time_s=time, since_refuel_s=behind.min(axis=0), to_refuel_s=ahead.min(axis=0),
+        since_start_s=arrival.min(axis=0), to_end_s=departure.min(axis=0), capacity_s=capacity,
+        limit_s=vehicle.mission_limit_s)
+
+
+def _fuel_and_time_around(
+    fuel: FloatArray, time: FloatArray, base: int, refuels: list[int], capacity: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """For each refuel and site, shape (refuels, n): fuel from the site to the refuel and from the refuel to the site;
+    time from the start to the site over the refuel, and from the site over the refuel to the end."""
+    fuel_paths, time_paths = shortest_paths(fuel, base), shortest_paths(time, base)
+    hop = np.where(fuel_paths <= capacity + TOLERANCE_S, time_paths, np.inf)[np.ix_(refuels, refuels)]
+    hop = shortest_paths(hop, 0)
+    behind, ahead = fuel_paths[refuels].copy(), fuel_paths[:, refuels].T.copy()
+    arrival = hop[0][:, None] + time_paths[refuels]
+    departure = hop[:, 0][:, None] + time_paths[:, refuels].T
+    behind[np.isinf(arrival)], ahead[np.isinf(departure)] = np.inf, np.inf
+    for number, site in enumerate(refuels):  # at a refuel the tank is full: no other state exists there
+        for array in (behind, ahead, arrival, departure):
+            array[:, site] = np.inf
+        behind[number, site] = ahead[number, site] = 0.0
+        arrival[number, site], departure[number, site] = hop[0, number], hop[number, 0]
+    return ahead, behind, arrival, departure

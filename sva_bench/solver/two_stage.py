@@ -1,0 +1,323 @@
+"""Both plans of a comparison, and what perfect foresight would earn."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.errors import BadInput
+from sva_bench.mission.certify import certify
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.plan import Objective, Plan, Status
+from sva_bench.solver.expected import Clock, Knowledge, Solution, SolveLimits, knowledge_of, solve
+from sva_bench.solver.formulation import Goal
+from sva_bench.solver.heuristic import Orders
+from sva_bench.solver.preprocess import warn_of_unreachable
+from sva_bench.solver.refuelling import quickest
+
+__all__ = ["DeterministicPlans", "Knowledge", "SolveLimits", "knowledge_of", "plan_deterministic", "plan_nominal",
+           "plan_stochastic", "wait_and_see"]
+
+_log = logging.getLogger(__name__)
+
+METHOD = "expected"
+TIE = 1e-6
+"""Relative difference of two values that counts as none."""
+MOST_SUBSETS = 16
+"""Subsets of uncertain vehicles up to which the value of perfect information is worked out unasked."""
+_FLOOR = 1e-8  # relative; keeps a known optimum feasible when its value becomes a constraint
+_STATUSES: tuple[Status, ...] = ("optimal", "feasible", "time_limit", "interrupted")  # best first
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DeterministicPlans:
+    """The deterministic plan, and what its ties leave open.
+
+    Attributes:
+        plan: Of the plans with the greatest sum of incentives, the one of greatest expected value, then of least time.
+        stochastic: The stochastic plan; the same routes where the two are worth the same.
+        least: Least expected value of a plan with that sum of incentives.
+        most: Greatest expected value of one.
+    """
+
+    plan: Plan
+    stochastic: Plan
+    least: float
+    most: float
+
+
+def plan_stochastic(
+    instance: Instance, limits: SolveLimits | None = None, incumbent: Plan | None = None,
+    known: Knowledge | None = None,
+) -> Plan:
+    """The plan of greatest expected value under the failure process ``mission``.
+
+    Args:
+        instance: The instance.
+        limits: When to stop.
+        incumbent: A feasible plan to start from.
+        known: What solves of the same instance with other availabilities found.
+
+    Raises:
+        BadInput: If the instance fails per leg, or the incumbent is infeasible.
+    """
+    if instance.failure != "mission":
+        raise BadInput(f"instance {instance.name}: plans are planned under mission, the instance says "
+                       f"{instance.failure}; set its failure to mission, and evaluate the plan under "
+                       f"{instance.failure} afterwards")
+    return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known)
+
+
+def plan_nominal(
+    instance: Instance, limits: SolveLimits | None = None, incumbent: Plan | None = None,
+    known: Knowledge | None = None,
+) -> Plan:
+    """A plan with the greatest sum of incentives, every vehicle taken as available; its ties are left open.
+
+    It depends on no availability, so all scenarios can share it.
+    """
+    return _plan(replace(instance, failure="mission"), "deterministic", np.ones(len(instance.vehicles)), limits,
+                 incumbent, known)
+
+
+def plan_deterministic(
+    instance: Instance, stochastic: Plan, limits: SolveLimits | None = None, nominal: Plan | None = None,
+    known: Knowledge | None = None,
+) -> DeterministicPlans:
+    """The deterministic plan, its ties broken in its own favour, and the range that they span.
+
+    Args:
+        instance: The instance; expected values are those under ``mission`` whatever it says.
+        stochastic: Its stochastic plan.
+        limits: When to stop; the time is that of all solves together.
+        nominal: ``plan_nominal`` of the instance, which scenarios may share.
+        known: What solves of the same instance with other availabilities found.
+
+    Source:
+        ``docs/model.md``, section "Ties".
+    """
+    instance = replace(instance, failure="mission")
+    limits = limits or SolveLimits()
+    known = known or knowledge_of(instance)
+    clock = limits.clock()
+    if nominal is None:
+        nominal = plan_nominal(instance, limits, known=known)
+    elif nominal.value is None or nominal.bound is None or nominal.status is None:
+        raise ValueError("the nominal plan must state its value, bound and status")
+    nominal_orders, stochastic_orders = (_orders(instance, plan, known) for plan in (nominal, stochastic))
+    known.orders.update(dict.fromkeys((nominal_orders, stochastic_orders)))
+    ties = _Ties(instance, nominal_orders, known, clock, limits.gap)
+    most, least, soonest = ties.solutions(nominal.status == "interrupted")
+    best = soonest or most
+    orders = best.orders if best else nominal_orders
+    expected, total = ties.expected(orders), _sum(_incentives(instance), orders)
+    solutions = [s for s in (most, least, soonest) if s is not None]
+    plan = _finish(
+        instance, "deterministic", orders, known, value=total, bound=max(nominal.bound or total, total),
+        status=_worst([nominal.status or "feasible", *(s.status for s in solutions)]), solutions=solutions,
+        runtime_s=clock.used_s())
+    if stochastic.value is not None and expected >= stochastic.value - TIE * max(1.0, abs(stochastic.value)):
+        stochastic = _certified(instance, replace(
+            stochastic, routes=plan.routes, fuel_s=plan.fuel_s, value=expected,
+            bound=None if stochastic.bound is None else max(stochastic.bound, expected)))
+    return DeterministicPlans(plan=plan, stochastic=stochastic, most=expected,
+                              least=min(expected, ties.expected(least.orders) if least else expected))
+
+
+def wait_and_see(
+    instance: Instance, limits: SolveLimits | None = None, known: Knowledge | None = None, *, force: bool = False,
+) -> float | None:
+    """Expected value with perfect foresight, ``WS``: each outcome's best plan, weighted by its probability.
+
+    Args:
+        instance: The instance; failures are those of ``mission`` whatever it says.
+        limits: When to stop; the time is that of all solves together.
+        known: What solves of the same instance with other availabilities found; each outcome is solved once.
+        force: Solve however many outcomes there are.
+
+    Returns:
+        The value; ``None`` if there are more than 16 outcomes, or one could not be solved to a proof.
+    """
+    limits = limits or SolveLimits()
+    known = known or knowledge_of(instance)
+    outcomes = _outcomes(instance)
+    if len(outcomes) > MOST_SUBSETS and not force:
+        return None
+    clock, total = limits.clock(), 0.0
+    for available, probability in outcomes.items():
+        there = np.array([v.name in available for v in instance.vehicles], dtype=np.float64)
+        solution = _greatest(instance, there, known, clock, limits.gap)
+        if solution.status != "optimal":
+            _log.warning("instance %s: no proof for the outcome in which %s are available; the value of perfect "
+                         "information stays open", instance.name, ", ".join(sorted(available)) or "no vehicles")
+            return None
+        total += probability * solution.value
+    return total
+
+
+def _outcomes(instance: Instance) -> dict[frozenset[str], float]:
+    """The sets of vehicles that can be available, and their probabilities."""
+    found: dict[frozenset[str], float] = {}
+    if instance.joint is not None:
+        for state in instance.joint:
+            if state.probability > 0:
+                found[state.available] = found.get(state.available, 0.0) + state.probability
+        return found
+    certain = [v.name for v in instance.vehicles if v.availability == 1]
+    uncertain = [v for v in instance.vehicles if 0 < v.availability < 1]
+    for there in itertools.product((True, False), repeat=len(uncertain)):
+        names = frozenset([*certain, *(v.name for v, t in zip(uncertain, there, strict=True) if t)])
+        found[names] = math.prod(
+            v.availability if t else 1 - v.availability for v, t in zip(uncertain, there, strict=True))
+    return found
+
+
+def _plan(
+    instance: Instance, objective: Objective, availability: FloatArray, limits: SolveLimits | None,
+    incumbent: Plan | None, known: Knowledge | None,
+) -> Plan:
+    limits = limits or SolveLimits()
+    known = known or knowledge_of(instance)
+    known.check(instance)
+    clock = limits.clock()
+    warn_of_unreachable(instance)
+    if incumbent is not None:
+        reasons = certify(instance, replace(incumbent, value=None, fuel_s={})).reasons
+        if reasons:
+            raise BadInput(f"instance {instance.name}: the plan to start from is infeasible: {reasons[0]}")
+        known.orders[_orders(instance, incumbent, known)] = None
+    solution = _greatest(instance, availability, known, clock, limits.gap)
+    scale = float(availability.max(initial=0.0))
+    value = _sum(_incentives(instance) * availability[:, None], solution.orders)
+    return _finish(instance, objective, solution.orders, known, value=value, bound=max(solution.bound * scale, value),
+                   status=solution.status, solutions=[solution], runtime_s=clock.used_s())
+
+
+def _greatest(
+    instance: Instance, availability: FloatArray, known: Knowledge, clock: Clock, gap: float,
+) -> Solution:
+    """The plan of greatest ``sum p e y``, in units in which the greatest ``p`` is 1."""
+    scale = float(availability.max(initial=0.0))
+    shares = availability / scale if scale > 0 else availability
+    goal = Goal(weights=_incentives(instance) * shares[:, None])
+    return _once(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap)
+
+
+def _once(
+    key: tuple[object, ...], instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float,
+) -> Solution:
+    """Solve, unless a proved solution of the same goal is known."""
+    if key in known.solutions:
+        return known.solutions[key]
+    solution = solve(instance, goal, known, clock, gap)
+    if solution.status == "optimal":
+        known.solutions[key] = solution
+    _log.debug("%s: %s, %.9g of %.9g, %d nodes, %s", key[0], solution.status, solution.value, solution.bound,
+               solution.nodes, {phase: round(s, 3) for phase, s in solution.seconds.items()})
+    return solution
+
+
+class _Ties:
+    """The plans that share the greatest sum of incentives.
+
+    Among them ``sum p e y`` is, but for a constant, ``sum (p - least p) e y``: solved in that form, two vehicles have
+    one and the same tie in all scenarios.
+    """
+
+    def __init__(self, instance: Instance, nominal: Orders, known: Knowledge, clock: Clock, gap: float) -> None:
+        self._instance, self._known, self._clock, self._gap = instance, known, clock, gap
+        self._incentives, self._availability = _incentives(instance), _availability(instance)
+        best = _sum(self._incentives, nominal)
+        self._floor = best - _FLOOR * max(1.0, abs(best))
+        spread = self._availability - self._availability.min(initial=1.0)
+        self._equal = float(spread.max(initial=0.0)) < 1e-12
+        self._shares = np.zeros(len(spread)) if self._equal else spread / spread.max()
+
+    def expected(self, orders: Orders) -> float:
+        """Expected value of a plan."""
+        return _sum(self._incentives * self._availability[:, None], orders)
+
+    def solutions(self, interrupted: bool) -> tuple[Solution | None, Solution | None, Solution | None]:
+        """The tied plans of most and least expected value, and the quickest of most; ``None`` = not sought."""
+        weights = self._incentives * self._shares[:, None]
+        most = least = None
+        if not self._equal and not interrupted:
+            most = self._solve("most", Goal(weights=weights, floors=((self._incentives, self._floor),)))
+            interrupted = most.status == "interrupted"
+        if not self._equal and not interrupted:
+            least = self._solve("least", Goal(weights=-weights, floors=((self._incentives, self._floor),)))
+            interrupted = least.status == "interrupted"
+        if interrupted:
+            return most, least, None
+        floors = [(self._incentives, self._floor)]
+        if most is not None:
+            floors.append((weights, most.value - _FLOOR * max(1.0, abs(most.value))))
+        soonest = self._solve("soonest", Goal(weights=np.zeros_like(weights), floors=tuple(floors), driving=1.0))
+        return most, least, soonest
+
+    def _solve(self, what: str, goal: Goal) -> Solution:
+        key = (what, tuple(self._shares.tolist()), self._gap, *(floor for _, floor in goal.floors))
+        return _once(key, self._instance, goal, self._known, self._clock, self._gap)
+
+
+def _finish(
+    instance: Instance, objective: Objective, orders: Orders, known: Knowledge, *, value: float, bound: float,
+    status: Status, solutions: Sequence[Solution], runtime_s: float,
+) -> Plan:
+    routes, fuel = {}, {}
+    for vehicle, road, order in zip(instance.vehicles, known.roads, orders, strict=True):
+        drive = quickest(road, order)
+        if drive is None:
+            raise RuntimeError(f"no feasible route of {vehicle.name} visits {order}")
+        routes[vehicle.name] = tuple(instance.sites[i] for i in drive.route)
+        fuel[vehicle.name] = float(sum(vehicle.fuel_s[i, j] for i, j in itertools.pairwise(drive.route)))
+    counted = {"nodes": sum(s.nodes for s in solutions), "cuts": max((s.cuts for s in solutions), default=0),
+               "rounds": sum(s.rounds for s in solutions)}
+    return _certified(instance, Plan(
+        routes=routes, instance=instance.name, objective=objective, method=METHOD, status=status, value=value + 0.0,
+        bound=bound + 0.0, fuel_s=fuel, runtime_s=runtime_s, seed=0, details=counted))
+
+
+def _certified(instance: Instance, plan: Plan) -> Plan:
+    """The plan, after an independent check.
+
+    Raises:
+        RuntimeError: If it fails; that is a fault of the solver.
+    """
+    certificate = certify(instance, plan)
+    if certificate.reasons:
+        raise RuntimeError(f"the solver made a plan that fails its check: {'; '.join(certificate.reasons)}")
+    return plan
+
+
+def _orders(instance: Instance, plan: Plan, known: Knowledge) -> Orders:
+    """The POIs of a feasible plan's routes."""
+    pois = set(instance.pois)
+    orders = tuple(tuple(j for j in map(instance.sites.index, plan.route(v.name)) if j in pois)
+                   for v in instance.vehicles)
+    for road, order, vehicle in zip(known.roads, orders, instance.vehicles, strict=True):
+        if quickest(road, order) is None:
+            raise ValueError(f"the plan's route of {vehicle.name} is infeasible")
+    return orders
+
+
+def _incentives(instance: Instance) -> FloatArray:
+    return np.array([v.incentives for v in instance.vehicles]).reshape(len(instance.vehicles), len(instance.sites))
+
+
+def _availability(instance: Instance) -> FloatArray:
+    return np.array([v.availability for v in instance.vehicles], dtype=np.float64)
+
+
+def _sum(weights: FloatArray, orders: Orders) -> float:
+    return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
+
+
+def _worst(statuses: Sequence[Status]) -> Status:
+    return max(statuses, key=_STATUSES.index)

@@ -1,0 +1,106 @@
+"""Exact distances between points, segments and obstacles, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sva_bench.arrays import FloatArray
+from sva_bench.world.model import Obstacles
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    dx, dy = bx - ax, by - ay
+    squared = dx * dx + dy * dy
+    t = 0.0 if squared == 0.0 else min(max(((px - ax) * dx + (py - ay) * dy) / squared, 0.0), 1.0)
+    return math.hypot(ax + t * dx - px, ay + t * dy - py)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _point_box(px: float, py: float, hx: float, hy: float) -> float:
+    return math.hypot(max(abs(px) - hx, 0.0), max(abs(py) - hy, 0.0))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _meets_box(ax: float, ay: float, bx: float, by: float, hx: float, hy: float) -> bool:
+    """Whether a segment meets a box about the origin (slab test)."""
+    low, high = 0.0, 1.0
+    for start, move, half in ((ax, bx - ax, hx), (ay, by - ay, hy)):
+        if move == 0.0:
+            if abs(start) > half:
+                return False
+            continue
+        first, second = (-half - start) / move, (half - start) / move
+        low, high = max(low, min(first, second)), min(high, max(first, second))
+    return low <= high
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def segment_distance(
+    bounds: FloatArray, boxes: FloatArray, cylinders: FloatArray, ax: float, ay: float, bx: float, by: float,
+    enough: float,
+) -> float:
+    """Distance from a segment to the nearest obstacle or outer wall [m]; below 0 outside the bounds.
+
+    Args:
+        bounds, boxes, cylinders: As in ``Obstacles``.
+        ax, ay, bx, by: Ends of the segment [m]; equal ends make it a point.
+        enough: Stop looking once the distance is known to be below this; ``-inf`` for the exact distance.
+    """
+    nearest = min(min(ax, bx) - bounds[0], min(ay, by) - bounds[1], bounds[2] - max(ax, bx), bounds[3] - max(ay, by))
+    for k in range(len(cylinders)):
+        if nearest < enough:
+            return nearest
+        gap = _point_segment(cylinders[k, 0], cylinders[k, 1], ax, ay, bx, by) - cylinders[k, 2]
+        nearest = min(nearest, max(gap, 0.0))
+    mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay)
+    for k in range(len(boxes)):
+        if nearest < enough:
+            return nearest
+        hx, hy = boxes[k, 2], boxes[k, 3]
+        ox, oy = boxes[k, 0], boxes[k, 1]
+        # Circles about both say quickly that most boxes are far away.
+        if math.hypot(mx - ox, my - oy) - half - math.hypot(hx, hy) > max(nearest, 0.0):
+            continue
+        c, s = math.cos(boxes[k, 4]), math.sin(boxes[k, 4])
+        px, py = c * (ax - ox) + s * (ay - oy), -s * (ax - ox) + c * (ay - oy)
+        qx, qy = c * (bx - ox) + s * (by - oy), -s * (bx - ox) + c * (by - oy)
+        if _meets_box(px, py, qx, qy, hx, hy):
+            nearest = min(nearest, 0.0)
+            continue
+        gap = min(_point_box(px, py, hx, hy), _point_box(qx, qy, hx, hy))
+        for sx in (-hx, hx):
+            for sy in (-hy, hy):
+                gap = min(gap, _point_segment(sx, sy, px, py, qx, qy))
+        nearest = min(nearest, gap)
+    return nearest
+
+
+def clearance(obstacles: Obstacles, x: float, y: float) -> float:
+    """Distance from a point to the nearest obstacle or outer wall [m]; 0 or less inside one."""
+    return float(segment_distance(obstacles.bounds_m, obstacles.boxes, obstacles.cylinders, x, y, x, y, -math.inf))
+
+
+def open_heading(obstacles: Obstacles, x: float, y: float) -> float:
+    """The heading with the longest free view from a point [rad], in steps of 5 degrees.
+
+    A robot that stops so leaves without turning away from a wall first. Ties go to the smallest angle.
+    """
+    views = np.deg2rad(np.arange(0.0, 360.0, 5.0))
+    lengths = [_view(obstacles, x, y, float(angle)) for angle in views]
+    return float(views[int(np.argmax(np.round(lengths, 6)))])
+
+
+def _view(obstacles: Obstacles, x: float, y: float, angle: float) -> float:
+    """Length of the free straight line from a point [m], to a millimetre."""
+    x0, y0, x1, y1 = obstacles.bounds_m
+    low, high = 0.0, math.hypot(x1 - x0, y1 - y0)
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        gap = segment_distance(obstacles.bounds_m, obstacles.boxes, obstacles.cylinders, x, y,
+                               x + middle * math.cos(angle), y + middle * math.sin(angle), 1e-9)
+        low, high = (middle, high) if gap > 0 else (low, middle)
+    return low

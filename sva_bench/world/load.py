@@ -1,0 +1,187 @@
+"""World files in, resolved worlds out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sva_bench.documents import Document, read_yaml, validate
+from sva_bench.errors import nearest
+from sva_bench.mission.failures import JointState, marginals
+from sva_bench.robot.model import BUILT_IN, RobotModel
+from sva_bench.seeds import Stream, rng_for
+from sva_bench.world.clearance import clearance, open_heading
+from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, Site, SiteKind, World
+from sva_bench.world.schema import (
+    KIND,
+    Box,
+    Cylinder,
+    Drawn,
+    Joint,
+    RobotEntry,
+    Shapes,
+    SiteEntry,
+    WorldFile,
+)
+
+
+def load_world(path: Path) -> World:
+    """Read and resolve a world file.
+
+    Raises:
+        BadFile: With file, line, key and what to change.
+    """
+    document = read_yaml(path)
+    file = validate(document, WorldFile, KIND)
+    obstacles = _obstacles(file.map.shapes)
+    robots = tuple(_robot(document, name, entry, list(file.sites.pois)) for name, entry in file.robots.items())
+    widest = max(robot.model.radius_m for robot in robots)
+    sites = _sites(document, file, obstacles, widest)
+    plan, execute = (
+        (file.failure, file.failure) if isinstance(file.failure, str) else (file.failure.plan, file.failure.execute))
+    return World(
+        name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=_scenarios(document, file),
+        plan_failure=plan, execute_failure=execute, margin=file.margin,
+        noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd),
+    )
+
+
+def _obstacles(shapes: Shapes) -> Obstacles:
+    boxes, cylinders = [], []
+    for shape in shapes.obstacles:
+        if isinstance(shape, Cylinder):
+            cylinders.append([*shape.cylinder, shape.radius_m])
+        elif isinstance(shape, Box):
+            boxes.append([*shape.box, shape.size_m[0] / 2, shape.size_m[1] / 2, math.radians(shape.yaw_deg)])
+        else:
+            (ax, ay), (bx, by) = shape.wall
+            boxes.append([(ax + bx) / 2, (ay + by) / 2, math.hypot(bx - ax, by - ay) / 2, shape.thickness_m / 2,
+                          math.atan2(by - ay, bx - ax)])
+    return Obstacles(bounds_m=np.array(shapes.bounds_m), boxes=np.array(boxes).reshape(-1, 5),
+                     cylinders=np.array(cylinders).reshape(-1, 3))
+
+
+def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: float) -> tuple[Site, ...]:
+    entries: list[tuple[SiteKind, str, SiteEntry, tuple[str, ...]]] = [
+        ("base", "base", file.sites.base, ("sites", "base"))]
+    entries += [("station", name, e, ("sites", "stations", name)) for name, e in file.sites.stations.items()]
+    entries += [("poi", name, e, ("sites", "pois", name)) for name, e in file.sites.pois.items()]
+    sites: list[Site] = []
+    for kind, name, entry, loc in entries:
+        if any(site.name == name for site in sites):
+            raise document.error(loc, f"there is another site named {name!r}; names must differ")
+        x, y = entry.at_m
+        gap = clearance(obstacles, x, y)
+        if gap < widest_m:
+            where = "inside an obstacle or outside the bounds" if gap <= 0 else f"only {gap:.3f} m from an obstacle"
+            raise document.error((*loc, "at_m"), f"{name} is {where}; a robot of radius {widest_m} m doesn't fit "
+                                 "there: move the site")
+        heading = open_heading(obstacles, x, y) if entry.heading_deg is None else math.radians(entry.heading_deg)
+        sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s))
+    for k, site in enumerate(sites):
+        for other in sites[:k]:
+            if math.hypot(site.x_m - other.x_m, site.y_m - other.y_m) < 0.01:
+                raise document.error(entries[k][3], f"{site.name} and {other.name} are in one place; move one of them")
+    return tuple(sites)
+
+
+def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) -> Robot:
+    loc = ("robots", name)
+    if isinstance(entry.model, str):
+        if entry.model not in BUILT_IN:
+            raise document.error((*loc, "model"),
+                                 f"no built-in robot {entry.model!r}; {nearest(entry.model, list(BUILT_IN))}")
+        model = BUILT_IN[entry.model]
+    else:
+        try:
+            model = RobotModel(name=name, **entry.model.model_dump())
+        except ValueError as error:
+            raise document.error((*loc, "model"), str(error)) from None
+    if isinstance(entry.incentives, Drawn):
+        incentives = draw_incentives(entry.incentives, pois)
+    else:
+        incentives = dict(entry.incentives)
+        for poi in incentives:
+            if poi not in pois:
+                raise document.error((*loc, "incentives", poi), f"there is no POI {poi!r}; {nearest(poi, pois)}")
+    return Robot(
+        name=name, model=model, availability=entry.availability, incentives=incentives,
+        fuel_capacity_s=math.inf if entry.fuel_capacity_s is None else entry.fuel_capacity_s,
+        mission_limit_s=math.inf if entry.mission_limit_s is None else entry.mission_limit_s,
+    )
+
+
+def draw_incentives(drawn: Drawn, pois: list[str]) -> dict[str, float]:
+    """Incentives of all POIs, to the hundredth: uniform, with a share of them zero.
+
+    Source:
+        Section 5.1 of the paper: U(0, 150) with half of the POIs at zero, and U(0, 170).
+    """
+    rng = rng_for(drawn.seed, Stream.INCENTIVE)
+    values = np.round(rng.uniform(*drawn.uniform, size=len(pois)), 2)
+    values[rng.permutation(len(pois))[: round(drawn.zero_share * len(pois))]] = 0.0
+    return {poi: float(value) for poi, value in zip(pois, values, strict=True)}
+
+
+def _scenarios(document: Document, file: WorldFile) -> tuple[Scenario, ...]:
+    robots = {name: entry.availability for name, entry in file.robots.items()}
+    if file.scenarios is None:
+        return (Scenario(name="nominal", availability=robots),)
+    scenarios = []
+    for name, entry in file.scenarios.items():
+        loc: tuple[str | int, ...] = ("scenarios", name)
+        if isinstance(entry, Joint):
+            for k, state in enumerate(entry.joint):
+                for i, robot in enumerate(state.available):
+                    _known(document, (*loc, "joint", k, "available", i), robot, robots)
+            joint = tuple(
+                JointState(probability=s.probability, available=frozenset(s.available)) for s in entry.joint)
+            total = sum(state.probability for state in joint)
+            if abs(total - 1) > 1e-9:
+                raise document.error((*loc, "joint"), f"the probabilities add up to {total:.12g}, not to 1")
+            scenarios.append(Scenario(name=name, availability=marginals(joint, list(robots)), joint=joint))
+        else:
+            for robot in entry:
+                _known(document, (*loc, robot), robot, robots)
+            scenarios.append(Scenario(name=name, availability=robots | entry))
+    return tuple(scenarios)
+
+
+def _known(document: Document, loc: tuple[str | int, ...], robot: str, robots: Mapping[str, float]) -> None:
+    if robot not in robots:
+        raise document.error(loc, f"there is no robot {robot!r}; {nearest(robot, list(robots))}")
+
+
+def world_as_dict(world: World) -> dict[str, Any]:
+    """The resolved world as the content of a world file that gives the same world again."""
+    def entry(site: Site) -> dict[str, Any]:
+        return {"at_m": [site.x_m, site.y_m], "heading_deg": round(math.degrees(site.heading_rad), 9),
+                "stop_s": site.stop_s}
+
+    def limit(seconds: float) -> float | None:
+        return seconds if math.isfinite(seconds) else None
+
+    o = world.obstacles
+    shapes: list[dict[str, Any]] = [
+        {"box": [b[0], b[1]], "size_m": [2 * b[2], 2 * b[3]], "yaw_deg": math.degrees(b[4])} for b in o.boxes.tolist()]
+    shapes += [{"cylinder": [c[0], c[1]], "radius_m": c[2]} for c in o.cylinders.tolist()]
+    return {
+        "format": KIND, "name": world.name,
+        "map": {"shapes": {"bounds_m": o.bounds_m.tolist(), "obstacles": shapes}},
+        "sites": {"base": entry(world.sites[0]), "stations": {s.name: entry(s) for s in world.stations},
+                  "pois": {s.name: entry(s) for s in world.pois}},
+        "robots": {r.name: {
+            "model": r.model.name if BUILT_IN.get(r.model.name) == r.model else
+            {k: v for k, v in r.model.figures().items() if k != "name"},
+            "fuel_capacity_s": limit(r.fuel_capacity_s), "mission_limit_s": limit(r.mission_limit_s),
+            "availability": r.availability, "incentives": dict(r.incentives)} for r in world.robots},
+        "scenarios": {s.name: dict(s.availability) if s.joint is None else {"joint": [
+            {"probability": j.probability, "available": sorted(j.available)} for j in s.joint]}
+            for s in world.scenarios},
+        "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
+        "margin": world.margin, "noise": {"wheel_gain_sd": world.noise.wheel_gain_sd},
+    }

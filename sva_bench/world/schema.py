@@ -1,0 +1,146 @@
+"""The world file's schema: what may stand in it, key by key."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from sva_bench.documents import Name, NonNegative, Number, Positive, Probability, Section, WholeNumber
+from sva_bench.mission.failures import FailureProcess
+
+KIND = "sva-bench/world@1"
+Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class Box(Section):
+    box: Point
+    size_m: Annotated[list[Positive], Field(min_length=2, max_length=2)]
+    yaw_deg: Number = 0.0
+
+
+class Cylinder(Section):
+    cylinder: Point
+    radius_m: Positive
+
+
+class Wall(Section):
+    wall: Annotated[list[Point], Field(min_length=2, max_length=2)]
+    thickness_m: Positive = 0.1
+
+    @field_validator("wall")
+    @classmethod
+    def _has_a_length(cls, ends: list[list[float]]) -> list[list[float]]:
+        if ends[0] == ends[1]:
+            raise ValueError("both ends of the wall are the same point")
+        return ends
+
+
+class Shapes(Section):
+    bounds_m: Annotated[list[Number], Field(min_length=4, max_length=4)]
+    obstacles: list[Box | Cylinder | Wall] = Field(default_factory=list)
+
+    @field_validator("bounds_m")
+    @classmethod
+    def _enclose_something(cls, bounds: list[float]) -> list[float]:
+        if not (bounds[0] < bounds[2] and bounds[1] < bounds[3]):
+            raise ValueError(f"expected x_min, y_min, x_max, y_max with min below max, found {bounds}")
+        if max(bounds[2] - bounds[0], bounds[3] - bounds[1]) > 2000 or max(map(abs, bounds)) > 1e5:
+            raise ValueError("a world may be at most 2000 m wide and 100 km from the origin")
+        return bounds
+
+
+class Map(Section):
+    shapes: Shapes
+
+
+class SiteEntry(Section):
+    at_m: Point
+    heading_deg: Number | None = None
+    stop_s: NonNegative = 0.0
+
+
+class Sites(Section):
+    base: SiteEntry
+    stations: dict[Name, SiteEntry] = Field(default_factory=dict)
+    pois: dict[Name, SiteEntry]
+
+
+class Figures(Section):
+    """Figures of a robot that isn't built in."""
+
+    radius_m: Positive
+    wheel_radius_m: Positive
+    track_m: Positive
+    mass_kg: Positive
+    max_speed_m_s: Positive
+    max_turn_rad_s: Positive
+    acceleration_m_s2: Positive
+    turn_acceleration_rad_s2: Positive
+
+
+class Drawn(Section):
+    """Incentives drawn per POI: uniform, a share of them zero."""
+
+    uniform: Annotated[list[NonNegative], Field(min_length=2, max_length=2)]
+    zero_share: Probability = 0.0
+    seed: WholeNumber
+
+    @field_validator("uniform")
+    @classmethod
+    def _in_order(cls, uniform: list[float]) -> list[float]:
+        if uniform[0] > uniform[1]:
+            raise ValueError(f"expected [low, high], found {uniform}")
+        return uniform
+
+
+class RobotEntry(Section):
+    model: str | Figures
+    fuel_capacity_s: NonNegative | None = None
+    mission_limit_s: NonNegative | None = None
+    availability: Probability = 1.0
+    incentives: dict[Name, NonNegative] | Drawn
+
+
+class JointEntry(Section):
+    probability: Probability
+    available: list[Name]
+
+
+class Joint(Section):
+    joint: Annotated[list[JointEntry], Field(min_length=1)]
+
+
+class FailureEntry(Section):
+    plan: FailureProcess
+    execute: FailureProcess
+
+
+class NoiseEntry(Section):
+    wheel_gain_sd: Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)] = 0.0
+
+
+class WorldFile(Section):
+    """A world file."""
+
+    format: Literal["sva-bench/world@1"]
+    name: Name
+    map: Map
+    sites: Sites
+    robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
+    scenarios: Annotated[dict[Name, dict[Name, Probability] | Joint], Field(min_length=1)] | None = None
+    failure: FailureProcess | FailureEntry = "mission"
+    interaction: Literal["independent"] = "independent"
+    margin: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] = 0.01
+    noise: NoiseEntry = Field(default_factory=NoiseEntry)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _say_what_is_not_there_yet(cls, data: object) -> object:
+        if isinstance(data, dict):
+            kinds = data.get("map")
+            if isinstance(kinds, dict) and {"ros", "movingai"} & set(kinds):
+                raise ValueError("this version reads only 'map: shapes', no occupancy grids")
+            if data.get("interaction") == "shared":
+                raise ValueError("this version knows only 'interaction: independent'")
+        return data

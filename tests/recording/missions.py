@@ -1,0 +1,54 @@
+"""A mission small enough to follow by hand: two POIs and a station on a line, three robots."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from sva_bench.execution.outcome import Assignment, Driven, Trace, settle, trace_of
+from sva_bench.mission.failures import NEVER
+from sva_bench.robot.model import BUILT_IN
+from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, Site, World
+
+BASE = (1.0, 1.0, 0.0)
+WORLD = World(
+    name="line",
+    obstacles=Obstacles(bounds_m=np.array([0, 0, 8, 4]), boxes=np.array([[4.0, 3.0, 0.5, 0.25, 0.3]]),
+                        cylinders=np.array([[6.0, 3.0, 0.3]])),
+    sites=(Site(name="base", kind="base", x_m=1.0, y_m=1.0, heading_rad=0.0),
+           Site(name="r1", kind="station", x_m=5.0, y_m=1.0, heading_rad=0.0, stop_s=2.0),
+           Site(name="p1", kind="poi", x_m=3.0, y_m=1.0, heading_rad=0.0),
+           Site(name="p2", kind="poi", x_m=7.0, y_m=1.0, heading_rad=0.0)),
+    robots=tuple(Robot(name=name, model=BUILT_IN["turtlebot2"], fuel_capacity_s=fuel, mission_limit_s=60.0,
+                       availability=0.5, incentives={"p1": 30.0, "p2": 12.5})
+                 for name, fuel in (("uv1", 20.0), ("uv2", 20.0), ("uv3", math.inf))),
+    scenarios=(Scenario(name="nominal", availability={"uv1": 0.5, "uv2": 0.5, "uv3": 0.5}),),
+    plan_failure="mission", execute_failure="mission", margin=0.0, noise=Noise(),
+)
+TOUR = ("base", "p1", "r1", "p2", "base")
+
+
+def trace(robot: str, route: tuple[str, ...] = TOUR, *, fails_before: int = NEVER, limit_s: float = 60.0,
+          fuel_s: float | None = None, stuck: bool = False) -> Trace:
+    """A drive at 1 m/s along the line, posed at 20 Hz; nothing but the legs takes time, bar 2 s at r1."""
+    at = {site.name: np.array([site.x_m, site.y_m]) for site in WORLD.sites}
+    me = next(r for r in WORLD.robots if r.name == robot)
+    poses, leg_of, clock, leg_s = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0)], []
+    for leg, (a, b) in enumerate(pairwise(route)):
+        length = float(np.linalg.norm(at[b] - at[a]))
+        share = np.arange(1, round(length * 20) + 1)[:, None] / round(length * 20)
+        yaw = math.atan2(*(at[b] - at[a])[::-1])
+        poses.append(np.hstack([at[a] + share * (at[b] - at[a]), np.full((len(share), 1), yaw)]))
+        leg_of.append(np.full(len(share), leg))
+        clock.append(share[:, 0] * length)
+        leg_s.append(length)
+    driven = Driven(leg_s=np.array(leg_s), stuck=stuck, leg_of=np.concatenate(leg_of), clock_s=np.concatenate(clock),
+                    pose=np.concatenate(poses))
+    orders = Assignment(
+        robot=robot, route=route, stations=frozenset({"r1"}), incentives=me.incentives,
+        stop_s={site.name: site.stop_s for site in WORLD.sites},
+        fuel_capacity_s=me.fuel_capacity_s if fuel_s is None else fuel_s, mission_limit_s=limit_s)
+    planned = np.array([at[site] for site in route]).reshape(-1, 2)
+    return trace_of(orders, driven, settle(orders, driven, fails_before), BASE, planned)

@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sva_bench.recording.story import BLUE, ROBOT_COLORS, VERMILLION, YELLOW, Level, Story, corners, dashes, story_of
+from tests.recording.missions import WORLD, trace
+
+
+def told(story: Story) -> list[tuple[float, Level, str]]:
+    return [(sentence.time_s, sentence.level, sentence.text) for sentence in story.log]
+
+
+def test_each_event_is_told_in_order_of_time() -> None:
+    # p1 after 2 m, r1 after 2 m more and 2 s of refuelling, p2 after 2 m, 6 m home; all at 1 m/s.
+    story = story_of(WORLD, [trace("uv1")], "tour")
+    assert told(story) == [
+        (0.0, "INFO", "uv1 left base"), (2.0, "DEBUG", "uv1 reached p1"), (2.0, "INFO", "uv1 collected p1: 30"),
+        (4.0, "DEBUG", "uv1 reached r1"), (6.0, "INFO", "uv1 refuelled at r1"), (8.0, "DEBUG", "uv1 reached p2"),
+        (8.0, "INFO", "uv1 collected p2: 12.5"), (14.0, "DEBUG", "uv1 reached base"),
+        (14.0, "INFO", "uv1 came home, with 42.5 collected")]
+    assert story.duration_s == 14
+
+
+def test_unhappy_ends_are_told_and_stop_the_robot_for_good() -> None:
+    late = trace("uv1", limit_s=5.0)  # p2 is reached after 8 s
+    empty = trace("uv2", fuel_s=3.0)  # r1 is 4 s away
+    failed = trace("uv3", fails_before=2)  # on leaving r1 for p2, at 6 s
+    story = story_of(WORLD, [failed, late, empty], "unhappy")  # in any order
+    texts = [entry for entry in told(story) if entry[1] in ("WARN", "ERROR")]
+    assert texts == [
+        (3.0, "ERROR", "uv2 ran out of fuel on the way to r1, with 30 collected"),
+        (6.0, "WARN", "uv1 passed its limit of 5 s at r1: earns no more"),
+        (6.0, "ERROR", "uv3 failed at r1, with 30 collected"),
+        (14.0, "WARN", "uv1 came home late, with 30 collected")]
+    assert [(robot.name, robot.dies_s) for robot in story.cast] == [("uv1", None), ("uv2", 3.0), ("uv3", 6.0)]
+    stuck = story_of(WORLD, [trace("uv1", ("base", "p1"), stuck=True)], "stuck")
+    assert told(stuck)[-1] == (2.0, "ERROR", "uv1 got stuck on the way to p1, with 0 collected")
+
+
+def test_a_poi_takes_the_colour_of_the_robot_that_collected_it_first() -> None:
+    # uv2 goes to p2 at once (6 s), uv1 comes there after 8 s; p1 is uv1's after 2 s and uv2's on the way home (10 s).
+    story = story_of(WORLD, [trace("uv1"), trace("uv2", ("base", "p2", "p1", "base"))], "two")
+    (pois,) = (marks for marks in story.marks if marks.kind == "poi")
+    assert_array_equal(pois.time_s, [0, 2, 6])
+    assert_array_equal(pois.colors, [[YELLOW, YELLOW], [BLUE, YELLOW], [BLUE, VERMILLION]])
+
+
+def test_a_robot_keeps_its_colour_whoever_else_is_shown() -> None:
+    assert story_of(WORLD, [trace("uv3")], "alone").cast[0].color == ROBOT_COLORS[2]
+
+
+def test_fuel_falls_while_driving_and_rises_during_the_refuelling_stop() -> None:
+    fuel = story_of(WORLD, [trace("uv1")], "tour").cast[0].fuel
+    assert fuel is not None
+    # 20 s at first, 16 s left at r1 (4 s), full again when the stop is over (6 s), 8 s more to drive.
+    assert_allclose(np.column_stack([fuel.time_s, fuel.value]), [[0, 20], [4, 16], [6, 20], [14, 12]], atol=1e-9)
+
+
+def test_fuel_without_a_limit_is_not_shown() -> None:
+    assert story_of(WORLD, [trace("uv3")], "no limit").cast[0].fuel is None
+
+
+def test_the_total_is_the_sum_of_the_robots_and_ends_with_the_mission() -> None:
+    story = story_of(WORLD, [trace("uv1"), trace("uv2", ("base", "p2", "base"))], "sum")
+    assert_array_equal(story.total.time_s, [0, 2, 6, 8, 14])
+    assert_array_equal(story.total.value, [0, 30, 42.5, 55, 55])
+    assert_array_equal(story.cast[1].collected.time_s, [0, 6, 14])
+
+
+def test_the_trail_leads_from_the_base_to_where_the_drive_ended() -> None:
+    robot = story_of(WORLD, [trace("uv1", fails_before=2)], "trail").cast[0]
+    assert_array_equal(robot.trail[0, 0], [1, 1])
+    assert_array_equal(robot.trail[1:, 0], robot.trail[:-1, 1])
+    assert_allclose(robot.trail[-1, 1], [5, 1])
+    assert_allclose(robot.trail_s[-1], 4.0)  # it waits and fails at r1: nothing is added there
+
+
+def test_a_robot_that_stays_home_or_fails_at_once_is_there_all_the_same() -> None:
+    story = story_of(WORLD, [trace("uv1", ()), trace("uv2", fails_before=0)], "idle")
+    assert told(story) == [(0.0, "INFO", "uv1 stays home"), (0.0, "ERROR", "uv2 failed at base, with 0 collected")]
+    assert [(len(robot.trail), robot.dies_s) for robot in story.cast] == [(0, None), (0, 0.0)]
+    assert story.duration_s == 0
+
+
+def test_dashes_follow_the_path_round_a_corner() -> None:
+    # Along x for 1, then along y for 1; dashes 0.4, gaps 0.4: [0, 0.4], [0.8, 1.2] which turns the corner, [1.6, 2].
+    cut = dashes(np.array([[0, 0], [1, 0], [1, 1.0]]), 0.4, 0.4)
+    expected = np.array([[[0, 0], [0.4, 0]], [[0.8, 0], [1, 0]], [[1, 0], [1, 0.2]], [[1, 0.6], [1, 1]]])
+    assert_allclose(cut, expected, atol=1e-12)
+    assert len(dashes(np.zeros((0, 2)), 0.4, 0.4)) == 0
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(-5, 5)), min_size=1, max_size=30))
+def test_corners_draw_the_same_lines(steps: list[tuple[int, int]]) -> None:
+    time, value = np.cumsum(np.array(steps, dtype=np.float64), axis=0).T
+    kept = corners(time, value)
+    assert kept[0]
+    assert kept[-1]
+    once = np.append(True, np.diff(time) > 0) & np.append(np.diff(time) > 0, True)  # where the line has one value
+    assert_allclose(np.interp(time[once], time[kept], value[kept]), value[once], atol=1e-9)
+
+
+@given(st.floats(1, 200), st.floats(1, 200), st.floats(-50, 50), st.floats(-50, 50))
+def test_the_whole_floor_is_in_view(width: float, depth: float, x: float, y: float) -> None:
+    obstacles = replace(WORLD.obstacles, bounds_m=np.array([x, y, x + width, y + depth]))
+    story = story_of(replace(WORLD, obstacles=obstacles), [trace("uv1", ())], "view")
+    eye, target = np.array(story.eye_m), np.array(story.target_m)
+    ahead = (target - eye) / np.linalg.norm(target - eye)
+    up = np.cross([1, 0, 0], ahead)
+    for corner in ([x, y, 0], [x + width, y, 0], [x, y + depth, 0], [x + width, y + depth, 0]):
+        ray = np.array(corner) - eye
+        tall = ray @ ahead * np.tan(np.radians(55) / 2)
+        assert abs(ray @ up) <= tall
+        assert abs(ray[0]) <= tall * 1.25
+
+
+def test_traces_of_strangers_or_twins_are_refused() -> None:
+    with pytest.raises(ValueError, match="one trace per robot"):
+        story_of(WORLD, [], "nobody")
+    with pytest.raises(ValueError, match="one trace per robot"):
+        story_of(WORLD, [trace("uv1"), trace("uv1")], "twins")
+    with pytest.raises(ValueError, match="one trace per robot"):
+        story_of(replace(WORLD, robots=WORLD.robots[:1]), [trace("uv2")], "stranger")
