@@ -23,19 +23,22 @@ from sva_bench.world.model import Obstacles
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keeps what native code prints off standard output; results go there and nothing else."""
-    sys.stdout.flush()
-    saved = os.dup(1)
-    null = os.open(os.devnull, os.O_WRONLY)
+    """Keeps what native code prints off both outputs: results and messages go there, and nothing else."""
     libc = ctypes.CDLL(None)
+    sys.stdout.flush()
+    sys.stderr.flush()
     libc.fflush(None)  # what others have buffered goes where it was meant to go
+    saved = [os.dup(1), os.dup(2)]
+    null = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(null, 1)
+        os.dup2(null, 2)
         yield
     finally:
-        libc.fflush(None)  # else the banner comes out of the C library's buffer when the program ends
-        os.dup2(saved, 1)
-        os.close(saved)
+        libc.fflush(None)  # else a banner comes out of the C library's buffer when the program ends
+        for number, descriptor in enumerate(saved, start=1):
+            os.dup2(descriptor, number)
+            os.close(descriptor)
         os.close(null)
 
 

@@ -95,8 +95,17 @@ def wrap(angle: float) -> float:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
+def _edge_at(arc: FloatArray, s: float) -> int:
+    """Index of the edge on which arc length ``s`` lies."""
+    k = 0
+    while k < len(arc) - 2 and arc[k + 1] <= s:
+        k += 1
+    return k
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _point_at(path: FloatArray, arc: FloatArray, s: float) -> tuple[float, float]:
-    k = min(max(np.searchsorted(arc, s, side="right") - 1, 0), len(path) - 2)
+    k = _edge_at(arc, s)
     length = arc[k + 1] - arc[k]
     share = 0.0 if length <= 0.0 else min(max((s - arc[k]) / length, 0.0), 1.0)
     return (path[k, 0] + share * (path[k + 1, 0] - path[k, 0]), path[k, 1] + share * (path[k + 1, 1] - path[k, 1]))
@@ -106,7 +115,7 @@ def _point_at(path: FloatArray, arc: FloatArray, s: float) -> tuple[float, float
 def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float) -> float:
     """Arc length of the path point nearest to (x, y), looked for between ``s`` and a little ahead."""
     best, best_s = np.inf, s
-    k = min(max(np.searchsorted(arc, s, side="right") - 1, 0), len(path) - 2)
+    k = _edge_at(arc, s)
     while k < len(path) - 1 and arc[k] <= s + _SEARCH_M:
         dx, dy = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
         length = arc[k + 1] - arc[k]
@@ -132,7 +141,7 @@ def _turn(error: float, rate: float, dt: float, limits: FloatArray) -> float:
     # The braking curve is evaluated where the robot will be when the command has acted for half a step.
     left = max(abs(error) - 0.5 * abs(rate) * dt, 0.0)
     wanted = min(limits[1], math.sqrt(2.0 * _BRAKING * limits[3] * left), abs(error) / dt)
-    return _towards(rate, math.copysign(wanted, error), limits[3] * dt)
+    return float(_towards(rate, math.copysign(wanted, error), limits[3] * dt))
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

@@ -269,4 +269,5 @@ def _free_mask(
 
 def _free(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> FloatArray:
     mask = _free_mask(obstacles.bounds_m, obstacles.boxes, obstacles.cylinders, points, clearance_m)
-    return points[mask > 0]
+    free: FloatArray = points[mask > 0]
+    return free

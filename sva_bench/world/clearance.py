@@ -53,13 +53,13 @@ def segment_distance(
     nearest = min(min(ax, bx) - bounds[0], min(ay, by) - bounds[1], bounds[2] - max(ax, bx), bounds[3] - max(ay, by))
     for k in range(len(cylinders)):
         if nearest < enough:
-            return nearest
+            return float(nearest)
         gap = _point_segment(cylinders[k, 0], cylinders[k, 1], ax, ay, bx, by) - cylinders[k, 2]
         nearest = min(nearest, max(gap, 0.0))
     mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay)
     for k in range(len(boxes)):
         if nearest < enough:
-            return nearest
+            return float(nearest)
         hx, hy = boxes[k, 2], boxes[k, 3]
         ox, oy = boxes[k, 0], boxes[k, 1]
         # Circles about both say quickly that most boxes are far away.
@@ -76,7 +76,7 @@ def segment_distance(
             for sy in (-hy, hy):
                 gap = min(gap, _point_segment(sx, sy, px, py, qx, qy))
         nearest = min(nearest, gap)
-    return nearest
+    return float(nearest)
 
 
 def clearance(obstacles: Obstacles, x: float, y: float) -> float:

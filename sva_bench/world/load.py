@@ -122,7 +122,8 @@ def draw_incentives(drawn: Drawn, pois: list[str]) -> dict[str, float]:
         Section 5.1 of the paper: U(0, 150) with half of the POIs at zero, and U(0, 170).
     """
     rng = rng_for(drawn.seed, Stream.INCENTIVE)
-    values = np.round(rng.uniform(*drawn.uniform, size=len(pois)), 2)
+    low, high = drawn.uniform
+    values = np.round(rng.uniform(low, high, size=len(pois)), 2)
     values[rng.permutation(len(pois))[: round(drawn.zero_share * len(pois))]] = 0.0
     return {poi: float(value) for poi, value in zip(pois, values, strict=True)}
 

@@ -1,0 +1,1 @@
+"""Independent answers that the product is checked against: they share no code with it."""
