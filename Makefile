@@ -2,7 +2,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: run test test-long lint setup lock clean
+.PHONY: run test test-long lint setup lock bench clean
 
 run: setup  ## plan, execute and measure the four-rooms mission
 	$(BIN)/sva-bench run worlds/four-rooms.yaml
@@ -32,3 +32,7 @@ lock: setup  ## pin the dependencies anew
 
 clean:
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+bench: setup  ## figures of the README; see benchmarks/
+	for file in travel_times physics recording solver_small; do $(BIN)/python benchmarks/$$file.py || exit 1; done
+	time $(BIN)/sva-bench run worlds/four-rooms.yaml

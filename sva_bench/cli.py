@@ -13,13 +13,13 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 from rich.console import Console
 from rich.logging import RichHandler
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from typer.exceptions import TyperException
 
 from sva_bench import __version__
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError, nearest
@@ -109,13 +109,14 @@ def run(
 
     Writes a run folder with travel times, instances, plans, outcomes, recordings and a summary.
     """
-    from sva_bench.bench import Options
-    from sva_bench.bench import run as run_bench
-    from sva_bench.solver.two_stage import SolveLimits
     from sva_bench.world.load import load_world
 
     _set_up_logging(verbose)
-    loaded = load_world(world)
+    loaded = load_world(world)  # before the heavy imports: an error in the file is said at once
+    from sva_bench.bench import Options
+    from sva_bench.bench import run as run_bench
+    from sva_bench.solver.two_stage import SolveLimits
+
     if scenario:
         loaded = replace(loaded, scenarios=tuple(loaded.scenario(name) for name in _known_scenarios(
             scenario, [s.name for s in loaded.scenarios])))
@@ -263,10 +264,10 @@ def run_command_line(arguments: Sequence[str]) -> int:
     except SvaBenchError as error:
         messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return int(error.exit_code)
-    except click.ClickException as error:
+    except TyperException as error:  # bad usage
         error.show()
         return error.exit_code
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         messages.print("interrupted")
         return int(ExitCode.INTERRUPTED)
     except BrokenPipeError:

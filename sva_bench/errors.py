@@ -9,7 +9,7 @@ from typing import ClassVar
 
 
 class ExitCode(IntEnum):
-    """What a command's exit status means (``docs/formats.md``)."""
+    """What a command's exit status means (``README.md``)."""
 
     DONE = 0
     FAULT = 1

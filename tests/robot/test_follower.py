@@ -139,10 +139,10 @@ def test_turning_in_place_takes_the_time_of_the_trapezoid(model: RobotModel, ang
     time_s, pose = course_time(model, [[1, 1], [1, 1]], angle, 0.0)
     assert_allclose(pose[:2], [1, 1], atol=1e-12)
     assert abs(wrap(angle - pose[2])) < 0.02
-    # Braking at 0.9 of the acceleration adds up to 5 % of the braking half, the braking curve's discrete tail some
-    # steps; the last 0.02 rad are not turned, which the tail outweighs.
+    # The last 0.02 rad are not turned: at 0.9 of the acceleration they would take sqrt(2 0.02 / 2.7) = 0.122 s.
+    # Braking at 0.9 of the acceleration adds 11 % to the braking half at most; the rest is a control step or two.
     ideal = trapezoid_s(abs(angle), model.max_turn_rad_s, model.turn_acceleration_rad_s2)
-    assert ideal - 0.05 <= time_s <= 1.08 * ideal + 0.2
+    assert ideal - 0.122 <= time_s <= 1.06 * ideal + 2 * STEP_S
 
 
 @pytest.mark.parametrize("model", MODELS, ids=by_model)
@@ -193,7 +193,8 @@ def test_slow_wheels_take_longer_and_unequal_ones_still_arrive() -> None:
     # Of 6.97 s some 5.3 s pass at full speed, which takes 1 / 0.9 as long.
     assert slow == pytest.approx(ideal / 0.9, rel=0.03)
     unequal, pose = course_time(TURTLEBOT, path, 0.0, 0.0, (0.97, 1.03))
-    assert unequal == pytest.approx(ideal, rel=0.02)
+    # 3 % of difference over the track's 0.23 m is steered against all the way, and turned back at the end: 0.2 s.
+    assert unequal == pytest.approx(ideal, abs=0.3)
     assert np.hypot(pose[0] - 4, pose[1]) < 0.02
 
 
