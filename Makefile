@@ -26,6 +26,7 @@ $(STAMP): requirements.lock pyproject.toml
 	touch $@
 
 lock: setup  ## pin the dependencies anew
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-tools
 	$(BIN)/pip-compile --quiet --extra dev --all-build-deps --allow-unsafe --generate-hashes --strip-extras \
 	  --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-annotate --no-header \
 	  --output-file requirements.lock pyproject.toml

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import statistics
 import time
+from itertools import pairwise
 from pathlib import Path
 
 from sva_bench.execution.execute import DriveTask, drive_route
@@ -25,7 +26,7 @@ def main() -> None:
     base = world.sites[0]
     task = DriveTask(
         obstacles=world.obstacles, model=model, start=(base.x_m, base.y_m, base.heading_rad),
-        legs=tuple((times.course(a, b),) for a, b in zip(ROUTE, ROUTE[1:], strict=False)), wheel_gains=(1.0, 1.0),
+        legs=tuple((times.course(a, b),) for a, b in pairwise(ROUTE)), wheel_gains=(1.0, 1.0),
         fidelity="rollout", traced=False)
     drive_route(task)  # compiles
     ratios = []

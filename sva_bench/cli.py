@@ -33,6 +33,7 @@ app = typer.Typer(
 
 log = logging.getLogger(__name__)
 messages = Console(stderr=True)
+_NO_PER_LEG = "there is no exact solver for per_leg failures yet: plans are made under mission"
 
 
 class FidelityChoice(StrEnum):
@@ -127,7 +128,7 @@ def run(
     if execute_failure is not None:
         loaded = replace(loaded, execute_failure=execute_failure.value)
     if loaded.plan_failure == "per_leg":
-        log.warning("no exact solver for per_leg failures yet: plans are made under mission")
+        log.warning(_NO_PER_LEG)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi)
     with _progress() as progress, _workers(workers) as executor:
@@ -185,6 +186,9 @@ def plan(
     with _progress() as progress:
         if source.suffix.lower() in (".yaml", ".yml"):
             instance = _instance_of_world(source, scenario, "prmstar", None, progress)
+            if instance.failure == "per_leg":
+                log.warning(_NO_PER_LEG)
+                instance = replace(instance, failure="mission")
         elif scenario is not None:
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
         else:
@@ -264,8 +268,9 @@ def run_command_line(arguments: Sequence[str]) -> int:
     except SvaBenchError as error:
         messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return int(error.exit_code)
-    except TyperException as error:  # bad usage
-        error.show()
+    except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
+        show: Callable[[], None] = getattr(error, "show", lambda: messages.print(str(error), highlight=False))
+        show()
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
         messages.print("interrupted")
@@ -300,8 +305,8 @@ def _instance_of_world(path: Path, scenario: str | None, planner: Any, margin: f
         chosen = world.scenario(_known_scenarios([scenario], [s.name for s in world.scenarios])[0])
     costs = plan_costs(world, planner, progress)
     for cost in costs.values():
-        log.info("%s: %d pairs, repair changed %.2f %% of them, by up to %.2f %%; longest leg %.3f s",
-                 cost.times.model.name, cost.pairs, cost.changed_pct, cost.max_excess_pct, cost.cost_s.max())
+        messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
+                       f"to {cost.max_excess_pct:.1f} %", highlight=False)
     return instance_of(world, costs, chosen)
 
 

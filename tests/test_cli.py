@@ -51,7 +51,7 @@ def test_a_run_leaves_every_file_of_the_contract(finished: tuple[Path, dict[str,
         "outcomes.parquet", "summary.json", "report.html",
         *(f"plans/{stem}.json" for stem in stems), *(f"recordings/{stem}.rrd" for stem in stems)}
     checked = subprocess.run([str(Path(sys.executable).with_name("rerun")), "rrd", "verify",
-                              *(str(path) for path in (run / "recordings").iterdir())], capture_output=True, check=False)
+                              *map(str, (run / "recordings").iterdir())], capture_output=True, check=False)
     assert checked.returncode == 0, checked.stderr
 
 

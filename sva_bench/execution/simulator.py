@@ -155,7 +155,7 @@ class Simulator:
         total = 0
         for stretch in course:
             state, since = new_state(), self.pose()
-            for step in range(1, patience_steps(stretch) + 1):
+            for step in range(1, patience_steps(stretch, model) + 1):
                 x, y, yaw = self.pose()
                 speed, rate = control(stretch.path, stretch.arc, stretch.heading_rad, limits, state, x, y, yaw, dt)
                 if state[0] == ARRIVED:

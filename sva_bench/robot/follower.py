@@ -188,7 +188,7 @@ def control(
         remaining = max(left - 0.5 * speed * dt, 0.0)
         wanted = min(limits[0], math.sqrt(2.0 * _BRAKING * limits[2] * remaining), math.sqrt(_LATERAL_M_S2 / bend),
                      limits[1] / bend)
-        wanted = min(max(wanted, _CREEP_M_S), left / dt)
+        wanted = min(max(wanted, min(_CREEP_M_S, limits[0])), left / dt)
         speed = _towards(speed, wanted, limits[2] * dt)
         rate = _towards(rate, speed * curvature, 2.0 * limits[3] * dt)
     if phase == TURN_TO_HEADING:

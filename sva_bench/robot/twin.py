@@ -12,13 +12,14 @@ from sva_bench.arrays import FloatArray
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, Stretch, control
 from sva_bench.robot.model import RobotModel
 
-_SLOWEST_M_S = 0.02  # a stretch that takes longer than at this speed, plus the turns, counts as stuck
-_TURNS_S = 30.0
+_SLOWEST = 0.05  # a stretch that takes longer than at this share of the robot's speeds counts as stuck
+_SETTLING_S = 30.0
 
 
-def patience_steps(stretch: Stretch) -> int:
+def patience_steps(stretch: Stretch, model: RobotModel) -> int:
     """Control steps after which a stretch that isn't finished counts as stuck."""
-    return math.ceil((float(stretch.arc[-1]) / _SLOWEST_M_S + _TURNS_S) * CONTROL_HZ)
+    fastest_s = float(stretch.arc[-1]) / model.max_speed_m_s + 2 * math.pi / model.max_turn_rad_s
+    return math.ceil((fastest_s / _SLOWEST + _SETTLING_S) * CONTROL_HZ)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -65,7 +66,7 @@ def drive(
     dt = 1.0 / CONTROL_HZ
     total, traces = 0, []
     for stretch in course:
-        steps = patience_steps(stretch)
+        steps = patience_steps(stretch, model)
         trace = np.empty((steps if traced else 0, 3))
         taken = _drive(stretch.path, stretch.arc, stretch.heading_rad, model.limits, pose, *wheel_gains, model.track_m,
                        dt, steps, trace)

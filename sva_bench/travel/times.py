@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ from sva_bench.robot.twin import drive
 from sva_bench.travel.roadmap import PlannerName, plan_paths
 from sva_bench.world.clearance import clearance
 from sva_bench.world.model import World
+
+_log = logging.getLogger(__name__)
 
 CLEARANCE_MARGINS_M = (0.12, 0.06, 0.03)
 """Distance to obstacles that paths keep beyond the robot's radius; the first that connects all sites.
@@ -33,6 +36,18 @@ class UnreachableSite(SvaBenchError):
     def __str__(self) -> str:
         return (f"no path from {self.origin!r} to {self.destination!r} for a robot of radius {self.radius_m} m: "
                 f"move one of them, or widen the passage between them in the world file")
+
+
+class NeverArrives(SvaBenchError):
+    """A path that the follower cannot finish with a robot's figures."""
+
+    def __init__(self, model: str, origin: str, destination: str) -> None:
+        super().__init__(model, origin, destination)
+        self.model, self.origin, self.destination = model, origin, destination
+
+    def __str__(self) -> str:
+        return (f"robot model {self.model}: it never arrives from {self.origin!r} at {self.destination!r}; its speeds "
+                f"and accelerations don't go together: change them in the world file")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,6 +94,7 @@ def plan_travel_times(world: World, model: RobotModel, planner: PlannerName = "p
 
     Raises:
         UnreachableSite: If the model cannot get from the base to a site.
+        NeverArrives: If the follower cannot drive a path with the model's figures.
 
     Source:
         ``f'`` of section 5.2 of the paper.
@@ -93,6 +109,9 @@ def plan_travel_times(world: World, model: RobotModel, planner: PlannerName = "p
         paths = plan_paths(world.obstacles, points, kept, planner=planner)
         lost = _unreachable(world, paths)
         if lost is None:
+            if margin != CLEARANCE_MARGINS_M[0]:
+                _log.warning("%s: a site or a passage is narrow; all paths keep %.3f m from obstacles, where %.3f m "
+                             "would be safer", model.name, kept, model.radius_m + CLEARANCE_MARGINS_M[0])
             return TravelTimes(
                 sites=tuple(site.name for site in world.sites), model=model, clearance_m=kept,
                 headings_rad=tuple(site.heading_rad for site in world.sites),
@@ -123,6 +142,6 @@ def _times_ms(world: World, model: RobotModel, paths: list[list[FloatArray | Non
             pose = np.array([origin.x_m, origin.y_m, origin.heading_rad])
             time_s, _ = drive(model, stretches(path, destination.heading_rad), pose)
             if not math.isfinite(time_s):
-                raise RuntimeError(f"the follower never arrives from {origin.name} at {destination.name}")
+                raise NeverArrives(model.name, origin.name, destination.name)
             times[i, j] = max(round(time_s * 1000), 1)  # the model needs a positive cost between different sites
     return times

@@ -98,7 +98,7 @@ def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) ->
         model = BUILT_IN[entry.model]
     else:
         try:
-            model = RobotModel(name=name, **entry.model.model_dump())
+            model = RobotModel(name=f"{name}-model", **entry.model.model_dump())
         except ValueError as error:
             raise document.error((*loc, "model"), str(error)) from None
     if isinstance(entry.incentives, Drawn):
