@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from sva_bench.analysis.report import write_report
-from sva_bench.analysis.summary import Judged, ScenarioResult, scenario_summary
+from sva_bench.analysis.summary import Judged, ScenarioResult, comparison_summary, scenario_summary
+from sva_bench.errors import ExitCode, SvaBenchError
 from sva_bench.execution.execute import Case, Executed, Fidelity, Settings, execute
 from sva_bench.mission.certify import certify
+from sva_bench.mission.failures import route_value
 from sva_bench.mission.instance import Instance, Vehicle, write_instance
-from sva_bench.mission.plan import Plan, write_plan
+from sva_bench.mission.plan import Plan, read_plan, write_plan
 from sva_bench.recording.rerun import record
 from sva_bench.runs import (
     manifest,
@@ -107,29 +109,111 @@ class Planned:
 
 def run(world: World, options: Options, out: Path, executor: Executor | None, progress: Progress) -> Run:
     """Plan, execute, record and measure a world's mission."""
-    started, clock = datetime.now(UTC).isoformat(timespec="seconds"), _Stopwatch()
-    resolved = world_as_dict(world)
+    clock = _Stopwatch()
     with clock.phase("travel"):
         costs = plan_costs(world, options.planner, progress)
     with clock.phase("planning"):
         planned = plan_scenarios(world, costs, options, progress)
     if any(plan.status == "interrupted" for p in planned.values() for plan in (p.stochastic, p.deterministic)):
         raise KeyboardInterrupt
-    settings = Settings(seed=options.seed, trials=options.trials, fidelity=options.fidelity,
-                        rollouts=1 if world.noise.silent else options.rollouts)
+    settings = _settings(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios for name, plan in (
         ("stochastic", planned[scenario.name].stochastic), ("deterministic", planned[scenario.name].deterministic))]
     with clock.phase("execution"):
         executed = execute(world, costs, cases, settings, executor,
                            lambda done, of: progress("driving routes", done, of))
-    summary = summarise(world, options, settings, costs, planned, executed)
-    name = run_name(world.name, options.seed, {"world": resolved, "options": options.as_dict()})
+    return _publish(world, options, costs, {name: p.instance for name, p in planned.items()}, executed,
+                    summarise(world, options, settings, costs, planned, executed), out, clock, progress)
+
+
+def execute_plans(
+    world: World, plans: Mapping[str, Plan], options: Options, out: Path, executor: Executor | None,
+    progress: Progress, costs: Mapping[str, FuelCosts],
+) -> Run:
+    """Execute plans from anywhere and compare them, pair by pair.
+
+    Args:
+        world: The world.
+        plans: The plans by the name they go by; feasible, or meant to be seen failing.
+        options: Seed, trials, rollouts, fidelity; what solvers are told is not used.
+        out, executor, progress: As for ``run``.
+        costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
+    """
+    clock = _Stopwatch()
+    settings = _settings(world, options)
+    cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
+             for name, plan in plans.items()]
+    with clock.phase("execution"):
+        executed = execute(world, costs, cases, settings, executor,
+                           lambda done, of: progress("driving routes", done, of))
+    runs, instances = _by_stem(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
+    robots, entries = [robot.name for robot in world.robots], []
+    for scenario in world.scenarios:
+        truth = replace(instances[scenario.name], failure=world.execute_failure)
+        judged = [Judged(expected=closed_form(truth, plan), executed=runs[f"{scenario.name}-{name}"])
+                  for name, plan in plans.items()]
+        entries.append(comparison_summary(judged, robots, noisy=not world.noise.silent))
+    summary = _head(world, options, settings, costs) | {"reproducible": True, "scenarios": entries}
+    return _publish(world, options, costs, instances, executed, summary, out, clock, progress,
+                    identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
+                                        for name, plan in plans.items()}})
+
+
+def read_plans(
+    world: World, costs: Mapping[str, FuelCosts], paths: Sequence[Path], *, allow_infeasible: bool,
+) -> dict[str, Plan]:
+    """Read plan files for a world, by their stems.
+
+    Raises:
+        BadFile: If a file is no plan, or names robots or sites that the world doesn't have.
+        InfeasiblePlan: If a plan cannot be driven; or breaks fuel or limit, and that isn't allowed.
+    """
+    instance = instance_of(world, costs, nominal_scenario(world))
+    unlimited = replace(instance, vehicles=tuple(
+        replace(v, fuel_capacity_s=np.inf, mission_limit_s=np.inf) for v in instance.vehicles))
+    plans = {}
+    for path in paths:
+        plan = read_plan(path, instance)
+        certificate = certify(unlimited if allow_infeasible else instance, replace(plan, value=None))
+        if not certificate.feasible:
+            raise InfeasiblePlan(path, certificate.reasons)
+        plans[path.stem] = plan
+    return plans
+
+
+class InfeasiblePlan(SvaBenchError):
+    """A plan that its certificate refuses."""
+
+    exit_code = ExitCode.INFEASIBLE_PLAN
+
+    def __init__(self, path: Path, reasons: Sequence[str]) -> None:
+        super().__init__(path, reasons)
+        self.path, self.reasons = path, reasons
+
+    def __str__(self) -> str:
+        return f"{self.path}: the plan is infeasible: {'; '.join(self.reasons)}"
+
+
+def _settings(world: World, options: Options) -> Settings:
+    return Settings(seed=options.seed, trials=options.trials, fidelity=options.fidelity,
+                    rollouts=1 if world.noise.silent else options.rollouts)
+
+
+def _publish(
+    world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
+    executed: list[Executed], summary: Mapping[str, Any], out: Path, clock: _Stopwatch, progress: Progress,
+    identity: Mapping[str, Any] | None = None,
+) -> Run:
+    """Write the run folder; ``identity`` is what results depend on beside world, options and seed."""
+    resolved = world_as_dict(world)
+    name = run_name(world.name, options.seed,
+                    {"world": resolved, "options": options.as_dict(), **(identity or {})})
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
         write_travel_times(folder / "travel_times.parquet", list(costs.values()))
-        for scenario, plans in planned.items():
-            write_instance(folder / f"instance-{scenario}.json", plans.instance)
+        for scenario, instance in instances.items():
+            write_instance(folder / f"instance-{scenario}.json", instance)
         with clock.phase("recording"):
             for number, done in enumerate(executed):
                 stem = f"{done.case.scenario.name}-{done.case.planner}"
@@ -141,7 +225,7 @@ def run(world: World, options: Options, out: Path, executor: Executor | None, pr
         write_json(folder / "summary.json", summary)
         write_report(folder / "report.html", summary, {k: v.case.plan for k, v in _by_stem(executed).items()}, world)
         write_json(folder / "manifest.json", manifest(
-            resolved, options.seed, options.as_dict(), started, clock.seconds))
+            resolved, options.seed, options.as_dict(), clock.started, clock.seconds))
     return Run(folder=out / name, summary=summary)
 
 
@@ -209,6 +293,16 @@ def expected_value(instance: Instance, plan: Plan) -> float:
     return certificate.expected
 
 
+def closed_form(instance: Instance, plan: Plan) -> float:
+    """Closed-form value of a plan, feasible or not: as if fuel and limits allowed it."""
+    value = 0.0
+    for vehicle in instance.vehicles:
+        sites = [instance.sites.index(name) for name in plan.route(vehicle.name)]
+        earned = [float(vehicle.incentives[site]) for site in sites if site in instance.pois]
+        value += route_value(earned, vehicle.availability, instance.failure)
+    return value
+
+
 def summarise(
     world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts],
     planned: Mapping[str, Planned], executed: list[Executed],
@@ -229,17 +323,20 @@ def summarise(
             # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
             vss_mean_value=0.0 if mission else None, evpi=plans.evpi if mission else None,
         ), robots, noisy=not world.noise.silent))
+    proved = all(plan.status == "optimal" for p in planned.values() for plan in (p.stochastic, p.deterministic))
+    return _head(world, options, settings, costs) | {"reproducible": proved, "scenarios": scenarios}
+
+
+def _head(world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
+    """What every summary says first."""
     pairs = sum(cost.pairs for cost in costs.values())
     changed = sum(cost.changed_pct * cost.pairs for cost in costs.values())
     return {
         "format": "sva-bench/summary@1", "world": world.name, "seed": options.seed, "trials": settings.trials,
         "rollouts": settings.rollouts, "fidelity": settings.fidelity,
         "failure": {"plan": "mission", "execute": world.execute_failure},
-        "reproducible": all(plan.status == "optimal" for p in planned.values()
-                            for plan in (p.stochastic, p.deterministic)),
         "travel": {"pairs": pairs, "triangle_violations_pct": round(changed / pairs, 6) if pairs else 0.0,
                    "max_excess_pct": round(max((c.max_excess_pct for c in costs.values()), default=0.0), 6)},
-        "scenarios": scenarios,
     }
 
 
@@ -251,6 +348,7 @@ class _Stopwatch:
     """Wall-clock time of each phase, for the manifest alone."""
 
     def __init__(self) -> None:
+        self.started = datetime.now(UTC).isoformat(timespec="seconds")
         self.seconds: dict[str, float] = {}
 
     @contextmanager

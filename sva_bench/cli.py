@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.logging import RichHandler
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 from typer.exceptions import TyperException
 
 from sva_bench import __version__
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError, nearest
+from sva_bench.terminal import (
+    messages,
+    print_json,
+    print_summary,
+    progress_bars,
+    results,
+    set_up_logging,
+    write_result,
+)
+
+if TYPE_CHECKING:
+    from sva_bench.world.model import World
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
@@ -32,7 +38,6 @@ app = typer.Typer(
            "4 some trials unfinished, 130 interrupted.")
 
 log = logging.getLogger(__name__)
-messages = Console(stderr=True)
 _NO_PER_LEG = "there is no exact solver for per_leg failures yet: plans are made under mission"
 
 
@@ -41,6 +46,7 @@ class FidelityChoice(StrEnum):
 
     kinematic = "kinematic"
     rollout = "rollout"
+    physics = "physics"
 
 
 class PlannerChoice(StrEnum):
@@ -80,29 +86,39 @@ MarginOption = Annotated[float | None, typer.Option(
     min=0, max=1, help="Planning costs are twin times x (1 + margin); default: the world's.", show_default=False)]
 TimeLimit = Annotated[float | None, typer.Option(
     metavar="S", min=0, help="Stop each solve after so many seconds and take its best plan.", show_default="none")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")]
+Trials = Annotated[int, typer.Option(min=1, help="Trials of each plan in each scenario.")]
+Rollouts = Annotated[int, typer.Option(min=1, help="Noise draws; trial t has number t mod ROLLOUTS.")]
+FidelityOption = Annotated[FidelityChoice, typer.Option(
+    help="The kinematic twin alone; physics once per route and noise draw; or every trial in physics.")]
+ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",
+                                                         show_default="all")]
+ExecuteFailure = Annotated[ProcessChoice | None, typer.Option(help="Failure process that is executed.",
+                                                              show_default="the world's")]
+Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
+WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]
 Gap = Annotated[float, typer.Option(min=0, help="Relative gap at which a plan counts as optimal.")]
 
 
 @app.command()
 def run(
     world: WorldArgument,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")] = 0,
-    trials: Annotated[int, typer.Option(min=1, help="Trials of each plan in each scenario.")] = 1000,
-    rollouts: Annotated[int, typer.Option(min=1, help="Noise draws; trial t has number t mod ROLLOUTS.")] = 8,
-    fidelity: Annotated[FidelityChoice, typer.Option(help="Physics once per route and noise draw, or the kinematic "
-                                                          "twin alone.")] = FidelityChoice.rollout,
+    seed: Seed = 0,
+    trials: Trials = 1000,
+    rollouts: Rollouts = 8,
+    fidelity: FidelityOption = FidelityChoice.rollout,
     planner: PlannerOption = PlannerChoice.prmstar,
-    scenario: Annotated[list[str] | None, typer.Option(help="Only this scenario; may be repeated.")] = None,
+    scenario: ScenarioNames = None,
     margin: MarginOption = None,
-    plan_failure: Annotated[ProcessChoice | None, typer.Option(help="Failure process that plans are made for.")] = None,
-    execute_failure: Annotated[ProcessChoice | None, typer.Option(help="Failure process that is executed.")] = None,
+    plan_failure: Annotated[ProcessChoice | None, typer.Option(help="Failure process that plans are made for.",
+                                                               show_default="the world's")] = None,
+    execute_failure: ExecuteFailure = None,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
                                                       "takes.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder that receives the run folder.")] = Path("runs"),
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes that drive; default: all cores.",
-                                                show_default=False)] = None,
+    out: Out = Path("runs"),
+    workers: WorkerCount = None,
     as_json: AsJson = False,
     verbose: Verbose = False,
 ) -> None:
@@ -110,34 +126,20 @@ def run(
 
     Writes a run folder with travel times, instances, plans, outcomes, recordings and a summary.
     """
-    from sva_bench.world.load import load_world
-
-    _set_up_logging(verbose)
-    loaded = load_world(world)  # before the heavy imports: an error in the file is said at once
+    set_up_logging(verbose)
+    loaded = _loaded(world, scenario, margin, plan_failure, execute_failure)
+    # After the world is read: an error in the file is said at once.
     from sva_bench.bench import Options
     from sva_bench.bench import run as run_bench
     from sva_bench.solver.two_stage import SolveLimits
 
-    if scenario:
-        loaded = replace(loaded, scenarios=tuple(loaded.scenario(name) for name in _known_scenarios(
-            scenario, [s.name for s in loaded.scenarios])))
-    if margin is not None:
-        loaded = replace(loaded, margin=margin)
-    if plan_failure is not None:
-        loaded = replace(loaded, plan_failure=plan_failure.value)
-    if execute_failure is not None:
-        loaded = replace(loaded, execute_failure=execute_failure.value)
     if loaded.plan_failure == "per_leg":
         log.warning(_NO_PER_LEG)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi)
-    with _progress() as progress, _workers(workers) as executor:
+    with progress_bars() as progress, _workers(workers) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    if as_json:
-        print_json(result.summary)
-    else:
-        _print_summary(result.summary)
-        messages.print(f"written to [bold]{escape(str(result.folder))}[/bold]", highlight=False)
+    _show(result.summary, result.folder, as_json)
 
 
 @app.command()
@@ -154,10 +156,10 @@ def times(
     """Plan travel times and repair them into fuel costs: an instance for any solver."""
     from sva_bench.mission.instance import instance_text
 
-    _set_up_logging(verbose)
-    with _progress() as progress:
+    set_up_logging(verbose)
+    with progress_bars() as progress:
         instance = _instance_of_world(world, scenario, planner.value, margin, progress)
-    _write(output, instance_text(instance))
+    write_result(output, instance_text(instance))
 
 
 @app.command()
@@ -181,9 +183,9 @@ def plan(
     from sva_bench.mission.plan import plan_as_dict
     from sva_bench.solver.two_stage import SolveLimits, plan_deterministic, plan_stochastic
 
-    _set_up_logging(verbose)
+    set_up_logging(verbose)
     assert method in MethodChoice  # one method so far: auto means expected
-    with _progress() as progress:
+    with progress_bars() as progress:
         if source.suffix.lower() in (".yaml", ".yml"):
             instance = _instance_of_world(source, scenario, "prmstar", None, progress)
             if instance.failure == "per_leg":
@@ -201,7 +203,7 @@ def plan(
             stochastic = plan_stochastic(replace(instance, failure="mission"), limits)
             made = plan_deterministic(instance, stochastic, limits).plan
         progress("solving", 1, 1)
-    _write(output, pretty_json(plan_as_dict(made)))
+    write_result(output, pretty_json(plan_as_dict(made)))
     gap_left = 0.0 if made.value is None or made.bound is None else made.bound - made.value
     messages.print(f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, gap {gap_left:.3g}, "
                    f"{made.runtime_s:.2f} s", highlight=False)
@@ -228,13 +230,54 @@ def certify(
     if as_json:
         print_json(certificate.as_dict())
     else:
-        console = Console(width=_width())
+        console = results()
         verdict = f"feasible, expected incentive {certificate.expected:.6g}" if certificate.feasible else "infeasible"
         console.print(verdict, highlight=False)
         for reason in certificate.reasons:
             console.print(f"  {reason}", highlight=False, markup=False)
     if not certificate.feasible:
         raise typer.Exit(ExitCode.INFEASIBLE_PLAN)
+
+
+@app.command()
+def execute(
+    world: WorldArgument,
+    plans: Annotated[list[Path], typer.Argument(metavar="PLAN...", help="Plan files (JSON), by hand or from anywhere.",
+                                                show_default=False)],
+    allow_infeasible: Annotated[bool, typer.Option("--allow-infeasible", help="Drive plans that break fuel or limit "
+                                                   "too: seeing them fail is the point.")] = False,
+    seed: Seed = 0,
+    trials: Trials = 1000,
+    rollouts: Rollouts = 8,
+    fidelity: FidelityOption = FidelityChoice.rollout,
+    planner: PlannerOption = PlannerChoice.prmstar,
+    scenario: ScenarioNames = None,
+    margin: MarginOption = None,
+    execute_failure: ExecuteFailure = None,
+    out: Out = Path("runs"),
+    workers: WorkerCount = None,
+    as_json: AsJson = False,
+    verbose: Verbose = False,
+) -> None:
+    """Execute plans from anywhere in a world and compare them, pair by pair.
+
+    Exits with 3 if a plan is infeasible, unless it is allowed.
+    """
+    set_up_logging(verbose)
+    loaded = _loaded(world, scenario, margin, None, execute_failure)
+    from sva_bench.bench import Options, execute_plans, plan_costs, read_plans
+
+    names = [path.stem for path in plans]
+    for path in plans:
+        if names.count(path.stem) > 1:
+            raise BadInput(f"{path}: there is another plan named {path.stem!r}; file names must differ")
+    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value)
+    with progress_bars() as progress:
+        costs = plan_costs(loaded, planner.value, progress)
+        read = read_plans(loaded, costs, plans, allow_infeasible=allow_infeasible)
+        with _workers(workers) as executor:
+            result = execute_plans(loaded, read, options, out, executor, progress, costs)
+    _show(result.summary, result.folder, as_json)
 
 
 @app.command()
@@ -269,8 +312,7 @@ def run_command_line(arguments: Sequence[str]) -> int:
         messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return int(error.exit_code)
     except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
-        show: Callable[[], None] = getattr(error, "show", lambda: messages.print(str(error), highlight=False))
-        show()
+        getattr(error, "show", error.format_message)()
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
         messages.print("interrupted")
@@ -287,9 +329,29 @@ def run_command_line(arguments: Sequence[str]) -> int:
     return int(result) if isinstance(result, int) else int(ExitCode.DONE)
 
 
-def print_json(data: Any) -> None:
-    """Print a result as JSON on standard output."""
-    sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
+def _loaded(
+    path: Path, scenarios: Sequence[str] | None, margin: float | None, plan_failure: ProcessChoice | None,
+    execute_failure: ProcessChoice | None,
+) -> World:
+    """The world, as the command line changes it."""
+    from sva_bench.world.load import load_world
+
+    world = load_world(path)
+    if scenarios:
+        world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
+            scenarios, [s.name for s in world.scenarios])))
+    return replace(
+        world, margin=world.margin if margin is None else margin,
+        plan_failure=world.plan_failure if plan_failure is None else plan_failure.value,
+        execute_failure=world.execute_failure if execute_failure is None else execute_failure.value)
+
+
+def _show(summary: Any, folder: Path, as_json: bool) -> None:
+    if as_json:
+        print_json(summary)
+    else:
+        print_summary(summary)
+        messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
 
 
 def _instance_of_world(path: Path, scenario: str | None, planner: Any, margin: float | None,
@@ -317,51 +379,6 @@ def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _write(path: Path | None, text: str) -> None:
-    """Write a result to a file, whole or not at all, or to standard output."""
-    if path is None:
-        sys.stdout.write(text)
-        return
-    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
-    except OSError as error:
-        draft.unlink(missing_ok=True)
-        raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another place with -o") from None
-
-
-def _set_up_logging(verbose: bool) -> None:
-    logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,
-                        handlers=[RichHandler(console=messages, show_time=False, show_path=False)])
-    logging.getLogger("sva_bench").setLevel(logging.DEBUG if verbose else logging.WARNING)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress bars on standard error; plain lines where that is no terminal."""
-    if not messages.is_terminal:
-        said: set[str] = set()
-
-        def say(what: str, done: int, of: int) -> None:
-            if what not in said and done < of:
-                said.add(what)
-                messages.print(f"{what} ...", highlight=False)
-
-        yield say
-        return
-    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-                  console=messages, transient=True) as bars:
-        tasks: dict[str, Any] = {}
-
-        def show(what: str, done: int, of: int) -> None:
-            if what not in tasks:
-                tasks[what] = bars.add_task(what, total=of)
-            bars.update(tasks[what], completed=done, total=of)
-
-        yield show
-
-
 @contextmanager
 def _workers(count: int | None) -> Iterator[Any]:
     """Processes that drive routes; ``None`` where one is enough."""
@@ -369,38 +386,3 @@ def _workers(count: int | None) -> Iterator[Any]:
 
     with local_workers(count or len(os.sched_getaffinity(0))) as executor:
         yield executor
-
-
-def _width() -> int | None:
-    """Tables keep their shape in a pipe."""
-    return None if sys.stdout.isatty() else 140
-
-
-def _print_summary(summary: Any) -> None:
-    from sva_bench.analysis.report import answer, with_interval
-
-    console = Console(width=_width())
-    travel = summary["travel"]
-    table = Table(title=f"{summary['world']}, seed {summary['seed']}: {summary['trials']} trials, "
-                        f"{summary['rollouts']} rollouts, {summary['fidelity']}", title_justify="left")
-    for heading in ("scenario", "plan", "promised", "expected", "executed [95 %]", *summary["scenarios"][0][
-            "availability"], "VSS executed [95 %]", "VSS modelled", "EVPI"):
-        table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
-    for scenario in summary["scenarios"]:
-        vss = scenario["vss"]
-        for name, plan in scenario["plans"].items():
-            first = name == "stochastic"
-            proof = "" if plan["status"] == "optimal" else f" ({plan['status']})"
-            worth = with_interval(vss["executed"]) if vss["distinguishable"] else "not distinguishable from zero"
-            table.add_row(
-                scenario["name"] if first else "", name + proof, f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
-                with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()),
-                worth if first else "", f"{vss['modelled']:.1f}" if first else "",
-                f"{scenario['evpi']:.1f}" if first and scenario["evpi"] is not None else "", end_section=not first)
-    console.print(table)
-    console.print(f"{travel['pairs']} travel times, {travel['triangle_violations_pct']:.1f} % repaired, by up to "
-                  f"{travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed under "
-                  f"{summary['failure']['execute']} failures.", highlight=False)
-    console.print(answer(summary), highlight=False)
-    if not summary["reproducible"]:
-        console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import Field
 
 from sva_bench.documents import (
     MAX_YAML_BYTES,
@@ -33,7 +34,7 @@ class Whole(Section):
     format: Literal["test/whole@1"]
     name: Name
     part: Part | None = None
-    parts: dict[Name, Part] = {}
+    parts: dict[Name, Part] = Field(default_factory=dict)
 
 
 def yaml(folder: Path, text: str) -> Path:

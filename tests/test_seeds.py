@@ -26,8 +26,8 @@ def test_more_numbers_leave_the_earlier_ones_as_they_are(root: int, few: int, mo
 
 
 def test_streams_differ_by_root_purpose_and_item() -> None:
-    keys = [(0, Stream.FAILURE, (0, 1)), (0, Stream.FAILURE, (1, 0)), (0, Stream.FAILURE, (0,)), (0, Stream.FAILURE, ()),
-            (0, Stream.NOISE, (0, 1)), (1, Stream.FAILURE, (0, 1))]
+    keys = [(0, Stream.FAILURE, (0, 1)), (0, Stream.FAILURE, (1, 0)), (0, Stream.FAILURE, (0,)),
+            (0, Stream.FAILURE, ()), (0, Stream.NOISE, (0, 1)), (1, Stream.FAILURE, (0, 1))]
     first = {float(uniforms(root, stream, *index, count=1)[0]) for root, stream, index in keys}
     assert len(first) == len(keys)
 

@@ -12,7 +12,7 @@ from sva_bench.mission.plan import Plan
 from sva_bench.world.model import World
 
 _STYLE = """
-body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#1b1b1b}
+body{font:16px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#1b1b1b}
 h1{font-size:1.6rem}h2{font-size:1.2rem;margin-top:2rem}
 .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
 th,td{padding:.3rem .7rem;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}
@@ -39,9 +39,7 @@ def write_report(path: Path, summary: Mapping[str, Any], plans: Mapping[str, Pla
         f"fidelity <code>{summary['fidelity']}</code>, seed {summary['seed']}; planned under "
         f"<code>{summary['failure']['plan']}</code>, executed under <code>{summary['failure']['execute']}</code> "
         "failures. Incentive in the units of the world file; 95 % intervals in brackets.</p>",
-        "<h2>Value of the stochastic solution</h2>",
-        _table(["scenario", "stochastic, executed", "deterministic, executed", "VSS, executed", "VSS, modelled",
-                "EVPI"], [_vss_row(s) for s in scenarios]),
+        *_comparison(scenarios),
         "<h2>Incentive by robot</h2>",
         _table(["scenario", "plan", *world_robots(world)],
                [[s["name"], name, *(f"{plan['by_robot'][r]:.1f}" for r in world_robots(world))]
@@ -71,8 +69,34 @@ def write_report(path: Path, summary: Mapping[str, Any], plans: Mapping[str, Pla
         f"<body>\n{body}\n</body></html>\n", encoding="utf-8")
 
 
+def _comparison(scenarios: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The tables that say which plan is worth more."""
+    if all("vss" in scenario for scenario in scenarios):
+        head = ["scenario", "stochastic, executed", "deterministic, executed", "VSS, executed", "VSS, modelled", "EVPI"]
+        return ["<h2>Value of the stochastic solution</h2>", _table(head, [_vss_row(s) for s in scenarios])]
+    rows = [[s["name"], name, f"{plan['expected']:.1f}", with_interval(plan["executed"])]
+            for s in scenarios for name, plan in s["plans"].items()]
+    parts = ["<h2>What the plans are worth</h2>", _table(["scenario", "plan", "expected", "executed"], rows)]
+    pairs = [[s["name"], f"{c['a']} − {c['b']}", verdict(c)] for s in scenarios for c in s["comparisons"]]
+    if pairs:
+        parts += ["<h2>Differences, trial by trial</h2>", _table(["scenario", "plans", "difference"], pairs)]
+    return parts
+
+
+def verdict(difference: Mapping[str, Any]) -> str:
+    """A difference with its interval, or that there is none to speak of."""
+    return with_interval(difference) if difference["distinguishable"] else "not distinguishable from zero"
+
+
 def answer(summary: Mapping[str, Any]) -> str:
-    """In one sentence: where planning for failures pays, and by how much."""
+    """In one sentence: which plan is worth more, and by how much."""
+    if not all("vss" in scenario for scenario in summary["scenarios"]):
+        if len(summary["scenarios"][0]["plans"]) == 1:
+            return "One plan: there is nothing to compare it with."
+        clear = [f"{c['a']} against {c['b']} in {s['name']} ({c['mean']:+.1f})" for s in summary["scenarios"]
+                 for c in s["comparisons"] if c["distinguishable"]]
+        return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
+            "No difference between plans stands out of the noise."
     pays = [s for s in summary["scenarios"] if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] > 0]
     if not pays:
         return "In no scenario can the executed incentives of the two plans be told apart."
@@ -89,11 +113,8 @@ def world_robots(world: World) -> list[str]:
 def _vss_row(scenario: Mapping[str, Any]) -> list[str]:
     vss = scenario["vss"]
     shown = [with_interval(scenario["plans"][name]["executed"]) for name in ("stochastic", "deterministic")]
-    verdict = with_interval(vss["executed"])
-    if not vss["distinguishable"]:
-        verdict += ", not distinguishable from zero"
-    modelled = f"{vss['modelled']:.1f}"
-    return [scenario["name"], *shown, verdict, modelled, "" if scenario["evpi"] is None else f"{scenario['evpi']:.1f}"]
+    return [scenario["name"], *shown, verdict(vss["executed"] | {"distinguishable": vss["distinguishable"]}),
+            f"{vss['modelled']:.1f}", "" if scenario["evpi"] is None else f"{scenario['evpi']:.1f}"]
 
 
 def with_interval(estimate: Mapping[str, Any]) -> str:

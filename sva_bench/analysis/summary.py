@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -68,13 +69,29 @@ def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bo
     }
 
 
+def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
+    """One entry of ``scenarios`` where plans from anywhere were executed: every pair compared, trial by trial."""
+    scenario = plans[0].executed.case.scenario
+    comparisons = []
+    for a, b in combinations(plans, 2):
+        difference = estimate(_totals(a.executed) - _totals(b.executed), a.executed.rollout, noisy=noisy)
+        comparisons.append({"a": a.executed.case.planner, "b": b.executed.case.planner, **difference.as_dict(),
+                            "distinguishable": difference.distinguishable})
+    return {
+        "name": scenario.name,
+        "availability": {name: scenario.availability[name] for name in robots},
+        "plans": {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy) for judged in plans},
+        "comparisons": comparisons,
+    }
+
+
 def plan_summary(judged: Judged, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
     """What one plan promised and what came of it."""
     run, plan = judged.executed, judged.executed.case.plan
     executed: Estimate = estimate(_totals(run), run.rollout, noisy=noisy)
     counts = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
     return {
-        "promised": plan.value,
+        "promised": judged.expected if plan.value is None else plan.value,
         "bound": plan.bound,
         "status": plan.status,
         "expected": judged.expected + 0.0,

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
@@ -22,7 +23,7 @@ from sva_bench.seeds import Stream, rng_for
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, World
 
-Fidelity = Literal["kinematic", "rollout"]
+Fidelity = Literal["kinematic", "rollout", "physics"]
 FIDELITIES: tuple[Fidelity, ...] = get_args(Fidelity)
 TRACE_HZ = 20.0
 
@@ -48,7 +49,7 @@ class Settings:
         seed: Root of failures and noise.
         trials: Number of trials.
         rollouts: Number of noise draws; trial t has that of rollout t mod ``rollouts``. 1 without noise.
-        fidelity: ``kinematic`` (the twin) or ``rollout`` (physics).
+        fidelity: ``kinematic`` (the twin), ``rollout`` (physics, once per noise draw) or ``physics`` (every trial).
     """
 
     seed: int
@@ -169,8 +170,8 @@ def wheel_gains(seed: int, rollout: int, robot: int, noise: Noise) -> tuple[floa
     return float(left), float(right)
 
 
-Key = tuple[str, Route, int]
-"""Robot, route and rollout: what a drive depends on, the world and the seed given."""
+Key = tuple[str, Route, int, int]
+"""Robot, legs driven, rollout, and the trial under ``physics``, else 0: what a drive depends on in one execution."""
 
 
 def execute(
@@ -217,17 +218,33 @@ def _tasks(
     base = world.sites[0]
     for own, failed in zip(orders, fails, strict=True):
         for number, (robot, order) in enumerate(zip(world.robots, own, strict=True)):
-            if not order.route:
-                continue
             legs = _legs(costs[robot.model.name], order.route)
-            for rollout in range(min(settings.rollouts, settings.trials)):
-                key = (robot.name, order.route, rollout)
-                if key not in tasks and (failed[rollout :: settings.rollouts, number] > 0).any():
-                    tasks[key] = DriveTask(
-                        obstacles=world.obstacles, model=robot.model, start=(base.x_m, base.y_m, base.heading_rad),
-                        legs=legs, wheel_gains=wheel_gains(settings.seed, rollout, number, world.noise),
-                        fidelity=settings.fidelity, traced=rollout == 0)
+            for trial, fails_before in enumerate(failed[:, number].tolist()):
+                key = _key(settings, order, trial, fails_before)
+                if key is None or key in tasks:
+                    continue
+                tasks[key] = DriveTask(
+                    obstacles=world.obstacles, model=robot.model, start=(base.x_m, base.y_m, base.heading_rad),
+                    legs=legs[: len(key[1]) - 1],
+                    wheel_gains=wheel_gains(settings.seed, key[2], number, world.noise),
+                    fidelity=settings.fidelity, traced=trial == 0 or (key[2] == 0 and settings.fidelity != "physics"))
     return tasks
+
+
+def _key(settings: Settings, order: Assignment, trial: int, fails_before: int) -> Key | None:
+    """The drive behind a robot's trial; ``None`` if it never leaves.
+
+    Up to ``rollout`` a route is driven whole and failures cut it off afterwards. Under ``physics`` each trial is
+    simulated by itself, up to where the robot fails.
+    """
+    if not order.route or fails_before == 0:
+        return None
+    rollout = trial % settings.rollouts
+    if settings.fidelity != "physics":
+        return order.robot, order.route, rollout, 0
+    pois = [k for k, site in enumerate(order.route) if order.is_poi(site)]
+    driven = order.route if fails_before > len(pois) else order.route[: pois[fails_before - 1]]
+    return order.robot, driven, rollout, trial
 
 
 def _legs(costs: FuelCosts, route: Route) -> tuple[Leg, ...]:
@@ -271,53 +288,56 @@ def _settle_all(
     incentive, end_time, fuel = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     pois, stops, end = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
     traces = []
+    mine: dict[Key, Driven] = {}
     for number, order in enumerate(orders):
-        settled: dict[tuple[int, int], Outcome] = {}
+        settled: dict[tuple[Key | None, int], Outcome] = {}
         for trial in range(settings.trials):
-            k, failed = int(rollout[trial]), int(fails[trial, number])
-            if (k, failed) not in settled:
-                settled[k, failed] = settle(order, _drive_of(drives, order, k), failed)
-            outcome = settled[k, failed]
+            failed = int(fails[trial, number])
+            which = (_key(settings, order, trial, failed), failed)
+            if which not in settled:
+                driven = _drive_of(drives, which[0])
+                settled[which] = settle(order, driven, failed)
+                if which[0] is not None:
+                    mine[which[0]] = driven
+            outcome = settled[which]
             incentive[trial, number], end_time[trial, number] = outcome.incentive, outcome.end_time_s
             fuel[trial, number], end[trial, number] = outcome.fuel_used_s, ENDS.index(outcome.end)
             pois[trial, number], stops[trial, number] = outcome.pois_reached, outcome.stops_reached
-        traces.append(_trace(world, costs[world.robots[number].model.name], order, drives,
-                             settled[0, int(fails[0, number])]))
+        failed = int(fails[0, number])
+        key = _key(settings, order, 0, failed)
+        traces.append(_trace(world, costs[world.robots[number].model.name], order, _drive_of(drives, key),
+                             settled[key, failed]))
     return Executed(
         case=case, rollout=rollout, available=fails == np.iinfo(np.int64).max, incentive=incentive, pois_reached=pois,
         stops_reached=stops, end=end, end_time_s=end_time, fuel_used_s=fuel,
         planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
-        legs=tuple(_leg_times(world, costs, orders, settings, drives)), traces=tuple(traces))
+        legs=tuple(_leg_times(world, costs, mine)), traces=tuple(traces))
 
 
 _NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
 
 
-def _drive_of(drives: Mapping[Key, Driven], order: Assignment, rollout: int) -> Driven:
-    """The drive of a robot in a rollout; nothing where it never leaves."""
-    return drives.get((order.robot, order.route, rollout), _NOTHING)
+def _drive_of(drives: Mapping[Key, Driven], key: Key | None) -> Driven:
+    """The drive of a robot; nothing where it never leaves."""
+    return _NOTHING if key is None else drives[key]
 
 
-def _trace(world: World, costs: FuelCosts, order: Assignment, drives: Mapping[Key, Driven], outcome: Outcome) -> Trace:
+def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, outcome: Outcome) -> Trace:
     base = world.sites[0]
-    planned = [costs.times.path(a, b) for origin, destination in zip(order.route, order.route[1:], strict=False)
-               for chain in [costs.chain(origin, destination)] for a, b in itertools.pairwise(chain)]
-    return trace_of(order, _drive_of(drives, order, 0), outcome, (base.x_m, base.y_m, base.heading_rad),
+    planned = [costs.times.path(a, b) for leg in pairwise(order.route) for a, b in pairwise(costs.chain(*leg))]
+    return trace_of(order, driven, outcome, (base.x_m, base.y_m, base.heading_rad),
                     np.concatenate(planned) if planned else np.empty((0, 2)))
 
 
-def _leg_times(
-    world: World, costs: Mapping[str, FuelCosts], orders: Sequence[Assignment], settings: Settings,
-    drives: Mapping[Key, Driven],
-) -> list[LegTime]:
+def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[Key, Driven]) -> list[LegTime]:
+    """Every leg of the drives given; of trials that share a drive, once."""
+    models = {robot.name: robot.model.name for robot in world.robots}
     rows = []
-    for robot, order in zip(world.robots, orders, strict=True):
-        fuel = costs[robot.model.name]
-        sites = fuel.times.sites
-        for rollout in range(settings.rollouts):
-            for leg, driven_s in enumerate(_drive_of(drives, order, rollout).leg_s.tolist()):
-                origin, destination = order.route[leg], order.route[leg + 1]
-                planned_s = fuel.repaired_ms[sites.index(origin), sites.index(destination)] / 1000.0
-                rows.append(LegTime(rollout=rollout, robot=order.robot, leg=leg, origin=origin, destination=destination,
-                                    planned_s=float(planned_s), driven_s=driven_s))
+    for (robot, route, rollout, _), driven in drives.items():
+        fuel = costs[models[robot]]
+        for leg, (driven_s, (origin, destination)) in enumerate(
+                zip(driven.leg_s.tolist(), pairwise(route), strict=False)):  # a stuck robot drives fewer
+            planned_ms = fuel.repaired_ms[fuel.times.sites.index(origin), fuel.times.sites.index(destination)]
+            rows.append(LegTime(rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
+                                planned_s=int(planned_ms) / 1000, driven_s=driven_s))
     return rows

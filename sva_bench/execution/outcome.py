@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
@@ -116,7 +117,7 @@ def settle(orders: Assignment, driven: Driven, fails_before: int = NEVER) -> Out
 
     Args:
         orders: Route and rules.
-        driven: Driving time of its legs.
+        driven: Driving time of its legs, at least of those before a failure.
         fails_before: 0: fails before leaving the base; k: on leaving its last stop for the k-th POI; ``NEVER``.
     """
     available = fails_before == NEVER
@@ -138,15 +139,16 @@ def settle(orders: Assignment, driven: Driven, fails_before: int = NEVER) -> Out
         return Outcome(available=available, incentive=incentive, pois_reached=pois, stops_reached=stops, end=end,
                        end_time_s=clock, fuel_used_s=fuel, events=tuple(events))
 
-    for leg, time_s in enumerate(driven.leg_s.tolist()):
-        origin, site = orders.route[leg], orders.route[leg + 1]
+    times = driven.leg_s.tolist()
+    for leg, (origin, site) in enumerate(pairwise(orders.route)):
         if orders.is_poi(site) and pois + 1 == fails_before:
             return ended("failed", origin)
+        time_s = times[leg]
         drives = min(time_s, max(tank, 0.0)) if time_s > tank + TOLERANCE_S else time_s
         clock, fuel, tank = clock + drives, fuel + drives, tank - drives
         if drives < time_s:
             return ended("out_of_fuel", site)
-        if driven.stuck and leg == len(driven.leg_s) - 1:
+        if driven.stuck and leg == len(times) - 1:
             return ended("stuck", site)
         stops += 1
         events.append(Event(time_s=clock, kind="arrived", site=site))

@@ -246,5 +246,6 @@ def test_progress_counts_every_drive(small: Planned) -> None:
     told: list[tuple[int, int]] = []
     case = Case(scenario=small.world.scenarios[1], planner="s", plan=APART)
     execute(small.world, small.costs, [case, replace(case, planner="again")],
-            Settings(seed=0, trials=9, rollouts=3, fidelity="kinematic"), None, lambda done, of: told.append((done, of)))
+            Settings(seed=0, trials=9, rollouts=3, fidelity="kinematic"), None,
+            lambda done, of: told.append((done, of)))
     assert told == [(k, 6) for k in range(1, 7)]  # two robots, three rollouts; the second case shares all drives

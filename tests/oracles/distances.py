@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -65,14 +66,14 @@ def segment_clearance(obstacles: Obstacles, a: FloatArray, b: FloatArray) -> flo
 
 def path_clearance(obstacles: Obstacles, path: FloatArray) -> float:
     """Distance from a polyline to whatever stands nearest."""
-    return min(segment_clearance(obstacles, a, b) for a, b in zip(path[:-1], path[1:], strict=True))
+    return min(segment_clearance(obstacles, a, b) for a, b in pairwise(path))
 
 
 def points_clearance(obstacles: Obstacles, points: FloatArray) -> FloatArray:
     """Distance from each point to whatever stands nearest, shape (n,)."""
     x, y = points.T
     x0, y0, x1, y1 = obstacles.bounds_m
-    nearest = np.min([x - x0, y - y0, x1 - x, y1 - y], axis=0)
+    nearest: FloatArray = np.min([x - x0, y - y0, x1 - x, y1 - y], axis=0)
     for box in obstacles.boxes:
         corners = corners_of(box)
         edges = np.roll(corners, -1, axis=0) - corners

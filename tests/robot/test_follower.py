@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -26,7 +28,7 @@ def by_model(model: RobotModel) -> str:
     return model.name
 
 
-def course_time(model: RobotModel, path: list[list[float]], heading: float, start: float,
+def course_time(model: RobotModel, path: Sequence[Sequence[float]], heading: float, start: float,
                 gains: tuple[float, float] = (1.0, 1.0)) -> tuple[float, FloatArray]:
     """Time of a path from a heading to a heading, and the pose at its end."""
     pose = np.array([*path[0], start])
@@ -82,7 +84,7 @@ def test_doubled_vertices_and_a_path_of_no_length_do_no_harm() -> None:
 def test_stretches_join_into_the_path(points: list[tuple[float, float]], heading: float) -> None:
     path = np.array(points)
     parts = stretches(path, heading)
-    for part, following in zip(parts[:-1], parts[1:], strict=True):
+    for part, following in pairwise(parts):
         assert_array_equal(part.path[-1], following.path[0])
         move = following.path[1] - following.path[0]
         assert part.heading_rad == pytest.approx(math.atan2(move[1], move[0]))
@@ -167,7 +169,7 @@ def test_it_stops_at_the_end_in_the_heading_asked_for(start: float, heading: flo
 
 
 def test_the_twin_is_deterministic() -> None:
-    path = [[0.0, 0], [1, 0.3], [2, 0], [2, 2]]
+    path = [(0.0, 0.0), (1.0, 0.3), (2.0, 0.0), (2.0, 2.0)]
     (first, pose), (second, again) = (course_time(TURTLEBOT, path, 1.0, 0.5) for _ in range(2))
     assert first == second
     assert_array_equal(pose, again)
@@ -185,7 +187,7 @@ def test_a_trace_shows_the_drive_and_costs_it_nothing() -> None:
 
 
 def test_slow_wheels_take_longer_and_unequal_ones_still_arrive() -> None:
-    path = [[0.0, 0], [4, 0]]
+    path = [(0.0, 0.0), (4.0, 0.0)]
     ideal, _ = course_time(TURTLEBOT, path, 0.0, 0.0)
     slow, _ = course_time(TURTLEBOT, path, 0.0, 0.0, (0.9, 0.9))
     slower, _ = course_time(TURTLEBOT, path, 0.0, 0.0, (0.8, 0.8))
@@ -214,7 +216,7 @@ def test_on_planned_paths_it_strays_less_than_the_narrowest_margin_in_use() -> N
             pose = np.array([*path[0], 0.3])
             _, trace = drive(TURTLEBOT, stretches(path, 0.0), pose, traced=True)
             gaps = np.min([points_to_segment(trace[:, :2], a, b)
-                           for a, b in zip(path[:-1], path[1:], strict=True)], axis=0)
+                           for a, b in pairwise(path)], axis=0)
             strays.append(gaps.max())
     # Corners below 0.6 rad are cut, by some 5 cm as the planner's margins assume.
     assert max(strays) < min(0.06, CLEARANCE_MARGINS_M[0])

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.execution.execute import DriveTask, drive_route
 from sva_bench.robot.model import BUILT_IN
-from sva_bench.travel.fuel import FuelCosts, fuel_costs, repair_metric
+from sva_bench.travel.fuel import fuel_costs, repair_metric
 from sva_bench.travel.roadmap import plan_paths
 from sva_bench.travel.times import TravelTimes, plan_travel_times
 from tests.oracles.distances import path_clearance
@@ -59,7 +59,8 @@ def test_a_chain_may_run_through_many_sites() -> None:
 
 
 def test_a_tie_leaves_the_direct_leg() -> None:
-    repaired, via = repair_metric(np.array([[0, 2, 5], [9, 0, 3], [9, 9, 0]]))  # 2 + 3 = 5: no reason to stop on the way
+    # 2 + 3 = 5: no reason to stop on the way.
+    repaired, via = repair_metric(np.array([[0, 2, 5], [9, 0, 3], [9, 9, 0]]))
     assert repaired[0, 2] == 5
     assert via[0, 2] == 2
 

@@ -39,7 +39,7 @@ def test_distance_of_a_point_to_a_rotated_box() -> None:
     assert clearance(DIAMOND, 2, 0) == pytest.approx(2 - math.sqrt(2))
     assert clearance(DIAMOND, 2, 2) == pytest.approx(math.sqrt(8) - 1)  # straight out from the middle of a side
     assert clearance(DIAMOND, 0.7, 0.7) == 0  # 0.99 from the centre, along the normal
-    assert clearance(DIAMOND, 1.2, 0.4) > 0  # would be inside, were it not for the rotation's corner: 1.2 + 0.4 > sqrt(2)
+    assert clearance(DIAMOND, 1.2, 0.4) > 0  # outside, for 1.2 + 0.4 > sqrt(2)
 
 
 def test_distance_of_a_point_to_a_cylinder() -> None:

@@ -1,0 +1,119 @@
+"""What commands print: results on standard output, progress and messages on standard error."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.logging import RichHandler
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from sva_bench.errors import BadInput
+
+messages = Console(stderr=True)
+
+
+def results() -> Console:
+    """Standard output; tables keep their shape in a pipe."""
+    return Console(width=None if sys.stdout.isatty() else 140)
+
+
+def print_json(data: Any) -> None:
+    """Print a result as JSON on standard output."""
+    sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
+
+
+def write_result(path: Path | None, text: str) -> None:
+    """Write a result to a file, whole or not at all, or to standard output."""
+    if path is None:
+        sys.stdout.write(text)
+        return
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(path)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another place with -o") from None
+
+
+def set_up_logging(verbose: bool) -> None:
+    """Send warnings to standard error, and everything of ours where the user wants to know more."""
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,
+                        handlers=[RichHandler(console=messages, show_time=False, show_path=False)])
+    logging.getLogger("sva_bench").setLevel(logging.DEBUG if verbose else logging.WARNING)
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
+    """Progress bars on standard error; plain lines where that is no terminal."""
+    if not messages.is_terminal:
+        said: set[str] = set()
+
+        def say(what: str, done: int, of: int) -> None:
+            if what not in said and done < of:
+                said.add(what)
+                messages.print(f"{what} ...", highlight=False)
+
+        yield say
+        return
+    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                  console=messages, transient=True) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(what: str, done: int, of: int) -> None:
+            if what not in tasks:
+                tasks[what] = bars.add_task(what, total=of)
+            bars.update(tasks[what], completed=done, total=of)
+
+        yield show
+
+
+def print_summary(summary: Any) -> None:
+    """Print a summary as a table, and what it comes to."""
+    from sva_bench.analysis.report import answer, verdict, with_interval
+
+    console = results()
+    scenarios, travel = summary["scenarios"], summary["travel"]
+    table = Table(title=f"{summary['world']}, seed {summary['seed']}: {summary['trials']} trials, "
+                        f"{summary['rollouts']} rollouts, {summary['fidelity']}", title_justify="left")
+    compared = "vss" in scenarios[0]
+    for heading in ("scenario", "plan", "promised", "expected", "executed [95 %]", *scenarios[0]["availability"],
+                    *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
+        table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
+    for scenario in scenarios:
+        last = list(scenario["plans"])[-1]
+        for number, (name, plan) in enumerate(scenario["plans"].items()):
+            proof = "" if plan["status"] in ("optimal", None) else f" ({plan['status']})"
+            worth = ["", "", ""] if compared else []
+            if compared and number == 0:
+                vss, evpi = scenario["vss"], scenario["evpi"]
+                worth = [verdict(vss["executed"] | {"distinguishable": vss["distinguishable"]}),
+                         f"{vss['modelled']:.1f}", "" if evpi is None else f"{evpi:.1f}"]
+            table.add_row(
+                "" if number else scenario["name"], name + proof, f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
+                with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()), *worth,
+                end_section=name == last)
+    console.print(table)
+    ends: dict[str, int] = {}
+    for plan in (plan for scenario in scenarios for plan in scenario["plans"].values()):
+        for end, count in plan["ends"].items():
+            ends[end] = ends.get(end, 0) + count
+    unhappy = ", ".join(f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if end in ends)
+    console.print(f"{travel['pairs']} travel times, {travel['triangle_violations_pct']:.1f} % repaired, by up to "
+                  f"{travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed under "
+                  f"{summary['failure']['execute']} failures.", highlight=False)
+    if unhappy:
+        console.print(f"Of {sum(ends.values())} robot missions ended otherwise than home or by draw: {unhappy}.",
+                      highlight=False)
+    console.print(answer(summary), highlight=False)
+    if not summary["reproducible"]:
+        console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

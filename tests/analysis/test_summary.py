@@ -1,0 +1,123 @@
+"""The ledger and the summary of two plans, by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from sva_bench.analysis.summary import Judged, ScenarioResult, ledger, plan_summary, scenario_summary
+from sva_bench.execution.execute import Case, Executed
+from sva_bench.execution.outcome import ENDS, End
+from sva_bench.mission.plan import Plan
+from sva_bench.world.model import Scenario
+
+ROBOTS = ("uv1", "uv2")
+SCENARIO = Scenario(name="S2", availability={"uv1": 1.0, "uv2": 0.5})
+
+
+def executed(incentive: list[list[float]], ends: list[list[End]], planned: list[float], *, promised: float | None,
+             planner: str = "stochastic", rollouts: int = 2) -> Executed:
+    earned = np.array(incentive)
+    end = np.array([[ENDS.index(e) for e in row] for row in ends], dtype=np.int64)
+    zeros = np.zeros(earned.shape, dtype=np.int64)
+    plan = Plan(routes={}, value=promised, bound=promised, status="optimal")
+    return Executed(
+        case=Case(scenario=SCENARIO, planner=planner, plan=plan), rollout=np.arange(len(earned)) % rollouts,
+        available=end != ENDS.index("failed"), incentive=earned, pois_reached=zeros, stops_reached=zeros, end=end,
+        end_time_s=np.zeros(earned.shape), fuel_used_s=np.zeros(earned.shape), planned_incentive=np.array(planned),
+        legs=(), traces=())
+
+
+# Plans of 100 for uv1 and 60 for uv2, available in half of the missions: 130 expected, 140 promised by an optimist.
+MIXED = executed([[100, 60], [100, 0], [70, 20], [40, 60]],
+                 [["home", "home"], ["home", "failed"], ["late", "out_of_fuel"], ["stuck", "home"]],
+                 [100.0, 60.0], promised=140.0)
+
+
+def test_a_ledger_charges_each_loss_to_the_end_of_the_robot_that_planned_it() -> None:
+    # Over four trials: out of fuel lost 60 - 20 = 40, late 100 - 70 = 30, stuck 100 - 40 = 60: 10, 7.5 and 15 each.
+    # Executed: (160 + 100 + 90 + 100) / 4 = 112.5. Draws: the failure lost 60 / 4 = 15 where 30 were expected: +15.
+    entries = ledger(Judged(expected=130.0, executed=MIXED), 112.5)
+    assert entries == pytest.approx({"promised": 140.0, "assumption": -10.0, "draws": 15.0, "out_of_fuel": -10.0,
+                                     "late": -7.5, "stuck": -15.0, "executed": 112.5})
+    assert list(entries) == ["promised", "assumption", "draws", "out_of_fuel", "late", "stuck", "executed"]
+
+
+def test_a_foreign_plan_that_promises_nothing_is_held_to_what_was_expected() -> None:
+    silent = executed([[10, 0]], [["home", "home"]], [10, 0], promised=None)
+    entries = ledger(Judged(expected=10.0, executed=silent), 10.0)
+    assert entries["promised"] == 10.0
+    assert entries["assumption"] == entries["draws"] == 0.0
+
+
+def test_where_all_went_well_nothing_is_charged_and_nothing_is_minus_zero() -> None:
+    happy = executed([[100, 60]] * 3, [["home", "home"]] * 3, [100, 60], promised=160.0)
+    entries = ledger(Judged(expected=160.0, executed=happy), 160.0)
+    assert [entries[k] for k in ("assumption", "draws", "out_of_fuel", "late", "stuck")] == [0.0] * 5
+    assert "-0.0" not in str(entries)
+
+
+figures = st.floats(0, 200)
+
+
+@given(arrays(np.float64, (6, 2), elements=figures), arrays(np.int64, (6, 2), elements=st.integers(0, len(ENDS) - 1)),
+       st.tuples(figures, figures), figures, figures)
+def test_a_ledger_adds_up(earned: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+                          ends: np.ndarray[tuple[int, int], np.dtype[np.int64]], planned: tuple[float, float],
+                          promised: float, expected: float) -> None:
+    kept = np.minimum(earned, planned)
+    run = replace(executed(kept.tolist(), [["home", "home"]] * 6, list(planned), promised=promised), end=ends)
+    mean = float(kept.sum(axis=1).mean())
+    entries = ledger(Judged(expected=expected, executed=run), mean)
+    between = sum(entries[k] for k in ("assumption", "draws", "out_of_fuel", "late", "stuck"))
+    # A sum of six figures below 1000 is exact to some 1e-12.
+    assert entries["promised"] + between == pytest.approx(entries["executed"], abs=1e-9)
+    assert entries["executed"] == mean
+    assert all(entries[k] <= 0 for k in ("out_of_fuel", "late", "stuck"))
+
+
+def test_a_plans_summary_by_hand() -> None:
+    summary = plan_summary(Judged(expected=130.0, executed=MIXED), ROBOTS, noisy=True)
+    assert (summary["promised"], summary["expected"], summary["executed"]["mean"]) == (140.0, 130.0, 112.5)
+    assert summary["by_robot"] == {"uv1": 77.5, "uv2": 35.0}
+    assert summary["ends"] == {"home": 4, "failed": 1, "out_of_fuel": 1, "late": 1, "stuck": 1}
+    assert summary["status"] == "optimal"
+    # Rollouts hold trials 0, 2 (160, 90) and 1, 3 (100, 100): means 125 and 100, one degree of freedom.
+    half = 12.706204736174698 * 12.5
+    assert summary["executed"]["ci95"] == pytest.approx([112.5 - half, 112.5 + half])
+
+
+def test_the_value_of_the_stochastic_solution_is_the_difference_of_paired_trials() -> None:
+    other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], [["home", "home"]] * 4, [90, 60], promised=150.0,
+                     planner="deterministic")
+    result = ScenarioResult(
+        stochastic=Judged(expected=130.0, executed=MIXED), deterministic=Judged(expected=120.0, executed=other),
+        modelled_range=(10.0, 25.0), vss_mean_value=0.0, evpi=None)
+    summary = scenario_summary(result, ROBOTS, noisy=True)
+    # Each trial is 10 better, whatever the failures: the difference has no spread.
+    assert summary["vss"]["executed"] == {"mean": 10.0, "ci95": [10.0, 10.0]}
+    assert summary["vss"]["distinguishable"]
+    assert summary["vss"]["modelled"] == 10.0
+    assert summary["vss"]["modelled_pct"] == pytest.approx(100 * 10 / 130)
+    assert summary["vss"]["executed_pct"] == pytest.approx(100 * 10 / 112.5)
+    assert summary["vss"]["modelled_range"] == [10.0, 25.0]
+    assert summary["availability"] == {"uv1": 1.0, "uv2": 0.5}
+    assert set(summary["plans"]) == {"stochastic", "deterministic"}
+    assert summary["evpi"] is None
+
+
+def test_equal_plans_are_not_distinguishable_and_per_cent_of_nothing_is_none() -> None:
+    nothing = executed([[0, 0], [0, 0]], [["home", "failed"]] * 2, [0, 0], promised=0.0)
+    twin = replace(nothing, case=replace(nothing.case, planner="deterministic"))
+    summary = scenario_summary(ScenarioResult(
+        stochastic=Judged(expected=0.0, executed=nothing), deterministic=Judged(expected=0.0, executed=twin),
+        modelled_range=None, vss_mean_value=None, evpi=0.0), ROBOTS, noisy=True)
+    assert not summary["vss"]["distinguishable"]
+    assert summary["vss"]["modelled_pct"] is None
+    assert summary["vss"]["executed_pct"] is None
+    assert summary["vss"]["modelled_range"] is None
