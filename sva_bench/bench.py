@@ -31,6 +31,7 @@ from sva_bench.runs import (
     write_outcomes,
     write_travel_times,
 )
+from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.two_stage import (
     Knowledge,
     SolveLimits,
@@ -157,6 +158,17 @@ def execute_plans(
     return _publish(world, options, costs, instances, executed, summary, out, clock, progress,
                     identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
                                         for name, plan in plans.items()}})
+
+
+def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list[str]]:
+    """POIs that a robot cannot visit and come home from, even alone and refuelling at will; by robot."""
+    instance = instance_of(world, costs, nominal_scenario(world))
+    lost = {}
+    for vehicle, road in zip(instance.vehicles, knowledge_of(instance).roads, strict=True):
+        pois = [instance.sites[poi] for poi in instance.pois if quickest(road, (poi,)) is None]
+        if pois:
+            lost[vehicle.name] = pois
+    return lost
 
 
 def read_plans(

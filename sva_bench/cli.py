@@ -37,6 +37,9 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 a fault of the program, 2 bad input or usage, 3 an infeasible plan, "
            "4 some trials unfinished, 130 interrupted.")
 
+world_app = typer.Typer(no_args_is_help=True, help="Check worlds.", rich_markup_mode="rich")
+app.add_typer(world_app, name="world")
+
 log = logging.getLogger(__name__)
 _NO_PER_LEG = "there is no exact solver for per_leg failures yet: plans are made under mission"
 
@@ -294,6 +297,40 @@ def view(
     from sva_bench.recording.viewer import view as open_viewer
 
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
+
+
+@world_app.command("check")
+def check_world(
+    world: WorldArgument,
+    planner: PlannerOption = PlannerChoice.prmstar,
+    verbose: Verbose = False,
+) -> None:
+    """Check a world: is the file right, does every robot reach every site, and what can't be part of any plan?"""
+    set_up_logging(verbose)
+    loaded = _loaded(world, None, None, None, None)
+    from sva_bench.bench import out_of_reach, plan_costs
+
+    with progress_bars() as progress:
+        costs = plan_costs(loaded, planner.value, progress)
+    console = results()
+    for cost in costs.values():
+        longest = int(cost.repaired_ms.max()) / 1000
+        console.print(f"{cost.times.model.name}: {cost.pairs} travel times of up to {longest:.1f} s, "
+                      f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
+                      highlight=False)
+    for robot, pois in out_of_reach(loaded, costs).items():
+        console.print(f"{robot} reaches none of {', '.join(pois)} within its fuel and limit, and will never be sent "
+                      "there", highlight=False)
+    console.print(f"{loaded.name} is a good world: {len(loaded.stations)} stations, {len(loaded.pois)} POIs, "
+                  f"{len(loaded.robots)} robots, {len(loaded.scenarios)} scenarios", highlight=False)
+
+
+@world_app.command("schema")
+def world_schema() -> None:
+    """Print the JSON schema of world files, for editors."""
+    from sva_bench.world.schema import WorldFile
+
+    print_json(WorldFile.model_json_schema())
 
 
 @app.callback(invoke_without_command=True)
