@@ -108,9 +108,27 @@ class Planned:
     evpi: float | None
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Measured:
+    """A mission planned, executed and measured, nothing written yet."""
+
+    costs: Mapping[str, FuelCosts]
+    planned: Mapping[str, Planned]
+    executed: list[Executed]
+    summary: Mapping[str, Any]
+    clock: Stopwatch
+
+
 def run(world: World, options: Options, out: Path, executor: Executor | None, progress: Progress) -> Run:
-    """Plan, execute, record and measure a world's mission."""
-    clock = _Stopwatch()
+    """Plan, execute, measure and record a world's mission."""
+    done = measure(world, options, executor, progress)
+    return _publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
+                    done.summary, out, done.clock, progress)
+
+
+def measure(world: World, options: Options, executor: Executor | None, progress: Progress) -> Measured:
+    """Plan, execute and measure a world's mission."""
+    clock = Stopwatch()
     with clock.phase("travel"):
         costs = plan_costs(world, options.planner, progress)
     with clock.phase("planning"):
@@ -123,8 +141,8 @@ def run(world: World, options: Options, out: Path, executor: Executor | None, pr
     with clock.phase("execution"):
         executed = execute(world, costs, cases, settings, executor,
                            lambda done, of: progress("driving routes", done, of))
-    return _publish(world, options, costs, {name: p.instance for name, p in planned.items()}, executed,
-                    summarise(world, options, settings, costs, planned, executed), out, clock, progress)
+    return Measured(costs=costs, planned=planned, executed=executed, clock=clock,
+                    summary=summarise(world, options, settings, costs, planned, executed))
 
 
 def execute_plans(
@@ -140,7 +158,7 @@ def execute_plans(
         out, executor, progress: As for ``run``.
         costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
     """
-    clock = _Stopwatch()
+    clock = Stopwatch()
     settings = _settings(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
              for name, plan in plans.items()]
@@ -213,7 +231,7 @@ def _settings(world: World, options: Options) -> Settings:
 
 def _publish(
     world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
-    executed: list[Executed], summary: Mapping[str, Any], out: Path, clock: _Stopwatch, progress: Progress,
+    executed: list[Executed], summary: Mapping[str, Any], out: Path, clock: Stopwatch, progress: Progress,
     identity: Mapping[str, Any] | None = None,
 ) -> Run:
     """Write the run folder; ``identity`` is what results depend on beside world, options and seed."""
@@ -356,7 +374,7 @@ def _by_stem(executed: list[Executed]) -> dict[str, Executed]:
     return {f"{run.case.scenario.name}-{run.case.planner}": run for run in executed}
 
 
-class _Stopwatch:
+class Stopwatch:
     """Wall-clock time of each phase, for the manifest alone."""
 
     def __init__(self) -> None:

@@ -19,6 +19,7 @@ from sva_bench import __version__
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError, nearest
 from sva_bench.terminal import (
     messages,
+    print_batch,
     print_json,
     print_summary,
     progress_bars,
@@ -281,6 +282,48 @@ def execute(
         with _workers(workers) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
     _show(result.summary, result.folder, as_json)
+
+
+@app.command()
+def batch(
+    worlds: Annotated[list[Path], typer.Argument(metavar="WORLD...", help="World files (YAML).", show_default=False)],
+    seed: Annotated[list[int] | None, typer.Option(min=0, help="Seed of failures and noise; may be repeated.",
+                                                   show_default="0")] = None,
+    trials: Trials = 1000,
+    rollouts: Rollouts = 8,
+    fidelity: FidelityOption = FidelityChoice.rollout,
+    planner: PlannerOption = PlannerChoice.prmstar,
+    scenario: ScenarioNames = None,
+    margin: MarginOption = None,
+    execute_failure: ExecuteFailure = None,
+    time_limit: TimeLimit = None,
+    gap: Gap = 1e-6,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The batch folder.",
+                                             show_default="runs/batch-<hash>")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")] = False,
+    workers: WorkerCount = None,
+    as_json: AsJson = False,
+    verbose: Verbose = False,
+) -> None:
+    """Monte Carlo over many worlds: a shard of outcomes for each, and the VSS over maps."""
+    set_up_logging(verbose)
+    loaded = [_loaded(path, scenario, margin, None, execute_failure) for path in worlds]
+    from sva_bench.batch import batch_name, run_batch, settings_of
+    from sva_bench.bench import Options
+    from sva_bench.solver.two_stage import SolveLimits
+
+    seeds = list(dict.fromkeys(seed or [0]))
+    options = Options(trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
+                      limits=SolveLimits(time_limit_s=time_limit, gap=gap))
+    folder = out or Path("runs") / batch_name(settings_of(loaded, seeds, options))
+    with progress_bars() as progress, _workers(workers) as executor:
+        summary = run_batch(loaded, seeds, options, folder, executor,
+                            lambda done, of: progress("measuring worlds", done, of), resume=resume)
+    if as_json:
+        print_json(summary)
+    else:
+        print_batch(summary)
+        messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
 
 
 @app.command()

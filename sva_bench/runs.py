@@ -20,10 +20,11 @@ import pyarrow.parquet as pq
 
 from sva_bench import __version__
 from sva_bench.documents import pretty_json
-from sva_bench.errors import BadInput
+from sva_bench.errors import BadFile, BadInput
 from sva_bench.execution.execute import Executed
 from sva_bench.execution.outcome import ENDS
 from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import World
 
 _PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
 
@@ -140,9 +141,39 @@ def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[st
     _write(path, columns, {"end_time_s": "s", "fuel_used_s": "s"})
 
 
-def _write(path: Path, columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
+def write_shard(path: Path, executed: Sequence[Executed], world: World, seed: int, fidelity: str,
+                summary: Mapping[str, Any]) -> None:
+    """Write a unit's outcomes, its summary in the table's metadata: whole or not at all."""
+    parts = [outcome_columns(run, [robot.name for robot in world.robots], fidelity) for run in executed]
+    columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    rows = len(columns["trial"])
+    columns |= {"world": np.full(rows, world.name), "seed": np.full(rows, seed)}
+    draft = path.with_name(f"{path.name}.tmp")
+    _write(draft, columns, {"end_time_s": "s", "fuel_used_s": "s"}, {_SUMMARY: json.dumps(summary)})
+    draft.replace(path)
+
+
+def read_shard(path: Path) -> dict[str, Any]:
+    """The summary in a shard.
+
+    Raises:
+        BadFile: If it is no shard of ours.
+    """
+    try:
+        metadata = pq.read_schema(path).metadata or {}
+        summary: dict[str, Any] = json.loads(metadata[_SUMMARY.encode()])
+    except (OSError, ValueError, KeyError, pa.ArrowException) as error:
+        raise BadFile(path, None, "", f"no shard of a batch ({type(error).__name__}); remove it and --resume") from None
+    return summary
+
+
+_SUMMARY = "sva-bench/summary"
+
+
+def _write(path: Path, columns: Mapping[str, Any], units: Mapping[str, str],
+           metadata: Mapping[str, str] | None = None) -> None:
     """Write a Parquet table, units in the metadata of its columns."""
     table = pa.table(dict(columns))
     fields = [field.with_metadata({"unit": units[field.name]}) if field.name in units else field
               for field in table.schema]
-    pq.write_table(table.cast(pa.schema(fields)), path)
+    pq.write_table(table.cast(pa.schema(fields, metadata=dict(metadata or {}))), path)
