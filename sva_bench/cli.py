@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,28 @@ from typer.exceptions import TyperException
 
 from sva_bench import __version__
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError, nearest
+from sva_bench.options import (
+    AsJson,
+    ExecuteFailure,
+    FidelityChoice,
+    FidelityOption,
+    Gap,
+    MarginOption,
+    MethodChoice,
+    ObjectiveChoice,
+    Out,
+    PlannerChoice,
+    PlannerOption,
+    ProcessChoice,
+    Rollouts,
+    ScenarioNames,
+    Seed,
+    TimeLimit,
+    Trials,
+    Verbose,
+    WorkerCount,
+    WorldArgument,
+)
 from sva_bench.terminal import (
     messages,
     print_batch,
@@ -27,6 +50,7 @@ from sva_bench.terminal import (
     set_up_logging,
     write_result,
 )
+from sva_bench.workers import local_workers
 
 if TYPE_CHECKING:
     from sva_bench.world.model import World
@@ -43,65 +67,6 @@ app.add_typer(world_app, name="world")
 
 log = logging.getLogger(__name__)
 _NO_PER_LEG = "there is no exact solver for per_leg failures yet: plans are made under mission"
-
-
-class FidelityChoice(StrEnum):
-    """How plans are executed."""
-
-    kinematic = "kinematic"
-    rollout = "rollout"
-    physics = "physics"
-
-
-class PlannerChoice(StrEnum):
-    """How paths are planned."""
-
-    prmstar = "prmstar"
-    rrtconnect = "rrtconnect"
-
-
-class ProcessChoice(StrEnum):
-    """Failure process."""
-
-    mission = "mission"
-    per_leg = "per_leg"
-
-
-class ObjectiveChoice(StrEnum):
-    """What a plan is made for."""
-
-    stochastic = "stochastic"
-    deterministic = "deterministic"
-
-
-class MethodChoice(StrEnum):
-    """How a plan is made."""
-
-    auto = "auto"
-    expected = "expected"
-
-
-WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-PlannerOption = Annotated[PlannerChoice, typer.Option(help="OMPL planner: one PRM* roadmap, or RRTConnect pair by pair "
-                                                           "(noisy).")]
-MarginOption = Annotated[float | None, typer.Option(
-    min=0, max=1, help="Planning costs are twin times x (1 + margin); default: the world's.", show_default=False)]
-TimeLimit = Annotated[float | None, typer.Option(
-    metavar="S", min=0, help="Stop each solve after so many seconds and take its best plan.", show_default="none")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")]
-Trials = Annotated[int, typer.Option(min=1, help="Trials of each plan in each scenario.")]
-Rollouts = Annotated[int, typer.Option(min=1, help="Noise draws; trial t has number t mod ROLLOUTS.")]
-FidelityOption = Annotated[FidelityChoice, typer.Option(
-    help="The kinematic twin alone; physics once per route and noise draw; or every trial in physics.")]
-ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",
-                                                         show_default="all")]
-ExecuteFailure = Annotated[ProcessChoice | None, typer.Option(help="Failure process that is executed.",
-                                                              show_default="the world's")]
-Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
-WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]
-Gap = Annotated[float, typer.Option(min=0, help="Relative gap at which a plan counts as optimal.")]
 
 
 @app.command()
@@ -141,7 +106,7 @@ def run(
         log.warning(_NO_PER_LEG)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi)
-    with progress_bars() as progress, _workers(workers) as executor:
+    with _about(world), progress_bars() as progress, local_workers(workers) as executor:
         result = run_bench(loaded, options, out, executor, progress)
     _show(result.summary, result.folder, as_json)
 
@@ -276,10 +241,10 @@ def execute(
         if names.count(path.stem) > 1:
             raise BadInput(f"{path}: there is another plan named {path.stem!r}; file names must differ")
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value)
-    with progress_bars() as progress:
+    with _about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner.value, progress)
         read = read_plans(loaded, costs, plans, allow_infeasible=allow_infeasible)
-        with _workers(workers) as executor:
+        with local_workers(workers) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
     _show(result.summary, result.folder, as_json)
 
@@ -316,7 +281,7 @@ def batch(
     options = Options(trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap))
     folder = out or Path("runs") / batch_name(settings_of(loaded, seeds, options))
-    with progress_bars() as progress, _workers(workers) as executor:
+    with progress_bars() as progress, local_workers(workers) as executor:
         summary = run_batch(loaded, seeds, options, folder, executor,
                             lambda done, of: progress("measuring worlds", done, of), resume=resume)
     if as_json:
@@ -334,7 +299,7 @@ def view(
     screenshot: Annotated[Path | None, typer.Option(metavar="OUT.png", help="Take a picture without a screen.",
                                                     show_default=False)] = None,
     at: Annotated[float | None, typer.Option(metavar="S", min=0, help="Mission time of the picture.",
-                                             show_default="the middle")] = None,
+                                             show_default="the end")] = None,
 ) -> None:
     """Open recordings in the Rerun viewer."""
     from sva_bench.recording.viewer import view as open_viewer
@@ -353,7 +318,7 @@ def check_world(
     loaded = _loaded(world, None, None, None, None)
     from sva_bench.bench import out_of_reach, plan_costs
 
-    with progress_bars() as progress:
+    with _about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner.value, progress)
     console = results()
     for cost in costs.values():
@@ -401,9 +366,13 @@ def run_command_line(arguments: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whoever read standard output has gone; say no more
         return int(ExitCode.DONE)
     except Exception as error:
-        messages.print(f"[bold red]fault:[/bold red] {escape(type(error).__name__)}: {escape(str(error))}\n"
-                       "This is a fault of the program or its installation, not of your input; "
-                       "-v prints where it happened.", highlight=False, soft_wrap=True)
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
+            messages.print(f"[bold red]error:[/bold red] nothing can be written: {error.strerror}", highlight=False)
+            return int(ExitCode.BAD_INPUT)
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        messages.print(f"[bold red]fault:[/bold red] {escape(type(error).__name__)}: {escape(str(error))} "
+                       f"({escape(Path(frame.filename).name)}:{frame.lineno})\nThis is a fault of the program or its "
+                       "installation, not of your input: please report it.", highlight=False, soft_wrap=True)
         log.debug("where it happened", exc_info=True)
         return int(ExitCode.FAULT)
     return int(result) if isinstance(result, int) else int(ExitCode.DONE)
@@ -426,6 +395,21 @@ def _loaded(
         execute_failure=world.execute_failure if execute_failure is None else execute_failure.value)
 
 
+@contextmanager
+def _about(path: Path) -> Iterator[None]:
+    """What travel says of sites and robots, said of the file and line where they stand."""
+    from sva_bench.documents import read_yaml
+    from sva_bench.travel.times import UnreachableSite
+
+    try:
+        yield
+    except UnreachableSite as error:
+        document = read_yaml(path)
+        name = error.destination
+        kind = next((kind for kind in ("stations", "pois") if name in (document.data["sites"].get(kind) or {})), None)
+        raise document.error(("sites", "base") if kind is None else ("sites", kind, name), str(error)) from None
+
+
 def _show(summary: Any, folder: Path, as_json: bool) -> None:
     if as_json:
         print_json(summary)
@@ -445,7 +429,8 @@ def _instance_of_world(path: Path, scenario: str | None, planner: Any, margin: f
     chosen = nominal_scenario(world)
     if scenario is not None:
         chosen = world.scenario(_known_scenarios([scenario], [s.name for s in world.scenarios])[0])
-    costs = plan_costs(world, planner, progress)
+    with _about(path):
+        costs = plan_costs(world, planner, progress)
     for cost in costs.values():
         messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
                        f"to {cost.max_excess_pct:.1f} %", highlight=False)
@@ -457,12 +442,3 @@ def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
         if name not in known:
             raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
     return list(dict.fromkeys(names))
-
-
-@contextmanager
-def _workers(count: int | None) -> Iterator[Any]:
-    """Processes that drive routes; ``None`` where one is enough."""
-    from sva_bench.workers import local_workers
-
-    with local_workers(count or len(os.sched_getaffinity(0))) as executor:
-        yield executor

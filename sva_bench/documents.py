@@ -28,6 +28,8 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,6
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]
+"""Times [s] and incentives: sums of more than 1e9 would lose the feasibility tolerance to rounding."""
 Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
 WholeNumber = Annotated[int, Field(strict=True, ge=0)]
 
@@ -169,12 +171,14 @@ def check_kind(document: Document, kind: str) -> None:
 
 def _first_complaint(document: Document, schema: type[BaseModel], error: ValidationError) -> BadFile:
     # An unknown key explains a missing one beside it better than the other way round.
-    details = sorted(error.errors(), key=lambda d: d["type"] != "extra_forbidden")
+    details = sorted(_as_meant(document.data, error.errors()), key=lambda d: d["type"] != "extra_forbidden")
     detail = details[0]
     loc = _existing(document.data, detail["loc"])
     if detail["type"] == "extra_forbidden":
         key = str(detail["loc"][-1])
         known = _keys_at(schema, detail["loc"][:-1])
+        if key in known:  # of another alternative
+            return document.error(loc, f"the key {key!r} doesn't go with the other keys here; remove one or the other")
         return document.error(loc, f"unknown key {key!r}; {nearest(key, known)}")
     if detail["type"] == "missing":
         return document.error(loc, f"the key {detail['loc'][-1]!r} is missing; add it")
@@ -182,10 +186,57 @@ def _first_complaint(document: Document, schema: type[BaseModel], error: Validat
         name = _shown(detail["input"])
         return document.error(
             loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit")
-    message = detail["msg"].removeprefix("Value error, ")
+    message = _PLAINLY.get(detail["type"], detail["msg"]).removeprefix("Value error, ").format(
+        **detail.get("ctx", {}) if detail["type"] in _PLAINLY else {})
     found = detail["input"]
     shown = f", found {_shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
     return document.error(loc, message[:1].lower() + message[1:] + shown)
+
+
+_PLAINLY = {  # what pydantic says of its own types, said of the file
+    "too_short": "expected at least {min_length} entries, found {actual_length}",
+    "too_long": "expected at most {max_length} entries, found {actual_length}",
+    "dict_type": "expected a mapping", "model_type": "expected a mapping", "list_type": "expected a list",
+    "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
+}
+
+
+def _as_meant(data: Any, details: list[Any]) -> list[Any]:
+    """The complaints of those alternatives of unions that the writer most likely meant.
+
+    A box that is no box is no cylinder and no wall either; only what is wrong with the box is worth telling.
+    """
+    place, depth = _until_union(data, details[0]["loc"])
+    if depth == len(details[0]["loc"]):
+        return details
+    tags: dict[str | int, list[Any]] = {}
+    for detail in details:
+        if _until_union(data, detail["loc"]) == (place, depth) and len(detail["loc"]) > depth:
+            tags.setdefault(detail["loc"][depth], []).append(detail)
+
+    def strangeness(tag: str | int) -> tuple[int, bool]:
+        odd = 0
+        for detail in tags[tag]:
+            whole = len(detail["loc"]) == depth + 1  # the value as a whole
+            holds = isinstance(detail["input"], dict | list)
+            other = detail["type"].endswith("_type") or (detail["type"] == "literal_error" and holds)
+            odd += 100 if whole and other else 0
+            odd += 3 if holds and other else 0  # a list where a number belongs
+            odd += detail["type"] in ("extra_forbidden", "missing")
+        return odd, str(tag).startswith("dict[")
+
+    return tags[min(tags, key=strangeness)] if len(tags) > 1 else details
+
+
+def _until_union(data: Any, loc: Loc) -> tuple[Loc, int]:
+    """How far a location follows the data; what comes next is the name of an alternative, or a missing key."""
+    for depth, part in enumerate(loc):
+        inside = part in data if isinstance(data, dict) else (
+            isinstance(data, list) and isinstance(part, int) and part < len(data))
+        if not inside:
+            return loc[:depth], depth
+        data = data[part]
+    return loc, len(loc)
 
 
 def _shown(value: object) -> str:

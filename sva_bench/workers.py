@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -10,22 +11,29 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def local_workers(count: int) -> Iterator[Executor | None]:
-    """An executor of so many processes; ``None`` for one, since this process can do its work."""
+def local_workers(wanted: int | None) -> Iterator[Executor | None]:
+    """An executor of so many processes (default: one a core); ``None`` for one, since this process can do its work."""
+    count = wanted or len(os.sched_getaffinity(0))
     if count <= 1:
         yield None
         return
-    executor = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
+    before = set(multiprocessing.active_children())
+    executor = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    # Workers inherit this, so that Ctrl-C never meets one that is still starting.
+    ours = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         for _ in range(count):  # they start, import and load compiled code while this process plans
             executor.submit(_warm_up)
+    finally:
+        signal.signal(signal.SIGINT, ours)
+    try:
         yield executor
+    except BaseException:
+        for worker in set(multiprocessing.active_children()) - before:
+            worker.terminate()  # what they are at is of no use any more, and may take long
+        raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
-
-
-def _begin() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _warm_up() -> None:

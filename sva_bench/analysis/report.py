@@ -85,6 +85,8 @@ def _comparison(scenarios: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def verdict(difference: Mapping[str, Any]) -> str:
     """A difference with its interval, or that there is none to speak of."""
+    if difference["ci95"] is None:
+        return f"{difference['mean']:.1f}, no interval"
     return with_interval(difference) if difference["distinguishable"] else "not distinguishable from zero"
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.execution.outcome import ENDS, Assignment, Driven, Outcome, Trace, settle, trace_of
 from sva_bench.execution.simulator import Simulator, downsampled
-from sva_bench.mission.failures import draw_failures
+from sva_bench.mission.failures import NEVER, draw_failures
 from sva_bench.mission.plan import Plan, Route
 from sva_bench.robot.follower import Stretch
 from sva_bench.robot.model import RobotModel
@@ -58,7 +58,7 @@ class Settings:
     fidelity: Fidelity
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class LegTime:
     """A leg as planned (the repaired twin time, without margin) and as driven [s]."""
 
@@ -203,10 +203,11 @@ def _orders(world: World, robot: Robot, route: Route) -> Assignment:
 
 
 def _failures(world: World, case: Case, orders: Sequence[Assignment], settings: Settings) -> IntArray:
-    most = max((sum(o.is_poi(site) for site in o.route) for o in orders), default=0)
-    return draw_failures(
+    pois = np.array([sum(o.is_poi(site) for site in o.route) for o in orders])
+    fails = draw_failures(
         settings.seed, [robot.name for robot in world.robots], case.scenario.availability, world.execute_failure,
-        trials=settings.trials, pois=most, joint=case.scenario.joint)
+        trials=settings.trials, pois=int(pois.max(initial=0)), joint=case.scenario.joint)
+    return np.where(fails > pois, NEVER, fails)  # draws for a longer route of another robot mean nothing to this one
 
 
 def _tasks(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -222,5 +221,5 @@ def trace_of(
     time, pose, fuel = time[kept], pose[kept], fuel[kept]
     if time[-1] < outcome.end_time_s:
         time, pose = np.append(time, outcome.end_time_s), np.append(pose, pose[-1:], axis=0)
-        fuel = np.append(fuel, orders.fuel_capacity_s - outcome.fuel_used_s if math.isinf(fuel[-1]) else fuel[-1])
+        fuel = np.append(fuel, 0.0 if outcome.end == "out_of_fuel" else fuel[-1])
     return Trace(orders=orders, outcome=outcome, time_s=time, pose=pose, fuel_s=fuel, planned=planned)

@@ -15,7 +15,7 @@ from types import TracebackType
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, Stretch, control, new_state
+from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import patience_steps
 from sva_bench.world.model import Obstacles
@@ -154,7 +154,7 @@ class Simulator:
         check = round(_STUCK_CHECK_S * CONTROL_HZ)
         total = 0
         for stretch in course:
-            state, since = new_state(), self.pose()
+            state, since_yaw, since_s = new_state(), self.pose()[2], 0.0
             for step in range(1, patience_steps(stretch, model) + 1):
                 x, y, yaw = self.pose()
                 speed, rate = control(stretch.path, stretch.arc, stretch.heading_rad, limits, state, x, y, yaw, dt)
@@ -169,10 +169,11 @@ class Simulator:
                 if poses is not None:
                     poses.append(self.pose())
                 if step % check == 0:
-                    moved = math.hypot(x - since[0], y - since[1])
-                    if moved < _STUCK_M and abs(math.remainder(yaw - since[2], 2 * math.pi)) < _STUCK_RAD:
+                    # On the way only progress along the path counts: a robot that pushes a wall sways and slides.
+                    turned = abs(math.remainder(yaw - since_yaw, 2 * math.pi)) >= _STUCK_RAD
+                    if state[1] - since_s < _STUCK_M and (state[0] == DRIVE or not turned):
                         return total * dt, False
-                    since = (x, y, yaw)
+                    since_yaw, since_s = yaw, float(state[1])
             else:
                 return total * dt, False
         return total * dt, True

@@ -13,6 +13,7 @@ from sva_bench.mission.failures import route_value
 from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 from sva_bench.mission.plan import Plan, Route
 
+INFINITE = float("inf")
 VALUE_TOLERANCE = 1e-6  # relative; the gap at which a plan counts as optimal
 
 
@@ -94,12 +95,12 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
         where = f"{instance.sites[i]} -> {instance.sites[j]}"
         if i == j:
             reasons.append(f"{name}: {instance.sites[i]} follows itself; name a stop once")
-        elif leg == float("inf"):
+        elif leg == INFINITE:
             reasons.append(f"{name}: there is no way {where}")
         since_refuel += leg
         fuel += leg
         duration += leg + float(instance.stop_s[j])
-        if since_refuel > vehicle.fuel_capacity_s + TOLERANCE_S:
+        if INFINITE > since_refuel > vehicle.fuel_capacity_s + TOLERANCE_S:
             reasons.append(f"{name}: {since_refuel:.3f} s of fuel burnt on arrival over {where}; "
                            f"the capacity is {vehicle.fuel_capacity_s:.3f} s")
             since_refuel = 0.0  # one complaint per filling is enough

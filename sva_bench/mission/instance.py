@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from sva_bench.arrays import FloatArray, frozen
-from sva_bench.documents import Document, Name, NonNegative, Probability, Section, pretty_json, read_json, validate
+from sva_bench.documents import Bounded, Document, Name, Probability, Section, pretty_json, read_json, validate
 from sva_bench.errors import nearest
 from sva_bench.mission.failures import FailureProcess, JointState, marginals
 
@@ -91,11 +91,11 @@ class Instance:
 
 class _VehicleFile(Section):
     name: Name
-    fuel_capacity_s: NonNegative | None
-    mission_limit_s: NonNegative | None
+    fuel_capacity_s: Bounded | None
+    mission_limit_s: Bounded | None
     availability: Probability | None = None
-    incentives: dict[Name, NonNegative] = Field(default_factory=dict)
-    fuel_s: list[list[NonNegative | None]] | None = None
+    incentives: dict[Name, Bounded] = Field(default_factory=dict)
+    fuel_s: list[list[Bounded | None]] | None = None
 
 
 class _JointFile(Section):
@@ -109,8 +109,8 @@ class _InstanceFile(Section):
     sites: Annotated[list[Name], Field(min_length=1)]
     base: Name
     stations: list[Name] = Field(default_factory=list)
-    fuel_s: list[list[NonNegative | None]] | None = None
-    stop_s: list[NonNegative] | None = None
+    fuel_s: list[list[Bounded | None]] | None = None
+    stop_s: list[Bounded] | None = None
     vehicles: list[_VehicleFile]
     failure: FailureProcess = "mission"
     joint_availability: Annotated[list[_JointFile], Field(min_length=1)] | None = None

@@ -114,7 +114,7 @@ def verify(path: Path) -> None:
     done = subprocess.run([*program(), "rrd", "verify", str(path)], env={**os.environ, **_DISCREET},
                           capture_output=True, check=False)
     if done.returncode:
-        raise BadFile(path, None, "", "the recording is cut off or damaged: record it again with `sva-bench replay`")
+        raise BadFile(path, None, "", "the recording is cut off or damaged, or none at all: run `sva-bench run` again")
 
 
 def drawing_environment(environment: Mapping[str, str]) -> dict[str, str]:

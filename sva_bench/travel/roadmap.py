@@ -16,17 +16,19 @@ from numba import njit
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
+from scipy.ndimage import label
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.stats import qmc
 
-from sva_bench.arrays import FloatArray
+from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.world.clearance import segment_distance
 from sva_bench.world.model import Obstacles
 
 PlannerName = Literal["prmstar", "rrtconnect"]
 
 _MILESTONES = (4000, 16000)  # a second, denser roadmap where the first leaves sites apart
+_CELL_M, _CELLS = 0.02, 200_000  # finest cell, and most cells, of the grid that says which sites no path joins
 _RRT_ITERATIONS = 20_000  # states that RRTConnect may try for one pair before the pair counts as unreachable
 _GRAZE_M = 1e-4  # boundary samples keep this far outside, so that edges along the boundary are free
 _ROUNDS = 3  # passes of the simplifier; a fourth no longer shortens anything by 0.1 %
@@ -55,8 +57,9 @@ def plan_paths(
     paths: list[list[FloatArray | None]] = []
     for milestones in _MILESTONES:
         paths = _prmstar(obstacles, points, clearance_m, milestones)
-        if all(path is not None for i, row in enumerate(paths) for j, path in enumerate(row) if i != j):
-            break
+        missing = [(i, j) for i, row in enumerate(paths) for j, path in enumerate(row) if i != j and path is None]
+        if not missing or surely_apart(obstacles, points, clearance_m)[tuple(zip(*missing, strict=True))].all():
+            break  # a denser roadmap would find no more
     return paths
 
 
@@ -85,6 +88,27 @@ class _SampleQueue(ob.ValidStateSampler):  # type: ignore[misc]
 
     def sampleNear(self, state: Any, near: Any, distance: float) -> bool:  # noqa: ARG002 - OMPL's signature
         return self.sample(state)
+
+
+def surely_apart(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> BoolArray:
+    """Which points no path can join, however fine the roadmap, shape (n, n).
+
+    Each point of a path lies in a cell of a grid, whose centre is at most half a diagonal away from it. Cells whose
+    centre is nearer to an obstacle than the clearance less that are closed; a path runs through open ones, from
+    neighbour to neighbour. So points in different parts of the open cells are apart.
+    """
+    low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
+    cell = max(_CELL_M, math.sqrt(float(np.prod(high - low)) / _CELLS))
+    counts = np.ceil((high - low) / cell).astype(np.int64)
+    x, y = (low[axis] + (np.arange(counts[axis]) + 0.5) * cell for axis in (0, 1))
+    centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    needed = clearance_m - cell * math.sqrt(0.5) - 1e-6
+    open_cells = _free_mask(obstacles.bounds_m, obstacles.boxes, obstacles.cylinders, centres, needed) > 0
+    parts, _ = label(open_cells.reshape(tuple(counts)), structure=np.ones((3, 3)))
+    at = np.clip(((points - low) / cell).astype(np.int64), 0, counts - 1)
+    mine = parts[at[:, 0], at[:, 1]]
+    apart: BoolArray = mine[:, None] != mine[None, :]
+    return apart
 
 
 def _space(obstacles: Obstacles, clearance_m: float) -> tuple[Any, Callable[[float, float, float, float], bool]]:
@@ -187,7 +211,8 @@ def _rrtconnect(obstacles: Obstacles, points: FloatArray, clearance_m: float) ->
             planner = og.RRTConnect(si)
             planner.setProblemDefinition(problem)
             planner.setup()
-            if planner.solve(_after(_RRT_ITERATIONS)):
+            planner.solve(_after(_RRT_ITERATIONS))
+            if problem.hasExactSolution():  # solve() is true for an approximate one too, which ends short
                 path = problem.getSolutionPath()
                 simplifier.simplifyMax(path)
                 vertices = np.array([(s[0], s[1]) for s in path.getStates()])
@@ -227,13 +252,15 @@ def _boundary(obstacles: Obstacles, ring: float, count: int) -> FloatArray:
     shares = max(corners + 2 * len(obstacles.cylinders), 1)
     per_corner = min(max(count // (2 * shares), 3), 12)
     angles = (np.arange(per_corner) + 0.5) / per_corner * (np.pi / 2)
+    # An inscribed polygon would leave the ring between its corners, and so be blocked; this one circumscribes it.
+    around_corner = ring / math.cos(np.pi / (4 * per_corner))
     points = []
     edges = []
     for cx, cy, hx, hy, yaw in obstacles.boxes:
         turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
         for quadrant, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
             a = angles + quadrant * np.pi / 2
-            arc = np.array([sx * hx, sy * hy]) + ring * np.column_stack([np.cos(a), np.sin(a)])
+            arc = np.array([sx * hx, sy * hy]) + around_corner * np.column_stack([np.cos(a), np.sin(a)])
             points.append(arc @ turn.T + (cx, cy))
         for axis, reach in ((0, hx), (1, hy)):
             for side in (-1.0, 1.0):
@@ -243,7 +270,6 @@ def _boundary(obstacles: Obstacles, ring: float, count: int) -> FloatArray:
                 edges.append(ends @ turn.T + (cx, cy))
     around = np.arange(2 * per_corner) / (2 * per_corner) * 2 * np.pi
     for cx, cy, radius in obstacles.cylinders:
-        # An inscribed polygon would leave the ring between its corners; sample a circle that circumscribes it.
         reach = (radius + ring) / math.cos(np.pi / len(around))
         points.append(np.array([cx, cy]) + reach * np.column_stack([np.cos(around), np.sin(around)]))
     left = count - sum(map(len, points))

@@ -56,11 +56,11 @@ def _obstacles(shapes: Shapes) -> Obstacles:
         if isinstance(shape, Cylinder):
             cylinders.append([*shape.cylinder, shape.radius_m])
         elif isinstance(shape, Box):
-            boxes.append([*shape.box, shape.size_m[0] / 2, shape.size_m[1] / 2, math.radians(shape.yaw_deg)])
+            boxes.append([*shape.box, shape.size_m[0] / 2, shape.size_m[1] / 2, _radians(shape.yaw_deg)])
         else:
             (ax, ay), (bx, by) = shape.wall
             boxes.append([(ax + bx) / 2, (ay + by) / 2, math.hypot(bx - ax, by - ay) / 2, shape.thickness_m / 2,
-                          math.atan2(by - ay, bx - ax)])
+                          _radians(math.degrees(math.atan2(by - ay, bx - ax)))])
     return Obstacles(bounds_m=np.array(shapes.bounds_m), boxes=np.array(boxes).reshape(-1, 5),
                      cylinders=np.array(cylinders).reshape(-1, 3))
 
@@ -80,7 +80,8 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
             where = "inside an obstacle or outside the bounds" if gap <= 0 else f"only {gap:.3f} m from an obstacle"
             raise document.error((*loc, "at_m"), f"{name} is {where}; a robot of radius {widest_m} m doesn't fit "
                                  "there: move the site")
-        heading = open_heading(obstacles, x, y) if entry.heading_deg is None else math.radians(entry.heading_deg)
+        heading = (_radians(math.degrees(open_heading(obstacles, x, y))) if entry.heading_deg is None
+                   else _radians(entry.heading_deg))
         sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s))
     for k, site in enumerate(sites):
         for other in sites[:k]:
@@ -157,10 +158,19 @@ def _known(document: Document, loc: tuple[str | int, ...], robot: str, robots: M
         raise document.error(loc, f"there is no robot {robot!r}; {nearest(robot, list(robots))}")
 
 
+def _radians(angle_deg: float) -> float:
+    """An angle of a file in radians; to the nanodegree, so that ``_degrees`` gives the same file again."""
+    return math.radians(round(angle_deg, 9))
+
+
+def _degrees(angle_rad: float) -> float:
+    return round(math.degrees(angle_rad), 9)
+
+
 def world_as_dict(world: World) -> dict[str, Any]:
     """The resolved world as the content of a world file that gives the same world again."""
     def entry(site: Site) -> dict[str, Any]:
-        return {"at_m": [site.x_m, site.y_m], "heading_deg": round(math.degrees(site.heading_rad), 9),
+        return {"at_m": [site.x_m, site.y_m], "heading_deg": _degrees(site.heading_rad),
                 "stop_s": site.stop_s}
 
     def limit(seconds: float) -> float | None:
@@ -168,7 +178,7 @@ def world_as_dict(world: World) -> dict[str, Any]:
 
     o = world.obstacles
     shapes: list[dict[str, Any]] = [
-        {"box": [b[0], b[1]], "size_m": [2 * b[2], 2 * b[3]], "yaw_deg": math.degrees(b[4])} for b in o.boxes.tolist()]
+        {"box": [b[0], b[1]], "size_m": [2 * b[2], 2 * b[3]], "yaw_deg": _degrees(b[4])} for b in o.boxes.tolist()]
     shapes += [{"cylinder": [c[0], c[1]], "radius_m": c[2]} for c in o.cylinders.tolist()]
     return {
         "format": KIND, "name": world.name,

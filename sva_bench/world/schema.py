@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from sva_bench.documents import Name, NonNegative, Number, Positive, Probability, Section, WholeNumber
+from sva_bench.documents import Bounded, Name, Number, Positive, Probability, Section, WholeNumber
 from sva_bench.mission.failures import FailureProcess
 
 KIND = "sva-bench/world@1"
@@ -54,35 +54,38 @@ class Map(Section):
     shapes: Shapes
 
 
+_EMPTY_IS_NONE = BeforeValidator(lambda value: {} if value is None else value)  # a heading with nothing below
+
+
 class SiteEntry(Section):
     at_m: Point
     heading_deg: Number | None = None
-    stop_s: NonNegative = 0.0
+    stop_s: Bounded = 0.0
 
 
 class Sites(Section):
     base: SiteEntry
-    stations: dict[Name, SiteEntry] = Field(default_factory=dict)
+    stations: Annotated[dict[Name, SiteEntry], _EMPTY_IS_NONE] = Field(default_factory=dict)
     pois: dict[Name, SiteEntry]
 
 
 class Figures(Section):
     """Figures of a robot that isn't built in."""
 
-    radius_m: Positive
-    wheel_radius_m: Positive
-    track_m: Positive
-    mass_kg: Positive
-    max_speed_m_s: Positive
-    max_turn_rad_s: Positive
-    acceleration_m_s2: Positive
-    turn_acceleration_rad_s2: Positive
+    radius_m: Annotated[Positive, Field(ge=0.02, le=5)]
+    wheel_radius_m: Annotated[Positive, Field(ge=0.005, le=2)]
+    track_m: Annotated[Positive, Field(ge=0.02, le=10)]
+    mass_kg: Annotated[Positive, Field(ge=0.05, le=10_000)]
+    max_speed_m_s: Annotated[Positive, Field(ge=0.02, le=20)]
+    max_turn_rad_s: Annotated[Positive, Field(ge=0.05, le=20)]
+    acceleration_m_s2: Annotated[Positive, Field(ge=0.02, le=20)]
+    turn_acceleration_rad_s2: Annotated[Positive, Field(ge=0.05, le=100)]
 
 
 class Drawn(Section):
     """Incentives drawn per POI: uniform, a share of them zero."""
 
-    uniform: Annotated[list[NonNegative], Field(min_length=2, max_length=2)]
+    uniform: Annotated[list[Bounded], Field(min_length=2, max_length=2)]
     zero_share: Probability = 0.0
     seed: WholeNumber
 
@@ -96,10 +99,10 @@ class Drawn(Section):
 
 class RobotEntry(Section):
     model: str | Figures
-    fuel_capacity_s: NonNegative | None = None
-    mission_limit_s: NonNegative | None = None
+    fuel_capacity_s: Bounded | None = None
+    mission_limit_s: Bounded | None = None
     availability: Probability = 1.0
-    incentives: dict[Name, NonNegative] | Drawn
+    incentives: dict[Name, Bounded] | Drawn
 
 
 class JointEntry(Section):
@@ -132,7 +135,7 @@ class WorldFile(Section):
     failure: FailureProcess | FailureEntry = "mission"
     interaction: Literal["independent"] = "independent"
     margin: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] = 0.01
-    noise: NoiseEntry = Field(default_factory=NoiseEntry)
+    noise: Annotated[NoiseEntry, _EMPTY_IS_NONE] = Field(default_factory=NoiseEntry)
 
     @model_validator(mode="before")
     @classmethod

@@ -210,7 +210,6 @@ def test_failures_along_the_route_keep_what_was_collected(small: Planned) -> Non
     assert np.all(done.end_time_s[failed_later, 1] > 0)
 
 
-@pytest.mark.xfail(strict=True, reason="draws beyond a route's last POI count when another robot's route is longer")
 def test_a_robot_that_was_drawn_to_fail_beyond_its_last_poi_is_available(small: Planned) -> None:
     # uv2 has one POI in both plans; uv1's longer route in the second must not make uv2 unavailable.
     world = quiet(replace(small.world, execute_failure="per_leg"))

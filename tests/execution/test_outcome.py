@@ -212,7 +212,6 @@ def test_the_last_pose_is_that_of_the_drive_and_of_the_cut() -> None:
     assert_array_equal(traced(orders(), drive, 0)[2], [START])
 
 
-@pytest.mark.xfail(strict=True, reason="the last row repeats the fuel of the pose before")
 def test_a_trace_that_runs_dry_ends_with_an_empty_tank() -> None:
     assert traced(orders(fuel=15), driven())[3][-1] == pytest.approx(0.0, abs=1e-9)
 

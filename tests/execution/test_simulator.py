@@ -132,7 +132,6 @@ def test_a_wall_in_the_way_stops_it() -> None:
     assert not kinematic.stuck  # the twin knows no obstacles
 
 
-@pytest.mark.xfail(strict=True, reason="it sways along the wall, which counts as moving, and gives up after 170 s")
 def test_a_robot_that_gets_no_further_gives_up_soon() -> None:
     wall = Obstacles(bounds_m=np.array([0.0, 0, 4, 2]), boxes=np.array([[2.0, 1, 0.05, 1.0, 0]]),
                      cylinders=NO_CYLINDERS)
