@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import t as student_t
 
 from sva_bench import __version__
+from sva_bench.analysis.report import write_batch_report
 from sva_bench.analysis.statistics import CONFIDENCE
 from sva_bench.bench import Measured, Options, measure
 from sva_bench.documents import read_json
@@ -82,6 +83,7 @@ def run_batch(
     summary = {"format": KIND, "trials": options.trials, "fidelity": options.fidelity, "worlds": names,
                "seeds": list(seeds), "units": summaries, "aggregate": aggregate(summaries)}
     write_json(folder / "summary.json", summary)
+    write_batch_report(folder / "report.html", summary)
     return summary
 
 

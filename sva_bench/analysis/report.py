@@ -61,11 +61,15 @@ def write_report(path: Path, summary: Mapping[str, Any], plans: Mapping[str, Pla
         "<h2>The world</h2>", picture(world),
         "<p class=note>Black: base. Blue: refuelling stations. Orange: points of interest.</p>",
     ]
+    _write_page(path, summary["world"], parts)
+
+
+def _write_page(path: Path, title: str, parts: Sequence[str]) -> None:
     body = "\n".join(parts)
     path.write_text(
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{_text(summary['world'])} · sva-bench</title><style>{_STYLE}</style></head>\n"
+        f"<title>{_text(title)} · sva-bench</title><style>{_STYLE}</style></head>\n"
         f"<body>\n{body}\n</body></html>\n", encoding="utf-8")
 
 
@@ -88,6 +92,28 @@ def verdict(difference: Mapping[str, Any]) -> str:
     if difference["ci95"] is None:
         return f"{difference['mean']:.1f}, no interval"
     return with_interval(difference) if difference["distinguishable"] else "not distinguishable from zero"
+
+
+def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
+    """Write the ``report.html`` of a batch.
+
+    Args:
+        path: Where to.
+        summary: Content of the batch's ``summary.json``.
+    """
+    over = [[row["scenario"], str(row["maps"]), with_interval(row["vss"]),
+             "" if row["vss_pct"]["mean"] is None else with_interval(row["vss_pct"])] for row in summary["aggregate"]]
+    parts = [
+        f"<h1>Value of the stochastic solution over {len(summary['worlds'])} maps</h1>",
+        f"<p class=note>{summary['trials']} trials of each plan in each scenario, fidelity "
+        f"<code>{summary['fidelity']}</code>; 95 % intervals in brackets. Over maps, the maps are the sample.</p>",
+        _table(["scenario", "maps", "VSS", "VSS [%]"], over),
+        "<h2>Map by map</h2>",
+        _table(["map", "seed", "scenario", "stochastic", "deterministic", "VSS", "VSS, modelled", "EVPI"],
+               [[unit["world"], str(unit["seed"]), *_vss_row(s)] for unit in summary["units"]
+                for s in unit["scenarios"]]),
+    ]
+    _write_page(path, "batch", parts)
 
 
 def answer(summary: Mapping[str, Any]) -> str:

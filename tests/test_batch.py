@@ -1,0 +1,150 @@
+"""Batches and foreign plans, as a user runs them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from sva_bench.batch import aggregate
+from tests.test_cli import sva_bench, world_file
+from tests.worlds_for_tests import SMALL
+
+QUICK = ("--trials", 60, "--rollouts", 2, "--fidelity", "kinematic")
+
+
+def two_worlds(folder: Path) -> tuple[Path, Path]:
+    other = folder / "other.yaml"
+    other.write_text(SMALL.replace("name: small", "name: other").replace("p3: {at_m: [5.2, 5.2]}",
+                                                                         "p3: {at_m: [5.2, 2.0]}"), encoding="utf-8")
+    return world_file(folder), other
+
+
+def rows_of(folder: Path) -> pa.Table:
+    """All rows of a batch, in one order."""
+    tables = [pq.read_table(path).replace_schema_metadata() for path in sorted(folder.glob("outcomes-*.parquet"))]
+    return pa.concat_tables(tables).sort_by([(key, "ascending") for key in (
+        "world", "seed", "scenario", "planner", "trial", "robot")])
+
+
+def test_a_batch_gives_the_same_rows_on_one_worker_and_on_two_and_resumes(tmp_path: Path) -> None:
+    small, other = two_worlds(tmp_path)
+    command = ("batch", small, other, "--seed", 0, "--seed", 1, *QUICK)
+    one = sva_bench(*command, "--out", "one", "--workers", 1, "--json", cwd=tmp_path)
+    assert one.returncode == 0, one.stderr
+    two = sva_bench(*command, "--out", "two", "--workers", 2, "--json", cwd=tmp_path)
+    assert two.returncode == 0, two.stderr
+    assert rows_of(tmp_path / "one").equals(rows_of(tmp_path / "two"))
+    assert one.stdout == two.stdout
+    assert {path.name for path in (tmp_path / "one").iterdir()} == {
+        "manifest.json", "summary.json", "report.html",
+        *(f"outcomes-{w}-seed{s}.parquet" for w in ("small", "other") for s in (0, 1))}
+    assert rows_of(tmp_path / "one").num_rows == 2 * 2 * 2 * 2 * 60 * 2
+
+    # As after a crash: a shard and the summary are missing, and a draft is left over.
+    (tmp_path / "two" / "outcomes-other-seed1.parquet").unlink()
+    (tmp_path / "two" / "summary.json").unlink()
+    (tmp_path / "two" / "outcomes-other-seed1.parquet.tmp").write_bytes(b"half")
+    kept = (tmp_path / "two" / "outcomes-small-seed0.parquet").stat().st_mtime_ns
+    again = sva_bench(*command, "--out", "two", "--resume", "--json", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert again.stdout == one.stdout
+    assert rows_of(tmp_path / "two").equals(rows_of(tmp_path / "one"))
+    assert (tmp_path / "two" / "outcomes-small-seed0.parquet").stat().st_mtime_ns == kept
+    assert not list((tmp_path / "two").glob("*.tmp"))
+
+    refused = sva_bench(*command, "--out", "two", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "--resume" in refused.stderr
+    differs = sva_bench(*command, "--trials", 61, "--out", "two", "--resume", cwd=tmp_path)
+    assert differs.returncode == 2
+    assert "settings.options.trials" in differs.stderr
+
+
+def test_worlds_of_one_name_are_refused(tmp_path: Path) -> None:
+    small = world_file(tmp_path)
+    done = sva_bench("batch", small, small, *QUICK, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "'small'" in done.stderr
+
+
+def test_vss_over_maps_takes_maps_as_the_sample() -> None:
+    def unit(world: str, mean: float) -> dict[str, Any]:
+        return {"world": world, "scenarios": [{"name": "S", "vss": {"executed": {"mean": mean}, "executed_pct": None}}]}
+
+    # Map a: mean of its seeds 1 and 3 is 2; map b: 6. Over maps: 4, sd sqrt(8), half-width 12.706 sqrt(8) / sqrt(2).
+    (row,) = aggregate([unit("a", 1.0), unit("a", 3.0), unit("b", 6.0)])
+    assert row["maps"] == 2
+    assert row["vss"]["mean"] == 4.0
+    np.testing.assert_allclose(row["vss"]["ci95"], [4 - 25.412, 4 + 25.412], atol=1e-3)
+    assert row["vss_pct"] == {"mean": None, "ci95": None}
+
+
+def plan_file(folder: Path, name: str, routes: dict[str, list[str]]) -> Path:
+    path = folder / name
+    path.write_text(json.dumps({"format": "sva-bench/plan@1", "routes": routes}), encoding="utf-8")
+    return path
+
+
+def test_plans_by_hand_are_executed_and_compared(tmp_path: Path) -> None:
+    good = plan_file(tmp_path, "good.json", {"uv1": ["base", "p4", "base"], "uv2": ["base", "p1", "base"]})
+    less = plan_file(tmp_path, "less.json", {"uv1": ["base", "p1", "base"], "uv2": []})
+    done = sva_bench("execute", world_file(tmp_path), good, less, *QUICK, "--scenario", "half", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    (scenario,) = json.loads(done.stdout)["scenarios"]
+    assert "vss" not in scenario
+    assert scenario["plans"]["good"]["expected"] == 40 + 0.5 * 40
+    assert scenario["plans"]["less"]["expected"] == 10
+    (pair,) = scenario["comparisons"]
+    assert (pair["a"], pair["b"], pair["distinguishable"]) == ("good", "less", True)
+    difference = scenario["plans"]["good"]["executed"]["mean"] - scenario["plans"]["less"]["executed"]["mean"]
+    assert pair["mean"] == pytest.approx(difference)
+
+
+def test_a_plan_that_breaks_its_fuel_is_refused_or_seen_running_dry(tmp_path: Path) -> None:
+    world = world_file(tmp_path, SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 20"))
+    dry = plan_file(tmp_path, "dry.json", {"uv1": ["base", "p1", "p4", "p3", "p2", "base"]})
+    refused = sva_bench("execute", world, dry, *QUICK, cwd=tmp_path)
+    assert refused.returncode == 3
+    assert "dry.json" in refused.stderr
+    assert "20.000 s" in refused.stderr
+    assert not (tmp_path / "runs").exists()
+    seen = sva_bench("execute", world, dry, *QUICK, "--allow-infeasible", "--json", cwd=tmp_path)
+    assert seen.returncode == 0, seen.stderr
+    for scenario in json.loads(seen.stdout)["scenarios"]:
+        plan = scenario["plans"]["dry"]
+        assert plan["ends"]["out_of_fuel"] == 60
+        assert plan["ledger"]["out_of_fuel"] < 0
+        assert plan["executed"]["mean"] < plan["expected"]
+
+
+@pytest.mark.parametrize("routes", [
+    {"uv1": ["base", "p1", "p1", "base"]}, {"uv1": ["base", "p1", "base", "p2", "base"]}, {"uv1": ["p1", "base"]},
+    {"uv1": ["base", "p1", "base"], "uv2": ["base", "p1", "base"]}, {"uv1": ["base", "p9", "base"]},
+    {"uv9": ["base", "p1", "base"]}])
+def test_a_plan_that_cannot_be_driven_is_refused_even_if_infeasible_ones_are_allowed(
+    routes: dict[str, list[str]], tmp_path: Path
+) -> None:
+    done = sva_bench("execute", world_file(tmp_path), plan_file(tmp_path, "odd.json", routes), "--allow-infeasible",
+                     cwd=tmp_path)
+    assert done.returncode in (2, 3)
+    assert "odd.json" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize("process", [pytest.param("mission", marks=pytest.mark.long), "per_leg"])
+def test_physics_trial_by_trial_equals_rollouts_cut_off(process: str, tmp_path: Path) -> None:
+    tables = []
+    for fidelity in ("rollout", "physics"):
+        done = sva_bench("run", world_file(tmp_path), "--trials", 6, "--rollouts", 2, "--fidelity", fidelity,
+                         "--execute-failure", process, "--scenario", "half", "--out", fidelity, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        (run,) = (tmp_path / fidelity).iterdir()
+        tables.append(pq.read_table(run / "outcomes.parquet").drop_columns(["fidelity"]))
+    assert tables[0].equals(tables[1])  # to the last bit: robots are independent
