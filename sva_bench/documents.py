@@ -60,7 +60,7 @@ class Document:
         if self._root is None:  # JSON: composed only now, since ruamel is slow on large matrices
             try:
                 self._root = _compose(self._text)
-            except YAMLError:
+            except (YAMLError, RecursionError, ValueError, OverflowError):
                 return None
         if self._root is None:
             return None
@@ -84,7 +84,8 @@ def dotted(loc: Loc) -> str:
     """``("map", "obstacles", 2)`` as ``map.obstacles[2]``."""
     text = ""
     for part in loc:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+        word = part if isinstance(part, int) or (part.isprintable() and len(part) <= 64) else _shown(part)
+        text += f"[{word}]" if isinstance(part, int) else f".{word}" if text else str(word)
     return text
 
 
@@ -104,6 +105,8 @@ def read_yaml(path: Path) -> Document:
         raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}") from None
     except RecursionError:
         raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
+    except (ValueError, OverflowError):
+        raise BadFile(path, None, "", "not valid YAML: an escape that is no character") from None
     if root is None:
         raise BadFile(path, 1, "", "the file is empty")
     return Document(path, _plain(root, path, ()), text, root)
@@ -122,22 +125,38 @@ def read_json(path: Path) -> Document:
         if len(found) < len(pairs):
             keys = [key for key, _ in pairs]
             key = next(key for key in keys if keys.count(key) > 1)
-            raise BadFile(path, _last_line_of(text, f'"{key}"'), key, "this key stands twice; remove one")
+            raise BadFile(path, _last_line_of(text, f'"{key}"'), dotted((key,)), "this key stands twice; remove one")
         return found
 
     def refuse(constant: str) -> float:
         raise BadFile(path, _last_line_of(text, constant), "", f"{constant} is not a number that JSON or we know; "
                       "use null where there is none")
 
+    def finite(literal: str) -> float:
+        number = float(literal)
+        return number if math.isfinite(number) else refuse(literal[:40])
+
     try:
-        data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+        data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
     except json.JSONDecodeError as error:
         raise BadFile(path, error.lineno, "", f"not valid JSON: {error.msg} (column {error.colno})") from None
     except RecursionError:
-        raise BadFile(path, None, "", "nested too deeply") from None
+        raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
     except ValueError as error:  # an integer of more than 4300 digits
         raise BadFile(path, None, "", f"not valid JSON: {error}") from None
+    if _deeper_than(data, MAX_DEPTH):
+        raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels")
     return Document(path, data, text)
+
+
+def _deeper_than(data: Any, levels: int) -> bool:
+    layer = [data]
+    for _ in range(levels):
+        layer = [value for item in layer for value in (item.values() if isinstance(item, dict) else item)
+                 if isinstance(value, dict | list)] if isinstance(data, dict | list) else []
+        if not layer:
+            return False
+    return True
 
 
 def validate(document: Document, schema: type[SectionT], kind: str) -> SectionT:
@@ -166,7 +185,7 @@ def check_kind(document: Document, kind: str) -> None:
     if found is None:
         raise document.error((), f"the key 'format' is missing; add 'format: {kind}'")
     if found != kind:
-        raise document.error(("format",), f"expected {kind!r}, found {found!r}")
+        raise document.error(("format",), f"expected {kind!r}, found {_shown(found)}")
 
 
 def _first_complaint(document: Document, schema: type[BaseModel], error: ValidationError) -> BadFile:
@@ -178,8 +197,9 @@ def _first_complaint(document: Document, schema: type[BaseModel], error: Validat
         key = str(detail["loc"][-1])
         known = _keys_at(schema, detail["loc"][:-1])
         if key in known:  # of another alternative
-            return document.error(loc, f"the key {key!r} doesn't go with the other keys here; remove one or the other")
-        return document.error(loc, f"unknown key {key!r}; {nearest(key, known)}")
+            return document.error(
+                loc, f"the key {_shown(key)} doesn't go with the other keys here; remove one or the other")
+        return document.error(loc, f"unknown key {_shown(key)}; {nearest(key, known)}")
     if detail["type"] == "missing":
         return document.error(loc, f"the key {detail['loc'][-1]!r} is missing; add it")
     if detail["type"] == "string_pattern_mismatch":
@@ -346,14 +366,20 @@ def _scalar(node: Node, path: Path, loc: Loc) -> Any:
     text, kind = str(node.value), str(node.tag).rpartition(":")[2]
     if not str(node.tag).startswith("tag:yaml.org,2002:") or kind not in _SCALARS:
         raise BadFile(path, node.start_mark.line + 1, dotted(loc),
-                      f"the tag {node.tag} is not allowed; write a plain value")
+                      f"the tag {_shown(str(node.tag))} is not allowed; write a plain value")
     try:
         value = _SCALARS[kind](text)
     except (ValueError, OverflowError):
         raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"{_shown(text)} is no valid {kind}") from None
     if isinstance(value, float) and not math.isfinite(value):
-        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"expected a finite number, found {text}")
+        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"expected a finite number, found {_shown(text)}")
     return value
+
+
+def _whole(text: str) -> int:
+    if len(text) > 400:  # far beyond any float, and Python prints none of more than 4300 digits
+        raise ValueError(text)
+    return int(text, 0) if text[:2].lower() in ("0x", "0o") else int(text)
 
 
 def _number(text: str) -> float:
@@ -365,7 +391,7 @@ _SCALARS: dict[str, Callable[[str], Any]] = {
     "timestamp": str,
     "null": lambda _: None,
     "bool": lambda text: text.lower() == "true",
-    "int": lambda text: int(text, 0) if text[:2].lower() in ("0x", "0o") else int(text),
+    "int": _whole,
     "float": _number,
 }
 

@@ -46,7 +46,10 @@ class BadFile(SvaBenchError):
 
 def nearest(word: str, candidates: list[str]) -> str:
     """A hint that names the valid word closest to ``word``, or all of them when none is close."""
-    close = get_close_matches(word, candidates, n=1, cutoff=0.5)
+    close = get_close_matches(word[:200], candidates, n=1, cutoff=0.5)
     if close:
         return f"did you mean {close[0]!r}?"
-    return f"known: {', '.join(sorted(candidates))}" if candidates else "none is defined"
+    known = sorted(candidates)
+    if len(known) > 12:
+        return f"known: {', '.join(known[:10])} and {len(known) - 10} more"
+    return f"known: {', '.join(known)}" if known else "none is defined"

@@ -130,7 +130,7 @@ def test_dates_and_words_of_old_yaml_stay_text(tmp_path: Path) -> None:
     ('{"a": 1,\n "b": -Infinity}', 2, "-Infinity is not a number"),
     ('{"a": 1,\n "b" 2}', 2, "not valid JSON"),
     ("", 1, "not valid JSON"),
-    ("[" * 100_000, None, "nested too deeply"),
+    ("[" * 100_000, None, "nested deeper than 32"),
     ('{"a": ' + "9" * 5000 + "}", None, "not valid JSON"),
 ])
 def test_json_has_the_same_rules(tmp_path: Path, text: str, line: int | None, says: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
@@ -10,28 +11,31 @@ from sva_bench.documents import Bounded, Name, Number, Positive, Probability, Se
 from sva_bench.mission.failures import FailureProcess
 
 KIND = "sva-bench/world@1"
-Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
+Size = Annotated[Positive, Field(ge=1e-6, le=1e5)]  # physics knows nothing smaller
+Angle = Annotated[Number, Field(ge=-1e6, le=1e6)]
+Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 
 
 class Box(Section):
     box: Point
-    size_m: Annotated[list[Positive], Field(min_length=2, max_length=2)]
-    yaw_deg: Number = 0.0
+    size_m: Annotated[list[Size], Field(min_length=2, max_length=2)]
+    yaw_deg: Angle = 0.0
 
 
 class Cylinder(Section):
     cylinder: Point
-    radius_m: Positive
+    radius_m: Size
 
 
 class Wall(Section):
     wall: Annotated[list[Point], Field(min_length=2, max_length=2)]
-    thickness_m: Positive = 0.1
+    thickness_m: Size = 0.1
 
     @field_validator("wall")
     @classmethod
     def _has_a_length(cls, ends: list[list[float]]) -> list[list[float]]:
-        if ends[0] == ends[1]:
+        if math.dist(ends[0], ends[1]) < 1e-6:
             raise ValueError("both ends of the wall are the same point")
         return ends
 
@@ -59,7 +63,7 @@ _EMPTY_IS_NONE = BeforeValidator(lambda value: {} if value is None else value)  
 
 class SiteEntry(Section):
     at_m: Point
-    heading_deg: Number | None = None
+    heading_deg: Angle | None = None
     stop_s: Bounded = 0.0
 
 
@@ -98,7 +102,7 @@ class Drawn(Section):
 
 
 class RobotEntry(Section):
-    model: str | Figures
+    model: Name | Figures
     fuel_capacity_s: Bounded | None = None
     mission_limit_s: Bounded | None = None
     availability: Probability = 1.0

@@ -118,7 +118,7 @@ def test_each_complaint_names_line_and_key(tmp_path: Path, old: str, new: str, k
      "greater than or equal to 0"),
     ("incentives: {p1: 10, p2: 20, p3: 30, p4: 40}", "incentives: {uniform: [5, 1], seed: 0}",
      "robots.uv1.incentives.uniform", "expected [low, high]"),
-    ("size_m: [1.2, 0.5]", "size_m: [1.2, 0]", "map.shapes.obstacles[1].size_m[1]", "greater than 0"),
+    ("size_m: [1.2, 0.5]", "size_m: [1.2, 0]", "map.shapes.obstacles[1].size_m[1]", "greater than"),
     ("[[3.0, 0.0], [3.0, 2.6]]", "[[3.0, 0.0], [3.0, 0.0]]", "map.shapes.obstacles[0].wall", "the same point"),
     ("name: small\n", "name: small\nfailure: {plan: mission, execute: never}\n", "failure.execute",
      "'mission' or 'per_leg'"),
