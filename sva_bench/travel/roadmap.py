@@ -139,11 +139,14 @@ def _state(si: Any, point: Sequence[float] | FloatArray) -> Any:
 def _prmstar(
     obstacles: Obstacles, points: FloatArray, clearance_m: float, milestones: int
 ) -> list[list[FloatArray | None]]:
+    if len(points) < 2:
+        return [[None] for _ in points]
     si, _ = _space(obstacles, clearance_m)
     samples = roadmap_samples(obstacles, clearance_m, milestones)
     si.setValidStateSamplerAllocator(lambda inner: _SampleQueue(inner, samples))
     problem = ob.ProblemDefinition(si)
-    for point in points:
+    # Each site once: of two vertices in one place, chance decides which gets an edge.
+    for point in points[1:]:
         problem.addStartState(_state(si, point))
     problem.setGoalState(_state(si, points[0]))
     planner = og.PRMstar(si)
@@ -181,7 +184,13 @@ def _read_roadmap(si: Any, planner: Any) -> tuple[FloatArray, csr_array]:
         neighbours = data.getEdges(k)
         rows += [k] * len(neighbours)
         columns += neighbours
-    heads, tails = np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64)
+    # OMPL numbers vertices by where they lie in memory, and ties between equally short paths go by number:
+    # by their coordinates instead, the same roadmap always gives the same paths.
+    order = np.lexsort(vertices.T)
+    number = np.empty(count, dtype=np.int64)
+    number[order] = np.arange(count)
+    vertices = vertices[order]
+    heads, tails = number[np.array(rows, dtype=np.int64)], number[np.array(columns, dtype=np.int64)]
     length = np.maximum(np.hypot(*(vertices[heads] - vertices[tails]).T), 1e-12)  # a stored 0 would be no edge
     return vertices, csr_array((length, (heads, tails)), shape=(count, count))
 
