@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, replace
@@ -152,7 +151,6 @@ def _measure_all(units: Iterable[Unit], executor: Executor | None) -> Iterable[t
 
 
 def _measure(unit: Unit) -> Measured:
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     return measure(unit.world, unit.options, None, lambda *_: None)
 
 

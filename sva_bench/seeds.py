@@ -10,12 +10,11 @@ from sva_bench.arrays import FloatArray
 
 
 class Stream(IntEnum):
-    """What a stream is for. Append only: a number keeps its meaning for good."""
+    """What a stream is for. Append only: a number keeps its meaning for good, and none is given twice."""
 
     FAILURE = 0
     NOISE = 1
     INCENTIVE = 2
-    ROADMAP = 3
     JOINT_FAILURE = 4
 
 

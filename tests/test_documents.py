@@ -13,8 +13,8 @@ from pydantic import Field
 
 from sva_bench.documents import (
     MAX_YAML_BYTES,
+    Bounded,
     Name,
-    NonNegative,
     Section,
     dotted,
     pretty_json,
@@ -26,7 +26,7 @@ from sva_bench.errors import BadFile, ExitCode, nearest
 
 
 class Part(Section):
-    size_m: NonNegative
+    size_m: Bounded
     label: str = "none"
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, World
 
 Fidelity = Literal["kinematic", "rollout", "physics"]
-FIDELITIES: tuple[Fidelity, ...] = get_args(Fidelity)
 TRACE_HZ = 20.0
 
 Hop = tuple[Stretch, ...]
@@ -249,11 +247,7 @@ def _key(settings: Settings, order: Assignment, trial: int, fails_before: int) -
 
 
 def _legs(costs: FuelCosts, route: Route) -> tuple[Leg, ...]:
-    legs = []
-    for origin, destination in itertools.pairwise(route):
-        chain = costs.chain(origin, destination)
-        legs.append(tuple(costs.times.course(a, b) for a, b in itertools.pairwise(chain)))
-    return tuple(legs)
+    return tuple(tuple(costs.times.course(a, b) for a, b in pairwise(costs.chain(*leg))) for leg in pairwise(route))
 
 
 def _drive_all(
@@ -309,7 +303,7 @@ def _settle_all(
         traces.append(_trace(world, costs[world.robots[number].model.name], order, _drive_of(drives, key),
                              settled[key, failed]))
     return Executed(
-        case=case, rollout=rollout, available=fails == np.iinfo(np.int64).max, incentive=incentive, pois_reached=pois,
+        case=case, rollout=rollout, available=fails == NEVER, incentive=incentive, pois_reached=pois,
         stops_reached=stops, end=end, end_time_s=end_time, fuel_used_s=fuel,
         planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
         legs=tuple(_leg_times(world, costs, mine)), traces=tuple(traces))

@@ -11,12 +11,11 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.mission.failures import NEVER
+from sva_bench.mission.instance import TOLERANCE_S
 
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
 EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]
-
-TOLERANCE_S = 1e-6  # feasibility tolerance, the same as the planner's
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -181,11 +181,8 @@ class Simulator:
 
 def obstacles_urdf(obstacles: Obstacles) -> str:
     """All obstacles, and the walls about the bounds, as one link of a URDF."""
-    x0, y0, x1, y1 = obstacles.bounds_m.tolist()
-    cx, cy, hx, hy, t = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2, _WALL_M / 2
-    boxes = [(x0 - t, cy, t, hy + 2 * t, 0.0), (x1 + t, cy, t, hy + 2 * t, 0.0), (cx, y0 - t, hx + 2 * t, t, 0.0),
-             (cx, y1 + t, hx + 2 * t, t, 0.0), *obstacles.boxes.tolist()]
-    solids = [(x, y, yaw, f'<box size="{2 * a!r} {2 * b!r} {_HEIGHT_M}"/>') for x, y, a, b, yaw in boxes]
+    solids = [(x, y, yaw, f'<box size="{2 * a!r} {2 * b!r} {_HEIGHT_M}"/>')
+              for x, y, a, b, yaw in obstacles.walled(_WALL_M).boxes.tolist()]
     solids += [(x, y, 0.0, f'<cylinder radius="{r!r}" length="{_HEIGHT_M}"/>')
                for x, y, r in obstacles.cylinders.tolist()]
     # A solid a line: the reader cuts longer ones.

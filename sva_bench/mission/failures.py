@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.seeds import Stream, uniforms
 
 FailureProcess = Literal["mission", "per_leg"]
-FAILURE_PROCESSES: tuple[FailureProcess, ...] = get_args(FailureProcess)
 
 NEVER = np.iinfo(np.int64).max
 """Number of the POI before which a robot that doesn't fail would fail."""

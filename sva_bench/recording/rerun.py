@@ -19,8 +19,8 @@ from rerun.experimental import ViewerClient
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.outcome import Trace
-from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Solids, Story, story_of
-from sva_bench.world.model import World
+from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Story, story_of
+from sva_bench.world.model import Obstacles, World
 
 TIMELINE = "sim_time"
 
@@ -142,7 +142,7 @@ def _pale(color: Color) -> Color:
     return r, g, b
 
 
-def _write_solids(recording: rr.RecordingStream, solids: Solids) -> None:
+def _write_solids(recording: rr.RecordingStream, solids: Obstacles) -> None:
     x0, y0, x1, y1 = solids.bounds_m.tolist()
     _constant(recording, "world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     _constant(recording, "world/floor", rr.Boxes3D(
@@ -159,7 +159,7 @@ def _write_solids(recording: rr.RecordingStream, solids: Solids) -> None:
             lengths=[_OBSTACLE_M] * len(solids.cylinders), colors=[_WALLS], fill_mode="solid"))
 
 
-def _write_marks(recording: rr.RecordingStream, marks: Marks, solids: Solids) -> None:
+def _write_marks(recording: rr.RecordingStream, marks: Marks, solids: Obstacles) -> None:
     """Sites as plates on the floor: POIs round, stations square, the base a square on its corner."""
     x0, y0, x1, y1 = solids.bounds_m.tolist()
     half, thick = max(0.3, max(x1 - x0, y1 - y0) / 60), 0.02  # large enough to be seen in a large world

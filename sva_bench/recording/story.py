@@ -42,26 +42,6 @@ _MARGIN = 0.07  # of the view, left free at its edges
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Solids:
-    """What stands in the world, walls about the bounds included.
-
-    Attributes:
-        bounds_m: x_min, y_min, x_max, y_max; shape (4,).
-        boxes: Centre x, y, half length, half width [m], yaw [rad]; shape (k, 5).
-        cylinders: Centre x, y, radius [m]; shape (c, 3).
-    """
-
-    bounds_m: FloatArray
-    boxes: FloatArray
-    cylinders: FloatArray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "bounds_m", frozen(self.bounds_m, (4,)))
-        object.__setattr__(self, "boxes", frozen(self.boxes, (None, 5)))
-        object.__setattr__(self, "cylinders", frozen(self.cylinders, (None, 3)))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
 class Marks:
     """The sites of one kind.
 
@@ -163,7 +143,7 @@ class Story:
     title: str
     world: str
     duration_s: float
-    solids: Solids
+    solids: Obstacles
     marks: tuple[Marks, ...]
     cast: tuple[Cast, ...]
     total: Series
@@ -199,7 +179,7 @@ def story_of(world: World, traces: Sequence[Trace], title: str) -> Story:
     gains = [_gains(trace) for trace in traces]
     eye, target = _eye(world.obstacles.bounds_m)
     return Story(
-        title=title, world=world.name, duration_s=duration_s, solids=_solids(world.obstacles),
+        title=title, world=world.name, duration_s=duration_s, solids=world.obstacles.walled(_WALL_M),
         marks=_marks(world.sites, traces, colors), cast=cast,
         total=_staircase(np.concatenate(gains), duration_s), log=_log(traces, colors), eye_m=eye, target_m=target)
 
@@ -243,15 +223,6 @@ def corners(time_s: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore"):  # two jumps in a row: inf - inf is no corner to leave out
         kept[1:-1] = ~(np.abs(np.diff(slopes)) <= _SLOPE_TOLERANCE)
     return kept
-
-
-def _solids(obstacles: Obstacles) -> Solids:
-    x0, y0, x1, y1 = obstacles.bounds_m.tolist()
-    cx, cy, hx, hy, t = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2, _WALL_M / 2
-    walls = [[cx, y0 - t, hx + 2 * t, t, 0.0], [cx, y1 + t, hx + 2 * t, t, 0.0],
-             [x0 - t, cy, t, hy, 0.0], [x1 + t, cy, t, hy, 0.0]]
-    return Solids(bounds_m=obstacles.bounds_m, boxes=np.concatenate([walls, obstacles.boxes]),
-                  cylinders=obstacles.cylinders)
 
 
 def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[Marks, ...]:

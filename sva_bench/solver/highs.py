@@ -42,7 +42,6 @@ class Relaxation:
 
     def __init__(self, model: LinearModel) -> None:
         self._solver = _open(model)
-        self._columns = len(model.objective)
 
     def add(self, rows: Rows) -> None:
         """Add rows; the next solve starts from the last basis."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.mission.failures import FailureProcess, JointState
@@ -31,6 +33,14 @@ class Obstacles:
         object.__setattr__(self, "bounds_m", frozen(self.bounds_m, (4,)))
         object.__setattr__(self, "boxes", frozen(self.boxes, (None, 5)))
         object.__setattr__(self, "cylinders", frozen(self.cylinders, (None, 3)))
+
+    def walled(self, thickness_m: float) -> Obstacles:
+        """The same, with the walls about the bounds as boxes, the first four."""
+        x0, y0, x1, y1 = self.bounds_m.tolist()
+        cx, cy, hx, hy, t = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2, thickness_m / 2
+        walls = [(x0 - t, cy, t, hy + 2 * t, 0.0), (x1 + t, cy, t, hy + 2 * t, 0.0),
+                 (cx, y0 - t, hx + 2 * t, t, 0.0), (cx, y1 + t, hx + 2 * t, t, 0.0)]
+        return replace(self, boxes=np.concatenate([walls, self.boxes]))
 
 
 @dataclass(frozen=True, kw_only=True)
