@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -18,7 +19,6 @@ from sva_bench.analysis.summary import Judged, ScenarioResult, comparison_summar
 from sva_bench.errors import ExitCode, SvaBenchError
 from sva_bench.execution.execute import Case, Executed, Fidelity, Settings, execute
 from sva_bench.mission.certify import certify
-from sva_bench.mission.failures import route_value
 from sva_bench.mission.instance import Instance, Vehicle, write_instance
 from sva_bench.mission.plan import Plan, read_plan, write_plan
 from sva_bench.recording.rerun import record
@@ -46,6 +46,8 @@ from sva_bench.travel.roadmap import PlannerName
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.load import world_as_dict
 from sva_bench.world.model import Scenario, World
+
+_log = logging.getLogger(__name__)
 
 NOMINAL = "nominal"
 """The scenario of the availabilities under ``robots:``."""
@@ -168,8 +170,9 @@ def execute_plans(
     runs, instances = _by_stem(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
     robots, entries = [robot.name for robot in world.robots], []
     for scenario in world.scenarios:
-        truth = replace(instances[scenario.name], failure=world.execute_failure)
-        judged = [Judged(expected=closed_form(truth, plan), executed=runs[f"{scenario.name}-{name}"])
+        # What the routes are worth if fuel and limits allow them: an infeasible plan may be here to be seen failing.
+        truth = _unlimited(replace(instances[scenario.name], failure=world.execute_failure))
+        judged = [Judged(expected=expected_value(truth, plan), executed=runs[f"{scenario.name}-{name}"])
                   for name, plan in plans.items()]
         entries.append(comparison_summary(judged, robots, noisy=not world.noise.silent))
     summary = _head(world, options, settings, costs) | {"reproducible": True, "scenarios": entries}
@@ -199,16 +202,22 @@ def read_plans(
         InfeasiblePlan: If a plan cannot be driven; or breaks fuel or limit, and that isn't allowed.
     """
     instance = instance_of(world, costs, nominal_scenario(world))
-    unlimited = replace(instance, vehicles=tuple(
-        replace(v, fuel_capacity_s=np.inf, mission_limit_s=np.inf) for v in instance.vehicles))
+    if allow_infeasible:
+        instance = _unlimited(instance)
     plans = {}
     for path in paths:
         plan = read_plan(path, instance)
-        certificate = certify(unlimited if allow_infeasible else instance, replace(plan, value=None))
+        certificate = certify(instance, replace(plan, value=None))
         if not certificate.feasible:
             raise InfeasiblePlan(path, certificate.reasons)
         plans[path.stem] = plan
     return plans
+
+
+def _unlimited(instance: Instance) -> Instance:
+    """The instance with all the fuel and time in the world."""
+    return replace(instance, vehicles=tuple(
+        replace(v, fuel_capacity_s=np.inf, mission_limit_s=np.inf) for v in instance.vehicles))
 
 
 class InfeasiblePlan(SvaBenchError):
@@ -293,12 +302,13 @@ def plan_scenarios(
     world: World, costs: Mapping[str, FuelCosts], options: Options, progress: Progress
 ) -> dict[str, Planned]:
     """Both plans of each scenario. Scenarios share what doesn't depend on availabilities."""
+    if world.plan_failure == "per_leg":  # the summary says mission too
+        _log.warning("%s: there is no exact solver for per_leg failures yet: plans are made under mission", world.name)
     known: Knowledge | None = None
     nominal: Plan | None = None
     planned: dict[str, Planned] = {}
     for number, scenario in enumerate(world.scenarios):
         progress("solving", number, len(world.scenarios))
-        # There is no exact solver for per_leg yet: such worlds are planned under mission, and the summary says so.
         instance = replace(instance_of(world, costs, scenario), failure="mission")
         if known is None or nominal is None:
             known = knowledge_of(instance)
@@ -321,16 +331,6 @@ def expected_value(instance: Instance, plan: Plan) -> float:
     if certificate.expected is None:
         raise RuntimeError(f"a plan for {instance.name} fails its check: {'; '.join(certificate.reasons)}")
     return certificate.expected
-
-
-def closed_form(instance: Instance, plan: Plan) -> float:
-    """Closed-form value of a plan, feasible or not: as if fuel and limits allowed it."""
-    value = 0.0
-    for vehicle in instance.vehicles:
-        sites = [instance.sites.index(name) for name in plan.route(vehicle.name)]
-        earned = [float(vehicle.incentives[site]) for site in sites if site in instance.pois]
-        value += route_value(earned, vehicle.availability, instance.failure)
-    return value
 
 
 def summarise(

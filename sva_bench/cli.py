@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
-import errno
 import logging
-import os
-import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
-from typer.exceptions import TyperException
 
 from sva_bench import __version__
-from sva_bench.errors import BadInput, ExitCode, SvaBenchError, nearest
+from sva_bench.errors import BadInput, ExitCode
+from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import (
     AsJson,
     ExecuteFailure,
-    FidelityChoice,
+    FailureProcess,
     FidelityOption,
     Gap,
     MarginOption,
-    MethodChoice,
-    ObjectiveChoice,
+    Method,
+    Objective,
     Out,
-    PlannerChoice,
     PlannerOption,
-    ProcessChoice,
     Rollouts,
     ScenarioNames,
     Seed,
@@ -52,9 +45,6 @@ from sva_bench.terminal import (
 )
 from sva_bench.workers import local_workers
 
-if TYPE_CHECKING:
-    from sva_bench.world.model import World
-
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
     help="What is a multi-robot mission plan worth when robots fail? Plans missions, executes them in physics with "
@@ -66,7 +56,6 @@ world_app = typer.Typer(no_args_is_help=True, help="Check worlds.", rich_markup_
 app.add_typer(world_app, name="world")
 
 log = logging.getLogger(__name__)
-_NO_PER_LEG = "there is no exact solver for per_leg failures yet: plans are made under mission"
 
 
 @app.command()
@@ -75,11 +64,11 @@ def run(
     seed: Seed = 0,
     trials: Trials = 1000,
     rollouts: Rollouts = 8,
-    fidelity: FidelityOption = FidelityChoice.rollout,
-    planner: PlannerOption = PlannerChoice.prmstar,
+    fidelity: FidelityOption = "rollout",
+    planner: PlannerOption = "prmstar",
     scenario: ScenarioNames = None,
     margin: MarginOption = None,
-    plan_failure: Annotated[ProcessChoice | None, typer.Option(help="Failure process that plans are made for.",
+    plan_failure: Annotated[FailureProcess | None, typer.Option(help="Failure process that plans are made for.",
                                                                show_default="the world's")] = None,
     execute_failure: ExecuteFailure = None,
     time_limit: TimeLimit = None,
@@ -95,18 +84,20 @@ def run(
 
     Writes a run folder with travel times, instances, plans, outcomes, recordings and a summary.
     """
-    set_up_logging(verbose)
-    loaded = _loaded(world, scenario, margin, plan_failure, execute_failure)
-    # After the world is read: an error in the file is said at once.
-    from sva_bench.bench import Options
-    from sva_bench.bench import run as run_bench
-    from sva_bench.solver.two_stage import SolveLimits
+    with holding_back_ctrl_c():
+        from sva_bench.inputs import about, load
 
-    if loaded.plan_failure == "per_leg":
-        log.warning(_NO_PER_LEG)
-    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
+    set_up_logging(verbose)
+    loaded = load(world, scenario, margin, plan_failure, execute_failure)
+    # After the world is read: an error in the file is said at once.
+    with holding_back_ctrl_c():
+        from sva_bench.bench import Options
+        from sva_bench.bench import run as run_bench
+        from sva_bench.solver.two_stage import SolveLimits
+
+    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi)
-    with _about(world), progress_bars() as progress, local_workers(workers) as executor:
+    with about(world), progress_bars() as progress, local_workers(workers) as executor:
         result = run_bench(loaded, options, out, executor, progress)
     _show(result.summary, result.folder, as_json)
 
@@ -118,16 +109,18 @@ def times(
                                                 "output.", show_default=False)] = None,
     scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario; default: those under "
                                                       "robots.", show_default=False)] = None,
-    planner: PlannerOption = PlannerChoice.prmstar,
+    planner: PlannerOption = "prmstar",
     margin: MarginOption = None,
     verbose: Verbose = False,
 ) -> None:
     """Plan travel times and repair them into fuel costs: an instance for any solver."""
-    from sva_bench.mission.instance import instance_text
+    with holding_back_ctrl_c():
+        from sva_bench.inputs import instance_of_world
+        from sva_bench.mission.instance import instance_text
 
     set_up_logging(verbose)
     with progress_bars() as progress:
-        instance = _instance_of_world(world, scenario, planner.value, margin, progress)
+        instance = instance_of_world(world, scenario, planner, margin, progress)
     write_result(output, instance_text(instance))
 
 
@@ -137,9 +130,9 @@ def plan(
                                            show_default=False)],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Plan file to write; default: standard output.",
                                                 show_default=False)] = None,
-    objective: Annotated[ObjectiveChoice, typer.Option(help="Plan for failures, or take every robot as "
-                                                            "available.")] = ObjectiveChoice.stochastic,
-    method: Annotated[MethodChoice, typer.Option(help="Solution method; auto chooses.")] = MethodChoice.auto,
+    objective: Annotated[Objective, typer.Option(help="Plan for failures, or take every robot as "
+                                                            "available.")] = "stochastic",
+    method: Annotated[Method, typer.Option(help="Solution method; auto chooses.")] = "auto",  # noqa: ARG001 - one so far
     scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
                                                       "under robots.", show_default=False)] = None,
     time_limit: TimeLimit = None,
@@ -147,18 +140,19 @@ def plan(
     verbose: Verbose = False,
 ) -> None:
     """Make one plan, proved optimal unless a limit stops it."""
-    from sva_bench.documents import pretty_json
-    from sva_bench.mission.instance import read_instance
-    from sva_bench.mission.plan import plan_as_dict
-    from sva_bench.solver.two_stage import SolveLimits, plan_deterministic, plan_stochastic
+    with holding_back_ctrl_c():
+        from sva_bench.documents import pretty_json
+        from sva_bench.inputs import instance_of_world
+        from sva_bench.mission.instance import read_instance
+        from sva_bench.mission.plan import plan_as_dict
+        from sva_bench.solver.two_stage import SolveLimits, plan_deterministic, plan_stochastic
 
     set_up_logging(verbose)
-    assert method in MethodChoice  # one method so far: auto means expected
     with progress_bars() as progress:
         if source.suffix.lower() in (".yaml", ".yml"):
-            instance = _instance_of_world(source, scenario, "prmstar", None, progress)
+            instance = instance_of_world(source, scenario, "prmstar", None, progress)
             if instance.failure == "per_leg":
-                log.warning(_NO_PER_LEG)
+                log.warning("there is no exact solver for per_leg failures yet: the plan is made under mission")
                 instance = replace(instance, failure="mission")
         elif scenario is not None:
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
@@ -166,7 +160,7 @@ def plan(
             instance = read_instance(source)
         progress("solving", 0, 1)
         limits = SolveLimits(time_limit_s=time_limit, gap=gap)
-        if objective is ObjectiveChoice.stochastic:
+        if objective == "stochastic":
             made = plan_stochastic(instance, limits)
         else:
             stochastic = plan_stochastic(replace(instance, failure="mission"), limits)
@@ -190,9 +184,10 @@ def certify(
 
     Exits with 3 if it is infeasible.
     """
-    from sva_bench.mission.certify import certify as check
-    from sva_bench.mission.instance import read_instance
-    from sva_bench.mission.plan import read_plan
+    with holding_back_ctrl_c():
+        from sva_bench.mission.certify import certify as check
+        from sva_bench.mission.instance import read_instance
+        from sva_bench.mission.plan import read_plan
 
     problem = read_instance(instance)
     certificate = check(problem, read_plan(plan, problem))
@@ -218,8 +213,8 @@ def execute(
     seed: Seed = 0,
     trials: Trials = 1000,
     rollouts: Rollouts = 8,
-    fidelity: FidelityOption = FidelityChoice.rollout,
-    planner: PlannerOption = PlannerChoice.prmstar,
+    fidelity: FidelityOption = "rollout",
+    planner: PlannerOption = "prmstar",
     scenario: ScenarioNames = None,
     margin: MarginOption = None,
     execute_failure: ExecuteFailure = None,
@@ -232,17 +227,21 @@ def execute(
 
     Exits with 3 if a plan is infeasible, unless it is allowed.
     """
+    with holding_back_ctrl_c():
+        from sva_bench.inputs import about, load
+
     set_up_logging(verbose)
-    loaded = _loaded(world, scenario, margin, None, execute_failure)
-    from sva_bench.bench import Options, execute_plans, plan_costs, read_plans
+    loaded = load(world, scenario, margin, execute_failure=execute_failure)
+    with holding_back_ctrl_c():
+        from sva_bench.bench import Options, execute_plans, plan_costs, read_plans
 
     names = [path.stem for path in plans]
     for path in plans:
         if names.count(path.stem) > 1:
             raise BadInput(f"{path}: there is another plan named {path.stem!r}; file names must differ")
-    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value)
-    with _about(world), progress_bars() as progress:
-        costs = plan_costs(loaded, planner.value, progress)
+    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
+    with about(world), progress_bars() as progress:
+        costs = plan_costs(loaded, planner, progress)
         read = read_plans(loaded, costs, plans, allow_infeasible=allow_infeasible)
         with local_workers(workers) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
@@ -256,8 +255,8 @@ def batch(
                                                    show_default="0")] = None,
     trials: Trials = 1000,
     rollouts: Rollouts = 8,
-    fidelity: FidelityOption = FidelityChoice.rollout,
-    planner: PlannerOption = PlannerChoice.prmstar,
+    fidelity: FidelityOption = "rollout",
+    planner: PlannerOption = "prmstar",
     scenario: ScenarioNames = None,
     margin: MarginOption = None,
     execute_failure: ExecuteFailure = None,
@@ -271,14 +270,18 @@ def batch(
     verbose: Verbose = False,
 ) -> None:
     """Monte Carlo over many worlds: a shard of outcomes for each, and the VSS over maps."""
+    with holding_back_ctrl_c():
+        from sva_bench.inputs import load
+
     set_up_logging(verbose)
-    loaded = [_loaded(path, scenario, margin, None, execute_failure) for path in worlds]
-    from sva_bench.batch import batch_name, run_batch, settings_of
-    from sva_bench.bench import Options
-    from sva_bench.solver.two_stage import SolveLimits
+    loaded = [load(path, scenario, margin, execute_failure=execute_failure) for path in worlds]
+    with holding_back_ctrl_c():
+        from sva_bench.batch import batch_name, run_batch, settings_of
+        from sva_bench.bench import Options
+        from sva_bench.solver.two_stage import SolveLimits
 
     seeds = list(dict.fromkeys(seed or [0]))
-    options = Options(trials=trials, rollouts=rollouts, fidelity=fidelity.value, planner=planner.value,
+    options = Options(trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap))
     folder = out or Path("runs") / batch_name(settings_of(loaded, seeds, options))
     with progress_bars() as progress, local_workers(workers) as executor:
@@ -302,7 +305,8 @@ def view(
                                              show_default="the end")] = None,
 ) -> None:
     """Open recordings in the Rerun viewer."""
-    from sva_bench.recording.viewer import view as open_viewer
+    with holding_back_ctrl_c():
+        from sva_bench.recording.viewer import view as open_viewer
 
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
@@ -310,16 +314,20 @@ def view(
 @world_app.command("check")
 def check_world(
     world: WorldArgument,
-    planner: PlannerOption = PlannerChoice.prmstar,
+    planner: PlannerOption = "prmstar",
     verbose: Verbose = False,
 ) -> None:
     """Check a world: is the file right, does every robot reach every site, and what can't be part of any plan?"""
-    set_up_logging(verbose)
-    loaded = _loaded(world, None, None, None, None)
-    from sva_bench.bench import out_of_reach, plan_costs
+    with holding_back_ctrl_c():
+        from sva_bench.inputs import about, load
 
-    with _about(world), progress_bars() as progress:
-        costs = plan_costs(loaded, planner.value, progress)
+    set_up_logging(verbose)
+    loaded = load(world)
+    with holding_back_ctrl_c():
+        from sva_bench.bench import out_of_reach, plan_costs
+
+    with about(world), progress_bars() as progress:
+        costs = plan_costs(loaded, planner, progress)
     console = results()
     for cost in costs.values():
         longest = int(cost.repaired_ms.max()) / 1000
@@ -336,7 +344,8 @@ def check_world(
 @world_app.command("schema")
 def world_schema() -> None:
     """Print the JSON schema of world files, for editors."""
-    from sva_bench.world.schema import WorldFile
+    with holding_back_ctrl_c():
+        from sva_bench.world.schema import WorldFile
 
     print_json(WorldFile.model_json_schema())
 
@@ -349,96 +358,9 @@ def _main(version: Annotated[bool, typer.Option("--version", help="Print the ver
         raise typer.Exit
 
 
-def run_command_line(arguments: Sequence[str]) -> int:
-    """Run one command and return its exit code; every failure becomes one message on standard error."""
-    try:
-        result = app(list(arguments), standalone_mode=False)
-    except SvaBenchError as error:
-        messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
-        return int(error.exit_code)
-    except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
-        getattr(error, "show", error.format_message)()
-        return error.exit_code
-    except (KeyboardInterrupt, typer.Abort):
-        messages.print("interrupted")
-        return int(ExitCode.INTERRUPTED)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whoever read standard output has gone; say no more
-        return int(ExitCode.DONE)
-    except Exception as error:
-        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
-            messages.print(f"[bold red]error:[/bold red] nothing can be written: {error.strerror}", highlight=False)
-            return int(ExitCode.BAD_INPUT)
-        frame = traceback.extract_tb(error.__traceback__)[-1]
-        messages.print(f"[bold red]fault:[/bold red] {escape(type(error).__name__)}: {escape(str(error))} "
-                       f"({escape(Path(frame.filename).name)}:{frame.lineno})\nThis is a fault of the program or its "
-                       "installation, not of your input: please report it.", highlight=False, soft_wrap=True)
-        log.debug("where it happened", exc_info=True)
-        return int(ExitCode.FAULT)
-    return int(result) if isinstance(result, int) else int(ExitCode.DONE)
-
-
-def _loaded(
-    path: Path, scenarios: Sequence[str] | None, margin: float | None, plan_failure: ProcessChoice | None,
-    execute_failure: ProcessChoice | None,
-) -> World:
-    """The world, as the command line changes it."""
-    from sva_bench.world.load import load_world
-
-    world = load_world(path)
-    if scenarios:
-        world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
-            scenarios, [s.name for s in world.scenarios])))
-    return replace(
-        world, margin=world.margin if margin is None else margin,
-        plan_failure=world.plan_failure if plan_failure is None else plan_failure.value,
-        execute_failure=world.execute_failure if execute_failure is None else execute_failure.value)
-
-
-@contextmanager
-def _about(path: Path) -> Iterator[None]:
-    """What travel says of sites and robots, said of the file and line where they stand."""
-    from sva_bench.documents import read_yaml
-    from sva_bench.travel.times import UnreachableSite
-
-    try:
-        yield
-    except UnreachableSite as error:
-        document = read_yaml(path)
-        name = error.destination
-        kind = next((kind for kind in ("stations", "pois") if name in (document.data["sites"].get(kind) or {})), None)
-        raise document.error(("sites", "base") if kind is None else ("sites", kind, name), str(error)) from None
-
-
 def _show(summary: Any, folder: Path, as_json: bool) -> None:
     if as_json:
         print_json(summary)
     else:
         print_summary(summary)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
-
-
-def _instance_of_world(path: Path, scenario: str | None, planner: Any, margin: float | None,
-                       progress: Callable[[str, int, int], None]) -> Any:
-    from sva_bench.bench import instance_of, nominal_scenario, plan_costs
-    from sva_bench.world.load import load_world
-
-    world = load_world(path)
-    if margin is not None:
-        world = replace(world, margin=margin)
-    chosen = nominal_scenario(world)
-    if scenario is not None:
-        chosen = world.scenario(_known_scenarios([scenario], [s.name for s in world.scenarios])[0])
-    with _about(path):
-        costs = plan_costs(world, planner, progress)
-    for cost in costs.values():
-        messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
-                       f"to {cost.max_excess_pct:.1f} %", highlight=False)
-    return instance_of(world, costs, chosen)
-
-
-def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
-    for name in names:
-        if name not in known:
-            raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
-    return list(dict.fromkeys(names))

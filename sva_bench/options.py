@@ -2,53 +2,22 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
-
-class FidelityChoice(StrEnum):
-    """How plans are executed."""
-
-    kinematic = "kinematic"
-    rollout = "rollout"
-    physics = "physics"
-
-
-class PlannerChoice(StrEnum):
-    """How paths are planned."""
-
-    prmstar = "prmstar"
-    rrtconnect = "rrtconnect"
-
-
-class ProcessChoice(StrEnum):
-    """Failure process."""
-
-    mission = "mission"
-    per_leg = "per_leg"
-
-
-class ObjectiveChoice(StrEnum):
-    """What a plan is made for."""
-
-    stochastic = "stochastic"
-    deterministic = "deterministic"
-
-
-class MethodChoice(StrEnum):
-    """How a plan is made."""
-
-    auto = "auto"
-    expected = "expected"
-
+# Spelt out, not imported: the modules that own them take a second to load, and --help should not.
+Fidelity = Literal["kinematic", "rollout", "physics"]
+Planner = Literal["prmstar", "rrtconnect"]
+Method = Literal["auto", "expected"]
+FailureProcess = Literal["mission", "per_leg"]
+Objective = Literal["stochastic", "deterministic"]
 
 WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-PlannerOption = Annotated[PlannerChoice, typer.Option(help="OMPL planner: one PRM* roadmap, or RRTConnect pair by pair "
+PlannerOption = Annotated[Planner, typer.Option(help="OMPL planner: one PRM* roadmap, or RRTConnect pair by pair "
                                                            "(noisy).")]
 MarginOption = Annotated[float | None, typer.Option(
     min=0, max=1, help="Planning costs are twin times x (1 + margin); default: the world's.", show_default=False)]
@@ -57,11 +26,11 @@ TimeLimit = Annotated[float | None, typer.Option(
 Seed = Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")]
 Trials = Annotated[int, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.")]
 Rollouts = Annotated[int, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod ROLLOUTS.")]
-FidelityOption = Annotated[FidelityChoice, typer.Option(
+FidelityOption = Annotated[Fidelity, typer.Option(
     help="The kinematic twin alone; physics once per route and noise draw; or every trial in physics.")]
 ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",
                                                          show_default="all")]
-ExecuteFailure = Annotated[ProcessChoice | None, typer.Option(help="Failure process that is executed.",
+ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that is executed.",
                                                               show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
+
+from sva_bench.interrupts import holding_back_ctrl_c
 
 
 @contextmanager
@@ -19,14 +20,10 @@ def local_workers(wanted: int | None) -> Iterator[Executor | None]:
         return
     before = set(multiprocessing.active_children())
     executor = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
-    # Workers inherit this, so that Ctrl-C never meets one that is still starting.
-    ours = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        for _ in range(count):  # they start, import and load compiled code while this process plans
-            executor.submit(_warm_up)
-    finally:
-        signal.signal(signal.SIGINT, ours)
-    try:
+        with holding_back_ctrl_c():  # workers inherit it for good
+            for _ in range(count):  # they start, import and load compiled code while this process plans
+                executor.submit(_warm_up)
         yield executor
     except BaseException:
         for worker in set(multiprocessing.active_children()) - before:

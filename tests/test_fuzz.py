@@ -24,7 +24,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from sva_bench.cli import run_command_line
+from sva_bench.__main__ import run_command_line
 from sva_bench.errors import SvaBenchError
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance, instance_as_dict, instance_text, read_instance

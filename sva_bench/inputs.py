@@ -1,0 +1,71 @@
+"""Worlds and instances as the command line asks for them; what is wrong is said of the file and line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from sva_bench.documents import read_yaml
+from sva_bench.errors import BadInput, nearest
+from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.mission.instance import Instance
+from sva_bench.options import FailureProcess, Planner
+from sva_bench.terminal import messages
+from sva_bench.world.load import load_world
+from sva_bench.world.model import World
+
+
+def load(
+    path: Path, scenarios: Sequence[str] | None = None, margin: float | None = None,
+    plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
+) -> World:
+    """The world, as the command line changes it."""
+    world = load_world(path)
+    if scenarios:
+        world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
+            scenarios, [s.name for s in world.scenarios])))
+    return replace(
+        world, margin=world.margin if margin is None else margin,
+        plan_failure=world.plan_failure if plan_failure is None else plan_failure,
+        execute_failure=world.execute_failure if execute_failure is None else execute_failure)
+
+
+@contextmanager
+def about(path: Path) -> Iterator[None]:
+    """What travel says of sites and robots, said of the file and line where they stand."""
+    with holding_back_ctrl_c():
+        from sva_bench.travel.times import UnreachableSite
+
+    try:
+        yield
+    except UnreachableSite as error:
+        document = read_yaml(path)
+        name = error.destination
+        kind = next((kind for kind in ("stations", "pois") if name in (document.data["sites"].get(kind) or {})), None)
+        raise document.error(("sites", "base") if kind is None else ("sites", kind, name), str(error)) from None
+
+
+def instance_of_world(
+    path: Path, scenario: str | None, planner: Planner, margin: float | None,
+    progress: Callable[[str, int, int], None],
+) -> Instance:
+    """The instance of a world's scenario; of the availabilities under ``robots:`` by default."""
+    world = load(path, [scenario] if scenario else None, margin)
+    with holding_back_ctrl_c():  # after the world: its errors are said at once
+        from sva_bench.bench import instance_of, nominal_scenario, plan_costs
+
+    with about(path):
+        costs = plan_costs(world, planner, progress)
+    for cost in costs.values():
+        messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
+                       f"to {cost.max_excess_pct:.1f} %", highlight=False)
+    return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))
+
+
+def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
+    for name in names:
+        if name not in known:
+            raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
+    return list(dict.fromkeys(names))
