@@ -110,7 +110,9 @@ def _begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> set[st
         if held:
             _refuse_other_settings(manifest, settings)
         else:
-            write_json(manifest, {"format": "sva-bench/batch-manifest@1", "settings": dict(settings)})
+            draft = manifest.with_name(manifest.name + ".tmp")
+            write_json(draft, {"format": "sva-bench/batch-manifest@1", "settings": dict(settings)})
+            draft.replace(manifest)
     except OSError as error:
         raise BadInput(f"{folder}: cannot be written to ({error.strerror}); choose another with --out") from None
     return {path.stem.removeprefix("outcomes-") for path in held if path.name.startswith("outcomes-")}

@@ -202,14 +202,18 @@ def read_plans(
         InfeasiblePlan: If a plan cannot be driven; or breaks fuel or limit, and that isn't allowed.
     """
     instance = instance_of(world, costs, nominal_scenario(world))
-    if allow_infeasible:
-        instance = _unlimited(instance)
+    names = {instance.name, *(instance_of(world, costs, scenario).name for scenario in world.scenarios)}
     plans = {}
     for path in paths:
         plan = read_plan(path, instance)
+        if plan.instance is not None and plan.instance not in names:
+            _log.warning("%s was made for %s, not for %s", path, plan.instance, world.name)
         certificate = certify(instance, replace(plan, value=None))
         if not certificate.feasible:
-            raise InfeasiblePlan(path, certificate.reasons)
+            never = certify(_unlimited(instance), replace(plan, value=None)).reasons if allow_infeasible else ()
+            if never or not allow_infeasible:
+                raise InfeasiblePlan(path, never or certificate.reasons)
+            _log.warning("%s is infeasible, and driven all the same: %s", path, "; ".join(certificate.reasons))
         plans[path.stem] = plan
     return plans
 
@@ -230,7 +234,7 @@ class InfeasiblePlan(SvaBenchError):
         self.path, self.reasons = path, reasons
 
     def __str__(self) -> str:
-        return f"{self.path}: the plan is infeasible: {'; '.join(self.reasons)}"
+        return f"{self.path}: the plan is infeasible:\n  " + "\n  ".join(self.reasons)
 
 
 def _settings(world: World, options: Options) -> Settings:

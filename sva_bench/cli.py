@@ -190,7 +190,10 @@ def certify(
         from sva_bench.mission.plan import read_plan
 
     problem = read_instance(instance)
-    certificate = check(problem, read_plan(plan, problem))
+    candidate = read_plan(plan, problem)
+    if candidate.instance not in (None, problem.name):
+        log.warning("%s was made for %s, not for %s", plan, candidate.instance, problem.name)
+    certificate = check(problem, candidate)
     if as_json:
         print_json(certificate.as_dict())
     else:
@@ -285,8 +288,16 @@ def batch(
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap))
     folder = out or Path("runs") / batch_name(settings_of(loaded, seeds, options))
     with progress_bars() as progress, local_workers(workers) as executor:
-        summary = run_batch(loaded, seeds, options, folder, executor,
-                            lambda done, of: progress("measuring worlds", done, of), resume=resume)
+        started = False
+
+        def show(done: int, of: int) -> None:
+            nonlocal started
+            if done and not started:
+                messages.print(f"{done} of {of} worlds and seeds are measured already", highlight=False)
+            started = True
+            progress("measuring worlds", done, of)
+
+        summary = run_batch(loaded, seeds, options, folder, executor, show, resume=resume)
     if as_json:
         print_json(summary)
     else:

@@ -138,6 +138,9 @@ def read_json(path: Path) -> Document:
     try:
         data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
     except json.JSONDecodeError as error:
+        if path.suffix.lower() in (".yaml", ".yml"):
+            raise BadFile(path, None, "", "expected JSON, found YAML; `sva-bench times` makes an instance of a world"
+                          ) from None
         raise BadFile(path, error.lineno, "", f"not valid JSON: {error.msg} (column {error.colno})") from None
     except RecursionError:
         raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
@@ -209,13 +212,25 @@ def _first_complaint(document: Document, schema: type[BaseModel], error: Validat
         **detail.get("ctx", {}) if detail["type"] in _PLAINLY else {})
     found = detail["input"]
     shown = f", found {_shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
+    if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
+        shown = f", found the text {_shown(found)}" + (": take the quotes away" if _numeric(found) else "")
     return document.error(loc, message[:1].lower() + message[1:] + shown)
+
+
+def _numeric(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 _PLAINLY = {  # what pydantic says of its own types, said of the file
     "too_short": "expected at least {min_length} entries, found {actual_length}",
     "too_long": "expected at most {max_length} entries, found {actual_length}",
     "dict_type": "expected a mapping", "model_type": "expected a mapping", "list_type": "expected a list",
+    "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
+    "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",
     "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
 }
 
@@ -259,7 +274,7 @@ def _until_union(data: Any, loc: Loc) -> tuple[Loc, int]:
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
+    text = "nothing" if value is None else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 

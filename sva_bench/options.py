@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,15 +15,26 @@ Method = Literal["auto", "expected"]
 FailureProcess = Literal["mission", "per_leg"]
 Objective = Literal["stochastic", "deterministic"]
 
+
+
+def _finite(value: float | None) -> float | None:
+    """Refuse inf and nan, which pass bounds."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"expected a finite number, found {value}")
+    return value
+
+
 WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 PlannerOption = Annotated[Planner, typer.Option(help="OMPL planner: one PRM* roadmap, or RRTConnect pair by pair "
                                                            "(noisy).")]
 MarginOption = Annotated[float | None, typer.Option(
-    min=0, max=1, help="Planning costs are twin times x (1 + margin); default: the world's.", show_default=False)]
+    min=0, max=1, callback=_finite, help="Planning costs are twin times x (1 + margin); default: the world's.",
+    show_default=False)]
 TimeLimit = Annotated[float | None, typer.Option(
-    metavar="S", min=0, help="Stop each solve after so many seconds and take its best plan.", show_default="none")]
+    metavar="S", min=0, callback=_finite, help="Stop each solve after so many seconds and take its best plan.",
+    show_default="none")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")]
 Trials = Annotated[int, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.")]
 Rollouts = Annotated[int, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod ROLLOUTS.")]
@@ -34,4 +46,4 @@ ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure pro
                                                               show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]
-Gap = Annotated[float, typer.Option(min=0, help="Relative gap at which a plan counts as optimal.")]
+Gap = Annotated[float, typer.Option(min=0, callback=_finite, help="Relative gap at which a plan counts as optimal.")]

@@ -32,14 +32,18 @@ def print_json(data: Any) -> None:
 
 
 def write_result(path: Path | None, text: str) -> None:
-    """Write a result to a file, whole or not at all, or to standard output."""
+    """Write a result to a file, whole or not at all, or to standard output; pipes and devices are written through."""
     if path is None:
         sys.stdout.write(text)
         return
-    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    target = path.resolve()  # a link stays one
+    draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
+        if target.exists() and not target.is_file():
+            path.write_text(text, encoding="utf-8")
+        else:
+            draft.write_text(text, encoding="utf-8")
+            draft.replace(target)
     except OSError as error:
         draft.unlink(missing_ok=True)
         raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another place with -o") from None
@@ -103,16 +107,21 @@ def print_summary(summary: Any) -> None:
                 with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()), *worth,
                 end_section=name == last)
     console.print(table)
-    ends: dict[str, int] = {}
-    for plan in (plan for scenario in scenarios for plan in scenario["plans"].values()):
-        for end, count in plan["ends"].items():
-            ends[end] = ends.get(end, 0) + count
-    unhappy = ", ".join(f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if end in ends)
+    missions, unhappy = 0, []
+    for name in scenarios[0]["plans"]:
+        ends: dict[str, int] = {}
+        for scenario in scenarios:
+            for end, count in scenario["plans"][name]["ends"].items():
+                ends[end] = ends.get(end, 0) + count
+        missions += sum(ends.values())
+        bad = [f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if end in ends]
+        if bad:
+            unhappy.append(f"{', '.join(bad)} ({name})")
     console.print(f"{travel['pairs']} travel times, {travel['triangle_violations_pct']:.1f} % repaired, by up to "
                   f"{travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed under "
                   f"{summary['failure']['execute']} failures.", highlight=False)
     if unhappy:
-        console.print(f"Of {sum(ends.values())} robot missions ended otherwise than home or by draw: {unhappy}.",
+        console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
                       highlight=False)
     console.print(answer(summary), highlight=False)
     if not summary["reproducible"]:
@@ -124,7 +133,9 @@ def print_batch(summary: Any) -> None:
     from sva_bench.analysis.report import verdict, with_interval
 
     console = results()
-    table = Table(title=f"{len(summary['worlds'])} worlds, {len(summary['seeds'])} seeds, {summary['trials']} trials, "
+    worlds, seeds = len(summary["worlds"]), len(summary["seeds"])
+    table = Table(title=f"{worlds} world{'s' * (worlds > 1)}, {seeds} seed{'s' * (seeds > 1)}, "
+                        f"{summary['trials']} trials, "
                         f"{summary['fidelity']}", title_justify="left")
     for heading in ("world", "seed", "scenario", "stochastic [95 %]", "deterministic [95 %]", "VSS [95 %]", "VSS %"):
         table.add_column(heading, justify="left" if heading in ("world", "scenario") else "right")

@@ -180,12 +180,13 @@ def test_times_plan_and_certify_work_hand_in_hand(tmp_path: Path) -> None:
     assert greedy["value"] >= plan["value"]
 
 
+TINY = """{"format": "sva-bench/instance@1", "name": "tiny", "sites": ["base", "p1"], "base": "base", "stations": [],
+ "fuel_s": [[0, 6], [5, 0]], "failure": "mission", "vehicles": [{"name": "uv1", "fuel_capacity_s": 10,
+ "mission_limit_s": 30, "availability": 1.0, "incentives": {"p1": 10}}]}"""
+
+
 def test_an_infeasible_plan_is_refused_with_three(tmp_path: Path) -> None:
-    (tmp_path / "i.json").write_text(json.dumps({
-        "format": "sva-bench/instance@1", "name": "tiny", "sites": ["base", "p1"], "base": "base", "stations": [],
-        "fuel_s": [[0, 6], [5, 0]], "failure": "mission",
-        "vehicles": [{"name": "uv1", "fuel_capacity_s": 10, "mission_limit_s": 30, "availability": 1.0,
-                      "incentives": {"p1": 10}}]}))
+    (tmp_path / "i.json").write_text(TINY)
     (tmp_path / "p.json").write_text(json.dumps(
         {"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}))
     done = sva_bench("certify", "i.json", "p.json", "--json", cwd=tmp_path)
@@ -218,7 +219,8 @@ def test_bad_worlds_give_one_clear_error_and_leave_nothing(
 
 @pytest.mark.parametrize("arguments", [
     ("run", "missing.yaml"), ("run", "small.yaml", "--scenario", "S9"), ("run", "small.yaml", "--trials", "0"),
-    ("run", "small.yaml", "--trails", "5"), ("plan", "small.yaml", "--method", "magic"), ("certify", "small.yaml"),
+    ("run", "small.yaml", "--trails", "5"), ("run", "small.yaml", "--gap", "inf"),
+    ("run", "small.yaml", "--margin", "nan"), ("plan", "small.yaml", "--method", "magic"), ("certify", "small.yaml"),
     ("view", "nothing.rrd"), ("times", "small.yaml", "-o", "no/such/folder/i.json"), ("fly",)])
 def test_bad_usage_exits_with_two(arguments: tuple[str, ...], tmp_path: Path) -> None:
     world_file(tmp_path)
@@ -226,6 +228,36 @@ def test_bad_usage_exits_with_two(arguments: tuple[str, ...], tmp_path: Path) ->
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
+
+
+def test_an_output_that_is_a_link_or_a_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
+    (tmp_path / "tiny.json").write_text(TINY)
+    (tmp_path / "target.json").write_text("old")
+    (tmp_path / "link.json").symlink_to("target.json")
+    assert sva_bench("plan", "tiny.json", "-o", "link.json", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "link.json").is_symlink()
+    assert json.loads((tmp_path / "target.json").read_text())["status"] == "optimal"
+    os.mkfifo(tmp_path / "pipe")
+    with subprocess.Popen(["cat", "pipe"], cwd=tmp_path, stdout=subprocess.PIPE, text=True) as reader:
+        assert sva_bench("plan", "tiny.json", "-o", "pipe", cwd=tmp_path).returncode == 0
+        assert json.loads(reader.communicate()[0])["status"] == "optimal"
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_plan_for_something_else_is_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "tiny.json").write_text(TINY.replace('"fuel_capacity_s": 10', '"fuel_capacity_s": 11'))
+    (tmp_path / "plan.json").write_text(
+        '{"format": "sva-bench/plan@1", "instance": "another", "routes": {"uv1": ["base", "p1", "base"]}}')
+    done = sva_bench("certify", "tiny.json", "plan.json", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "was made for another, not for tiny" in " ".join(done.stderr.split())
+
+
+def test_an_empty_recording_is_bad_input(tmp_path: Path) -> None:
+    (tmp_path / "empty.rrd").touch()
+    done = sva_bench("view", "empty.rrd", "--screenshot", "s.png", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "cut off or damaged" in " ".join(done.stderr.split())
 
 
 def test_help_says_what_each_command_does(tmp_path: Path) -> None:

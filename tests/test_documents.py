@@ -64,7 +64,7 @@ def test_a_good_file_gives_its_data(tmp_path: Path) -> None:
     ("format: test/whole@1\nname: a\npart:\n  size_m: .nan\n", 4, "part.size_m", "finite"),
     ("format: test/whole@1\nname: a\npart:\n  size_m: -.INF\n", 4, "part.size_m", "finite"),
     ("format: test/whole@1\nname: a\npart:\n  size_m: 1e999\n", 4, "part.size_m", "finite"),
-    ("format: test/whole@1\nname: a\npart:\n  size_m: '1'\n", 4, "part.size_m", "found '1'"),
+    ("format: test/whole@1\nname: a\npart:\n  size_m: '1'\n", 4, "part.size_m", "found the text '1': take the quotes away"),
     ("format: test/whole@1\nname: a b\n", 2, "name", "no valid name"),
     ("format: test/whole@1\nname: ../a\n", 2, "name", "no valid name"),
     ("format: test/whole@1\nname: a\nname: b\n", 3, "name", "stands twice"),

@@ -104,7 +104,7 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
     over = [[row["scenario"], str(row["maps"]), with_interval(row["vss"]),
              "" if row["vss_pct"]["mean"] is None else with_interval(row["vss_pct"])] for row in summary["aggregate"]]
     parts = [
-        f"<h1>Value of the stochastic solution over {len(summary['worlds'])} maps</h1>",
+        f"<h1>Value of the stochastic solution over {_number(len(summary['worlds']), 'map')}</h1>",
         f"<p class=note>{summary['trials']} trials of each plan in each scenario, fidelity "
         f"<code>{summary['fidelity']}</code>; 95 % intervals in brackets. Over maps, the maps are the sample.</p>",
         _table(["scenario", "maps", "VSS", "VSS [%]"], over),
@@ -181,6 +181,10 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], *, text_last: boo
 
     body = "".join(row(cells, "td") for cells in rows)
     return f"<div class=wide><table><thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table></div>"
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def _text(value: object) -> str:

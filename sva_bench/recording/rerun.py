@@ -58,7 +58,9 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
     try:
         recording.set_log_time_enabled(False)
         recording.set_log_tick_enabled(False)
-        recording.save(unfinished, default_blueprint=_layout(story))
+        # In memory, for a full disk must not stop the library's own writer thread: it hangs.
+        memory = recording.memory_recording()
+        recording.send_blueprint(_layout(story), make_active=False)
         recording.send_recording_name(title)
         _write_solids(recording, story.solids)
         for marks in story.marks:
@@ -68,7 +70,7 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
         _write_numbers(recording, story)
         _write_log(recording, story)
         recording.flush()
-        recording.disconnect()
+        unfinished.write_bytes(memory.drain_as_bytes())
         os.replace(unfinished, path)
     finally:
         recording.disconnect()

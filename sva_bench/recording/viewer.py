@@ -113,7 +113,7 @@ def verify(path: Path) -> None:
     """
     done = subprocess.run([*program(), "rrd", "verify", str(path)], env={**os.environ, **_DISCREET},
                           capture_output=True, check=False)
-    if done.returncode:
+    if done.returncode or not path.stat().st_size:
         raise BadFile(path, None, "", "the recording is cut off or damaged, or none at all: run `sva-bench run` again")
 
 
