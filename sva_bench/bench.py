@@ -306,8 +306,6 @@ def plan_scenarios(
     world: World, costs: Mapping[str, FuelCosts], options: Options, progress: Progress
 ) -> dict[str, Planned]:
     """Both plans of each scenario. Scenarios share what doesn't depend on availabilities."""
-    if world.plan_failure == "per_leg":  # the summary says mission too
-        _log.warning("%s: there is no exact solver for per_leg failures yet: plans are made under mission", world.name)
     known: Knowledge | None = None
     nominal: Plan | None = None
     planned: dict[str, Planned] = {}
@@ -321,6 +319,9 @@ def plan_scenarios(
         pair = plan_deterministic(instance, stochastic, options.limits, nominal=nominal, known=known)
         rp = expected_value(instance, pair.stochastic)
         foresight = wait_and_see(instance, options.limits, known, force=options.evpi)
+        if world.plan_failure == "per_leg":
+            along = replace(instance, failure="per_leg")
+            pair = replace(pair, stochastic=plan_stochastic(along, options.limits, pair.stochastic, known))
         planned[scenario.name] = Planned(
             instance=instance, stochastic=pair.stochastic, deterministic=pair.plan,
             vss_range=(rp - pair.most, rp - pair.least),
@@ -343,7 +344,7 @@ def summarise(
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     runs = _by_stem(executed)
-    mission = world.execute_failure == "mission"
+    mission = world.plan_failure == world.execute_failure == "mission"
     robots = [robot.name for robot in world.robots]
     scenarios = []
     for scenario in world.scenarios:
@@ -368,7 +369,7 @@ def _head(world: World, options: Options, settings: Settings, costs: Mapping[str
     return {
         "format": "sva-bench/summary@1", "world": world.name, "seed": options.seed, "trials": settings.trials,
         "rollouts": settings.rollouts, "fidelity": settings.fidelity,
-        "failure": {"plan": "mission", "execute": world.execute_failure},
+        "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
         "travel": {"pairs": pairs, "triangle_violations_pct": round(changed / pairs, 6) if pairs else 0.0,
                    "max_excess_pct": round(max((c.max_excess_pct for c in costs.values()), default=0.0), 6)},
     }

@@ -132,7 +132,7 @@ def plan(
                                                 show_default=False)] = None,
     objective: Annotated[Objective, typer.Option(help="Plan for failures, or take every robot as "
                                                             "available.")] = "stochastic",
-    method: Annotated[Method, typer.Option(help="Solution method; auto chooses.")] = "auto",  # noqa: ARG001 - one so far
+    method: Annotated[Method, typer.Option(help="Solution method; auto chooses.")] = "auto",
     scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
                                                       "under robots.", show_default=False)] = None,
     time_limit: TimeLimit = None,
@@ -151,9 +151,6 @@ def plan(
     with progress_bars() as progress:
         if source.suffix.lower() in (".yaml", ".yml"):
             instance = instance_of_world(source, scenario, "prmstar", None, progress)
-            if instance.failure == "per_leg":
-                log.warning("there is no exact solver for per_leg failures yet: the plan is made under mission")
-                instance = replace(instance, failure="mission")
         elif scenario is not None:
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
         else:
@@ -161,10 +158,10 @@ def plan(
         progress("solving", 0, 1)
         limits = SolveLimits(time_limit_s=time_limit, gap=gap)
         if objective == "stochastic":
-            made = plan_stochastic(instance, limits)
+            made = plan_stochastic(instance, limits, method=method)
         else:
-            stochastic = plan_stochastic(replace(instance, failure="mission"), limits)
-            made = plan_deterministic(instance, stochastic, limits).plan
+            stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method)
+            made = plan_deterministic(instance, stochastic, limits, method=method).plan
         progress("solving", 1, 1)
     write_result(output, pretty_json(plan_as_dict(made)))
     gap_left = 0.0 if made.value is None or made.bound is None else made.bound - made.value

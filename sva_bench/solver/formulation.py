@@ -43,6 +43,12 @@ class Rows:
     column: IntArray
     value: FloatArray
 
+    @classmethod
+    def none(cls) -> Rows:
+        """No rows."""
+        return cls(lower=np.zeros(0), upper=np.zeros(0), start=np.zeros(1, dtype=np.int64),
+                   column=np.zeros(0, dtype=np.int64), value=np.zeros(0))
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearModel:
@@ -99,11 +105,18 @@ class Goal:
         weights: Reward of a visit by vehicle m to site j, shape (M, n); may be negative.
         floors: Weights and the least sum of them that a plan must reach.
         driving: What a second of driving and stopping costs.
+        survival: Chance of each vehicle to get to its next POI, shape (M,): the k-th visit of a route earns the k-th
+            power of it; ``None`` = certain.
     """
 
     weights: FloatArray
     floors: tuple[tuple[FloatArray, float], ...] = ()
     driving: float = 0.0
+    survival: FloatArray | None = None
+
+    def chances(self) -> FloatArray:
+        """``survival``, or ones."""
+        return np.ones(len(self.weights)) if self.survival is None else self.survival
 
     def rewarded(self) -> BoolArray:
         """Whether the visit of vehicle m to site j counts anywhere, shape (M, n)."""

@@ -1,155 +1,138 @@
-"""A good plan quickly: ruin and recreate with exact refuelling. Deterministic; proves nothing."""
+"""A good plan quickly: ruin and recreate from several starts, and the best of all routes met. Proves nothing.
+
+Deterministic: it counts rounds and reads no clock but to stop early.
+"""
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from sva_bench.arrays import FloatArray
-from sva_bench.solver.refuelling import Road, quickest
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.solver.packing import Route, best_packing
+from sva_bench.solver.routes import Tables, route_time
+from sva_bench.solver.ruin_recreate import rounds as run_rounds
+from sva_bench.solver.ruin_recreate import straighten
 
 Orders = tuple[tuple[int, ...], ...]
 """POIs of each vehicle, in order of visit."""
 
-_DETOUR_S = 0.5  # keeps a POI on the way from looking infinitely good
-_SHORT = 8  # POIs
-_BAN = 0.7  # share of the rounds in which POIs are barred from a random vehicle
+STARTS = 4
+ROUNDS = 1000
+_POOL = 5000  # routes kept of one start
+_CYCLE = 50  # rounds between two returns to the best plan, or to nothing
+_HEAT = 0.03  # loss that is taken at the start of a cycle, relative to the best value
+_STRIDE = 250  # rounds between two looks at the clock
+_DETOUR = 0.01  # of the median leg; keeps a POI on the way from looking infinitely good
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found:
+    """What a search came to.
+
+    Attributes:
+        orders: The best plan.
+        routes: The routes met that count for the relaxation, each with its vehicle.
+    """
+
+    orders: Orders
+    routes: tuple[Route, ...]
 
 
 def search(
-    roads: Sequence[Road], weights: FloatArray, start: Orders, *, rounds: int, seed: int,
-    out_of_time: Callable[[], bool],
-) -> Orders:
-    """Orders of POIs worth at least as much as those it starts from.
+    tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, starts: int = STARTS,
+    rounds: int = ROUNDS, seed: int = 0, stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
+) -> Found:
+    """A plan worth at least as much as the one it starts from.
 
     Args:
-        roads: Road of each vehicle.
+        tables: The vehicles' legs.
         weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
-        start: Feasible orders.
-        rounds: How often to ruin and recreate.
+        survival: Chance of a vehicle to get to its next POI, which multiplies its rewards, shape (M,); 1 = order is
+            indifferent.
+        start: A feasible plan.
+        starts: How often to begin anew.
+        rounds: How often to ruin and recreate after each.
         seed: Seed of the random choices.
-        out_of_time: Whether to stop.
-
-    Source:
-        Schrimpf et al. (2000), "Record breaking optimization results using the ruin and recreate principle".
+        stop: Whether to stop, given the best value so far.
     """
-    rng = np.random.default_rng(seed)
-    best = current = _insert(roads, weights, start, 1.0, rng, noise=0.0, ban=0.0)
-    best_worth = current_worth = worth(weights, best)
-    for number in range(rounds):
-        if out_of_time():
+    vehicles, n = weights.shape
+    best = start
+    routes: dict[Route, None] = {}
+    if not vehicles or not (weights > 0).any():
+        return Found(orders=best, routes=())
+    both_ways = tables.time_s[0] + tables.time_s[0].T
+    near = np.argsort(both_ways, axis=1, kind="stable")
+    legs = both_ways[np.isfinite(both_ways) & (both_ways > 0)] / 2
+    detour = _DETOUR * float(np.median(legs)) if len(legs) else _DETOUR
+    ordered = bool((survival < 1).any())
+    for number in range(starts):
+        if number and stop(value_of(weights, survival, best)):
             break
-        ruined = _ruin(roads, current, rng)
-        ban = float(rng.uniform(0, 0.5)) if rng.random() < _BAN and len(roads) > 1 else 0.0
-        trial = _insert(roads, weights, ruined, float(rng.uniform(0.5, 2)), rng, noise=0.3, ban=ban)
-        trial = tuple(shorten(road, order) for road, order in zip(roads, trial, strict=True))
-        trial = _insert(roads, weights, trial, 1.0, rng, noise=0.0, ban=0.0)
-        trial_worth = worth(weights, trial)
-        if trial_worth > best_worth:
-            best, best_worth = trial, trial_worth
-        # Accept a little worse at first, nothing worse in the end; now and then go back to the best.
-        if trial_worth >= current_worth - 0.05 * best_worth * (1 - number / rounds):
-            current, current_worth = trial, trial_worth
-        if number % 50 == 49:
-            current, current_worth = best, best_worth
-    return best
-
-
-def worth(weights: FloatArray, orders: Orders) -> float:
-    """Sum of the rewards."""
-    return float(sum(weights[m, j] for m, order in enumerate(orders) for j in order))
-
-
-def shorten(road: Road, order: tuple[int, ...]) -> tuple[int, ...]:
-    """The same POIs in an order that no reversal and no move of up to three of them makes quicker.
-
-    On a long route only such as are quicker without refuels are tried.
-    """
-    drive = quickest(road, order)
-    if drive is None:
-        raise ValueError(f"no feasible route visits {order} in this order")
-    improved = True
-    while improved:
-        improved = False
-        for candidate in _neighbours(order):
-            if len(order) > _SHORT and _direct(road, candidate) >= _direct(road, order):
-                continue
-            other = quickest(road, candidate)
-            if other is not None and other.time_s < drive.time_s - 1e-9:
-                order, drive, improved = candidate, other, True
+        rng = np.random.default_rng((seed, number))
+        current, current_length = _as_arrays(start if number == 0 else tuple(() for _ in start), n)
+        incumbent, incumbent_length = current.copy(), current_length.copy()
+        pool, length, kind = np.zeros((_POOL, n), np.int16), np.zeros(_POOL, np.int64), np.zeros(_POOL, np.int64)
+        table, keys = np.full(2 * _POOL + 1, -1, np.int64), rng.integers(0, 2**63, n, dtype=np.uint64)
+        size = 0
+        for done, until in itertools.pairwise((0, *range(1, rounds, _STRIDE), rounds)):  # a first plan at once
+            size = run_rounds(
+                rng, until - done, done, _CYCLE, _HEAT, tables.kind, tables.base, tables.fuel_s,
+                tables.time_s, tables.quickest_s, tables.first, tables.last, tables.hops, tables.capacity_s,
+                tables.limit_s, near, weights, survival, detour, current, current_length, incumbent, incumbent_length,
+                pool, length, kind, size, table, keys, ordered)
+            found = _as_orders(incumbent, incumbent_length)
+            if value_of(weights, survival, found) > value_of(weights, survival, best):
+                best = found
+            if stop(value_of(weights, survival, best)):
                 break
-    return order
+        routes.update(dict.fromkeys(
+            (int(kind[k]), tuple(pool[k, :length[k]].tolist())) for k in range(size)))
+    good: tuple[Route, ...] = ()
+    if not stop(value_of(weights, survival, best)):
+        packed, good = best_packing(tables, weights, survival, tuple(routes), best)
+        if value_of(weights, survival, packed) > value_of(weights, survival, best):
+            best = packed
+    return Found(orders=best, routes=good)
 
 
-def _direct(road: Road, order: tuple[int, ...]) -> float:
-    """Time of the route without its refuels."""
-    return sum(road.time_s[i][j] for i, j in itertools.pairwise((road.base, *order, road.base)))
+def value_of(weights: FloatArray, survival: FloatArray, orders: Orders) -> float:
+    """Sum of the rewards, each times the chance to get that far."""
+    return math.fsum(weights[m, j] * survival[m]**k if survival[m] < 1 else weights[m, j]
+                     for m, order in enumerate(orders) for k, j in enumerate(order, start=1))
 
 
-def _neighbours(order: tuple[int, ...]) -> list[tuple[int, ...]]:
-    n = len(order)
-    found = [(*order[:i], *reversed(order[i:j]), *order[j:]) for i in range(n) for j in range(i + 2, n + 1)]
-    for length in (1, 2, 3):
-        for i in range(n - length + 1):
-            block, rest = order[i:i + length], order[:i] + order[i + length:]
-            found += [(*rest[:k], *block, *rest[k:]) for k in range(len(rest) + 1) if k != i]
-    return found
+def shorten(tables: Tables, orders: Orders) -> Orders:
+    """The same visits, each vehicle's in an order that no reversal and no move of up to three of them makes quicker."""
+    n = tables.fuel_s.shape[1]
+    array, length = _as_arrays(orders, n)
+    spare, sums = np.zeros(n, np.int64), np.zeros((2, n + 2))
+    for m, k in enumerate(tables.kind):
+        if length[m]:
+            straighten(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
+                       tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
+                       np.zeros((4, tables.front)), spare, sums)
+    return _as_orders(array, length)
 
 
-def _ruin(roads: Sequence[Road], orders: Orders, rng: np.random.Generator) -> Orders:
-    """The orders without some POIs: a segment of a route, those around one, or any; what is left stays feasible."""
-    visited = [j for order in orders for j in order]
-    if not visited:
-        return orders
-    count = int(rng.integers(1, max(2, int(0.6 * len(visited)) + 1)))
-    kind = rng.integers(3)
-    if kind == 0:
-        gone = set(rng.permutation(visited)[:count].tolist())
-    elif kind == 1:
-        first = int(rng.integers(len(visited)))
-        gone = set(visited[first:first + count])
-    else:
-        centre, times = int(rng.choice(visited)), roads[0].time_s
-        gone = set(sorted(visited, key=lambda j: (times[centre][j], j))[:count])
-    left = tuple(tuple(j for j in order if j not in gone) for order in orders)
-    # Without the triangle inequality a POI may have been a shortcut.
-    return tuple(order if quickest(road, order) is not None else () for road, order in zip(roads, left, strict=True))
+def least_time(tables: Tables, kind: int, order: Sequence[int]) -> float:
+    """Least time of a route of a kind of vehicle over POIs in this order [s]; ``inf`` = infeasible."""
+    return float(route_time(
+        np.array(order, dtype=np.int64), len(order), tables.base, tables.fuel_s[kind], tables.time_s[kind],
+        tables.first[kind], tables.last[kind], tables.hops, tables.capacity_s[kind], tables.limit_s[kind],
+        np.zeros((4, tables.front))))
 
 
-def _insert(
-    roads: Sequence[Road], weights: FloatArray, orders: Orders, power: float, rng: np.random.Generator, *,
-    noise: float, ban: float,
-) -> Orders:
-    """Insert unvisited POIs, those of most reward for the least detour first, until none fits."""
-    done, sites = [list(order) for order in orders], int(weights.shape[1])
-    visited = {j for order in orders for j in order}
-    pairs: list[list[int]] = np.argwhere(weights > 0).tolist()
-    allowed = [(m, j) for m, j in pairs if j not in visited]
-    if ban:
-        barred = rng.integers(len(roads), size=(sites,))
-        draw = rng.random((sites,))
-        allowed = [(m, j) for m, j in allowed if not (draw[j] < ban and barred[j] == m)]
-    factor = 1 + noise * (rng.random(weights.shape) - 0.5) * 2
-    hopeless: set[tuple[int, int, int, int]] = set()  # with another visit nearby, only less is feasible
-    while allowed:
-        candidates = []
-        for m, j in allowed:
-            times, stops = roads[m].time_s, [roads[m].base, *done[m], roads[m].base]
-            for position, (a, b) in enumerate(itertools.pairwise(stops)):
-                if (m, j, a, b) not in hopeless:
-                    detour = times[a][j] + times[j][b] - (times[a][b] if a != b else 0.0)
-                    score = float(weights[m, j] ** power * factor[m, j]) / (max(detour, 0.0) + _DETOUR_S)
-                    candidates.append((-score, m, j, position, a, b))
-        candidates.sort()
-        for _, m, j, position, a, b in candidates:
-            order = [*done[m][:position], j, *done[m][position:]]
-            if quickest(roads[m], order) is not None:
-                done[m] = order
-                allowed = [(v, k) for v, k in allowed if k != j]
-                break
-            hopeless.add((m, j, a, b))
-        else:
-            break
-    return tuple(tuple(order) for order in done)
+def _as_arrays(orders: Orders, n: int) -> tuple[IntArray, IntArray]:
+    array, length = np.zeros((len(orders), n), np.int64), np.array([len(order) for order in orders], dtype=np.int64)
+    for m, order in enumerate(orders):
+        array[m, :len(order)] = order
+    return array, length
+
+
+def _as_orders(array: IntArray, length: IntArray) -> Orders:
+    return tuple(tuple(array[m, :length[m]].tolist()) for m in range(len(length)))

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import highspy
 import numpy as np
 
-from sva_bench.arrays import FloatArray
+from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.solver.formulation import LinearModel, Rows
 
 SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
@@ -37,8 +37,29 @@ class Outcome:
     nodes: int
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Relaxed:
+    """The optimum of a linear program.
+
+    Attributes:
+        status: How it ended.
+        values: The optimum, shape (columns,); ``None`` if there is none, or it was not reached.
+        objective: Its objective; ``-inf`` if there is none, ``inf`` if it was not reached.
+        reduced: Reduced cost of each column; positive ones would gain, shape (columns,).
+        activity: Value of each row, shape (rows,).
+        duals: Gain by each unit of a row's side, shape (rows,).
+    """
+
+    status: SolveStatus
+    values: FloatArray | None
+    objective: float
+    reduced: FloatArray
+    activity: FloatArray
+    duals: FloatArray
+
+
 class Relaxation:
-    """The linear relaxation of a model, open for more rows."""
+    """The linear relaxation of a model, open for more rows and columns."""
 
     def __init__(self, model: LinearModel) -> None:
         self._solver = _open(model)
@@ -48,23 +69,31 @@ class Relaxation:
         _check(self._solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1],
                                     rows.column, rows.value), "addRows")
 
-    def solve(self, time_limit_s: float) -> tuple[Outcome, FloatArray]:
-        """The optimum over the rows so far, and the activity of each row."""
+    def add_columns(self, objective: FloatArray, start: IntArray, row: IntArray, value: FloatArray) -> None:
+        """Add columns from 0 up without upper bound; the next solve starts from the last basis."""
+        count = len(objective)
+        _check(self._solver.addCols(count, objective, np.zeros(count), np.full(count, math.inf), len(value),
+                                    start[:-1], row, value), "addCols")
+
+    def solve(self, time_limit_s: float) -> Relaxed:
+        """The optimum over the rows and columns so far."""
         _option(self._solver, "time_limit", time_limit_s)
         _check(self._solver.run(), "run")
         status = _status(self._solver)
+        nothing = np.zeros(0)
         if status != "optimal":
-            return Outcome(status=status, values=None, objective=-math.inf,
-                           bound=-math.inf if status == "infeasible" else math.inf, nodes=0), np.zeros(0)
+            return Relaxed(status=status, values=None, objective=-math.inf if status == "infeasible" else math.inf,
+                           reduced=nothing, activity=nothing, duals=nothing)
         solution = self._solver.getSolution()
-        value = float(self._solver.getInfo().objective_function_value)
-        return Outcome(status=status, values=np.array(solution.col_value), objective=value, bound=value, nodes=0), \
-            np.array(solution.row_value)
+        return Relaxed(
+            status=status, values=np.array(solution.col_value),
+            objective=float(self._solver.getInfo().objective_function_value), reduced=np.array(solution.col_dual),
+            activity=np.array(solution.row_value), duals=np.array(solution.row_dual))
 
 
 def maximise(
     model: LinearModel, rows: Rows, *, gap: float, absolute_gap: float, time_limit_s: float,
-    start: FloatArray | None = None,
+    start: FloatArray | None = None, most_nodes: int | None = None,
 ) -> Outcome:
     """Solve a mixed-integer program by branch and bound; Ctrl-C ends it with what it has.
 
@@ -75,6 +104,7 @@ def maximise(
         absolute_gap: Absolute gap at which it may stop.
         time_limit_s: Wall-clock limit [s]; ``inf`` = none.
         start: A feasible point to begin with, shape (columns,).
+        most_nodes: Branch-and-bound nodes after which it stops; ``None`` = no limit.
     """
     solver = _open(model)
     if len(rows.lower):
@@ -89,6 +119,8 @@ def maximise(
     _option(solver, "mip_feasibility_tolerance", INTEGRALITY)
     _option(solver, "mip_allow_restart", False)  # restarts cost up to five times the time here
     _option(solver, "time_limit", time_limit_s)
+    if most_nodes is not None:
+        _option(solver, "mip_max_nodes", most_nodes)
     if start is not None:
         solution = highspy.HighsSolution()
         solution.col_value = start.tolist()
@@ -165,7 +197,7 @@ def _status(solver: Any) -> SolveStatus:
         return "optimal"
     if status == kinds.kInfeasible:
         return "infeasible"
-    if status == kinds.kTimeLimit:
+    if status in (kinds.kTimeLimit, kinds.kSolutionLimit):  # the latter stands for a limit on nodes too
         return "time_limit"
     if status == kinds.kInterrupt:
         return "interrupted"

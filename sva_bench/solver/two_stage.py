@@ -15,18 +15,18 @@ from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Objective, Plan, Status
-from sva_bench.solver.expected import Clock, Knowledge, Solution, SolveLimits, knowledge_of, solve
 from sva_bench.solver.formulation import Goal
 from sva_bench.solver.heuristic import Orders
+from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of
 from sva_bench.solver.preprocess import warn_of_unreachable
 from sva_bench.solver.refuelling import quickest
+from sva_bench.solver.solve import Method, solve
 
 __all__ = ["DeterministicPlans", "Knowledge", "SolveLimits", "knowledge_of", "plan_deterministic", "plan_nominal",
            "plan_stochastic", "wait_and_see"]
 
 _log = logging.getLogger(__name__)
 
-METHOD = "expected"
 TIE = 1e-6
 """Relative difference of two values that counts as none."""
 MOST_SUBSETS = 16
@@ -54,41 +54,41 @@ class DeterministicPlans:
 
 def plan_stochastic(
     instance: Instance, limits: SolveLimits | None = None, incumbent: Plan | None = None,
-    known: Knowledge | None = None,
+    known: Knowledge | None = None, method: Method = "auto",
 ) -> Plan:
-    """The plan of greatest expected value under the failure process ``mission``.
+    """The plan of greatest expected value under the instance's failure process.
 
     Args:
         instance: The instance.
         limits: When to stop.
         incumbent: A feasible plan to start from.
         known: What solves of the same instance with other availabilities found.
+        method: How to prove it.
 
     Raises:
-        BadInput: If the instance fails per leg, or the incumbent is infeasible.
+        BadInput: If the incumbent is infeasible, or the method doesn't serve the instance's failure process.
     """
-    if instance.failure != "mission":
-        raise BadInput(f"instance {instance.name}: plans are planned under mission, the instance says "
-                       f"{instance.failure}; set its failure to mission, and evaluate the plan under "
-                       f"{instance.failure} afterwards")
-    return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known)
+    if instance.failure == "per_leg" and method != "auto":
+        raise BadInput(f"instance {instance.name}: {method} plans under mission, the instance fails per leg; take the "
+                       "method auto, or set its failure to mission")
+    return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known, method)
 
 
 def plan_nominal(
     instance: Instance, limits: SolveLimits | None = None, incumbent: Plan | None = None,
-    known: Knowledge | None = None,
+    known: Knowledge | None = None, method: Method = "auto",
 ) -> Plan:
     """A plan with the greatest sum of incentives, every vehicle taken as available; its ties are left open.
 
     It depends on no availability, so all scenarios can share it.
     """
     return _plan(replace(instance, failure="mission"), "deterministic", np.ones(len(instance.vehicles)), limits,
-                 incumbent, known)
+                 incumbent, known, method)
 
 
 def plan_deterministic(
     instance: Instance, stochastic: Plan, limits: SolveLimits | None = None, nominal: Plan | None = None,
-    known: Knowledge | None = None,
+    known: Knowledge | None = None, method: Method = "auto",
 ) -> DeterministicPlans:
     """The deterministic plan, its ties broken in its own favour, and the range that they span.
 
@@ -98,6 +98,7 @@ def plan_deterministic(
         limits: When to stop; the time is that of all solves together.
         nominal: ``plan_nominal`` of the instance, which scenarios may share.
         known: What solves of the same instance with other availabilities found.
+        method: How to prove it.
 
     Source:
         ``docs/model.md``, section "Ties".
@@ -107,12 +108,12 @@ def plan_deterministic(
     known = known or knowledge_of(instance)
     clock = limits.clock()
     if nominal is None:
-        nominal = plan_nominal(instance, limits, known=known)
+        nominal = plan_nominal(instance, limits, known=known, method=method)
     elif nominal.value is None or nominal.bound is None or nominal.status is None:
         raise ValueError("the nominal plan must state its value, bound and status")
     nominal_orders, stochastic_orders = (_orders(instance, plan, known) for plan in (nominal, stochastic))
     known.orders.update(dict.fromkeys((nominal_orders, stochastic_orders)))
-    ties = _Ties(instance, nominal_orders, known, clock, limits.gap)
+    ties = _Ties(instance, nominal_orders, known, clock, limits.gap, method)
     most, least, soonest = ties.solutions(nominal.status == "interrupted")
     best = soonest or most
     orders = best.orders if best else nominal_orders
@@ -180,7 +181,7 @@ def _outcomes(instance: Instance) -> dict[frozenset[str], float]:
 
 def _plan(
     instance: Instance, objective: Objective, availability: FloatArray, limits: SolveLimits | None,
-    incumbent: Plan | None, known: Knowledge | None,
+    incumbent: Plan | None, known: Knowledge | None, method: Method,
 ) -> Plan:
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
@@ -192,7 +193,12 @@ def _plan(
         if reasons:
             raise BadInput(f"instance {instance.name}: the plan to start from is infeasible: {reasons[0]}")
         known.orders[_orders(instance, incumbent, known)] = None
-    solution = _greatest(instance, availability, known, clock, limits.gap)
+    if instance.failure == "per_leg":
+        goal = Goal(weights=_incentives(instance), survival=availability)
+        solution = solve(instance, goal, known, clock, limits.gap)
+        return _finish(instance, objective, solution.orders, known, value=solution.value, bound=solution.bound,
+                       status=solution.status, solutions=[solution], runtime_s=clock.used_s())
+    solution = _greatest(instance, availability, known, clock, limits.gap, method)
     scale = float(availability.max(initial=0.0))
     value = _sum(_incentives(instance) * availability[:, None], solution.orders)
     return _finish(instance, objective, solution.orders, known, value=value, bound=max(solution.bound * scale, value),
@@ -200,22 +206,23 @@ def _plan(
 
 
 def _greatest(
-    instance: Instance, availability: FloatArray, known: Knowledge, clock: Clock, gap: float,
+    instance: Instance, availability: FloatArray, known: Knowledge, clock: Clock, gap: float, method: Method = "auto",
 ) -> Solution:
     """The plan of greatest ``sum p e y``, in units in which the greatest ``p`` is 1."""
     scale = float(availability.max(initial=0.0))
     shares = availability / scale if scale > 0 else availability
     goal = Goal(weights=_incentives(instance) * shares[:, None])
-    return _once(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap)
+    return _once(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap, method)
 
 
 def _once(
-    key: tuple[object, ...], instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float,
+    key: tuple[object, ...], instance: Instance, goal: Goal, known: Knowledge, clock: Clock,
+    gap: float, method: Method,
 ) -> Solution:
     """Solve, unless a proved solution of the same goal is known."""
     if key in known.solutions:
         return known.solutions[key]
-    solution = solve(instance, goal, known, clock, gap)
+    solution = solve(instance, goal, known, clock, gap, method)
     if solution.status == "optimal":
         known.solutions[key] = solution
     _log.debug("%s: %s, %.9g of %.9g, %d nodes, %s", key[0], solution.status, solution.value, solution.bound,
@@ -230,8 +237,10 @@ class _Ties:
     one and the same tie in all scenarios.
     """
 
-    def __init__(self, instance: Instance, nominal: Orders, known: Knowledge, clock: Clock, gap: float) -> None:
+    def __init__(self, instance: Instance, nominal: Orders, known: Knowledge, clock: Clock, gap: float,
+                 method: Method) -> None:
         self._instance, self._known, self._clock, self._gap = instance, known, clock, gap
+        self._method: Method = method
         self._incentives, self._availability = _incentives(instance), _availability(instance)
         best = _sum(self._incentives, nominal)
         self._floor = best - _FLOOR * max(1.0, abs(best))
@@ -263,7 +272,7 @@ class _Ties:
 
     def _solve(self, what: str, goal: Goal) -> Solution:
         key = (what, tuple(self._shares.tolist()), self._gap, *(floor for _, floor in goal.floors))
-        return _once(key, self._instance, goal, self._known, self._clock, self._gap)
+        return _once(key, self._instance, goal, self._known, self._clock, self._gap, self._method)
 
 
 def _finish(
@@ -279,8 +288,9 @@ def _finish(
         fuel[vehicle.name] = float(sum(vehicle.fuel_s[i, j] for i, j in itertools.pairwise(drive.route)))
     counted = {"nodes": sum(s.nodes for s in solutions), "cuts": max((s.cuts for s in solutions), default=0),
                "rounds": sum(s.rounds for s in solutions)}
+    method = solutions[0].method if solutions else "expected"
     return _certified(instance, Plan(
-        routes=routes, instance=instance.name, objective=objective, method=METHOD, status=status, value=value + 0.0,
+        routes=routes, instance=instance.name, objective=objective, method=method, status=status, value=value + 0.0,
         bound=bound + 0.0, fuel_s=fuel, runtime_s=runtime_s, seed=0, details=counted))
 
 

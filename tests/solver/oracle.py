@@ -81,6 +81,44 @@ def truth(instance: Instance) -> Truth:
                  least=float(expected[tied].min()), soonest=float(seconds[best].min()), foresight=foresight)
 
 
+def per_leg_optimum(instance: Instance) -> float:
+    """Greatest expected value of a plan if vehicles fail along the way: every order of visits counts."""
+    worth = [_best_orders(instance, v) for v in instance.vehicles]
+    best = 0.0
+    for visits in itertools.product(*worth):
+        if sum(map(len, visits)) == len(frozenset().union(*visits)):
+            best = max(best, sum(w[s] for w, s in zip(worth, visits, strict=True)))
+    return best
+
+
+def _best_orders(instance: Instance, vehicle: Vehicle) -> dict[frozenset[int], float]:
+    """Greatest value of a route for every set of POIs: labels (site, visited, fuel, time, value)."""
+    pois = set(instance.pois)
+    found = {frozenset[int](): 0.0}
+    front: dict[tuple[int, frozenset[int]], list[tuple[float, float, float]]] = {}
+    waiting = [(instance.base, frozenset[int](), 0.0, 0.0, 0.0)]
+    while waiting:
+        site, visited, fuel, time, value = waiting.pop()
+        for j in range(len(instance.sites)):
+            burnt = fuel + float(vehicle.fuel_s[site, j])
+            later = time + float(vehicle.fuel_s[site, j]) + float(instance.stop_s[j])
+            if j == site or j in visited or burnt > vehicle.fuel_capacity_s + TOLERANCE \
+                    or later > vehicle.mission_limit_s + TOLERANCE or not np.isfinite(later):
+                continue
+            if j == instance.base:
+                found[visited] = max(found.get(visited, 0.0), value)
+                continue
+            now = visited | {j} if j in pois else visited
+            left = burnt if j in pois else 0.0
+            earned = value + (vehicle.availability**len(now) * float(vehicle.incentives[j]) if j in pois else 0.0)
+            labels = front.setdefault((j, now), [])
+            if any(t <= later and f <= left and v >= earned for t, f, v in labels):
+                continue
+            labels.append((later, left, earned))
+            waiting.append((j, now, left, later, earned))
+    return found
+
+
 def closure(cost: FloatArray) -> FloatArray:
     """The triangle inequality put right over every site but the base, site 0."""
     cost = cost.copy()

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from sva_bench.mission.certify import certify
-from sva_bench.solver import expected
+from sva_bench.solver import solve as solving
+from sva_bench.solver.heuristic import Found
+from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
     plan_deterministic,
@@ -13,15 +17,17 @@ from sva_bench.solver.two_stage import (
     plan_stochastic,
     wait_and_see,
 )
-from tests.solver.oracle import random_instance, truth
+from tests.solver.oracle import per_leg_optimum, random_instance, truth
+
+METHODS: tuple[Method, ...] = ("auto", "expected")
 
 
-def check(seed: int) -> None:
+def check(seed: int, method: Method = "auto") -> None:
     instance = random_instance(seed)
     want = truth(instance)
     known = knowledge_of(instance)
-    stochastic = plan_stochastic(instance, known=known)
-    plans = plan_deterministic(instance, stochastic, known=known)
+    stochastic = plan_stochastic(instance, known=known, method=method)
+    plans = plan_deterministic(instance, stochastic, known=known, method=method)
     assert stochastic.status == plans.plan.status == "optimal"
     assert stochastic.value == pytest.approx(want.stochastic, rel=1e-6, abs=1e-6)
     assert stochastic.bound == pytest.approx(want.stochastic, rel=1e-6, abs=1e-6)
@@ -44,28 +50,54 @@ def check(seed: int) -> None:
 @pytest.fixture
 def no_heuristic(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave everything to the model."""
-    monkeypatch.setattr(expected, "search", lambda roads, weights, start, **_: start)  # noqa: ARG005
+    monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
+def check_per_leg(seed: int) -> None:
+    instance = replace(random_instance(seed), failure="per_leg")
+    plan = plan_stochastic(instance)
+    assert plan.status == "optimal"
+    assert plan.value == pytest.approx(per_leg_optimum(instance), rel=1e-6, abs=1e-6)
+    assert plan.bound == pytest.approx(plan.value, rel=1e-6, abs=1e-6)
+    assert certify(instance, plan).reasons == ()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(12))
+def test_plans_are_those_that_enumeration_finds(seed: int, method: Method) -> None:
+    check(seed, method)
+
+
+@pytest.mark.usefixtures("no_heuristic")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(100, 118))
+def test_the_method_alone_finds_the_plans_that_enumeration_finds(seed: int, method: Method) -> None:
+    check(seed, method)
+
+
+@pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("seed", range(20))
-def test_plans_are_those_that_enumeration_finds(seed: int) -> None:
-    check(seed)
-
-
-@pytest.mark.usefixtures("no_heuristic")
-@pytest.mark.parametrize("seed", range(100, 130))
-def test_the_model_alone_finds_the_plans_that_enumeration_finds(seed: int) -> None:
-    check(seed)
+def test_plans_for_failures_along_the_way_are_those_that_enumeration_finds(seed: int) -> None:
+    check_per_leg(seed)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(200, 400))
-def test_plans_are_those_that_enumeration_finds_on_many_instances(seed: int) -> None:
-    check(seed)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(200, 300))
+def test_plans_are_those_that_enumeration_finds_on_many_instances(seed: int, method: Method) -> None:
+    check(seed, method)
 
 
 @pytest.mark.long
 @pytest.mark.usefixtures("no_heuristic")
-@pytest.mark.parametrize("seed", range(400, 700))
-def test_the_model_alone_finds_the_plans_that_enumeration_finds_on_many_instances(seed: int) -> None:
-    check(seed)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(400, 600))
+def test_the_method_alone_finds_the_plans_that_enumeration_finds_on_many_instances(seed: int, method: Method) -> None:
+    check(seed, method)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("no_heuristic")
+@pytest.mark.parametrize("seed", range(600, 1000))
+def test_plans_for_failures_along_the_way_are_those_that_enumeration_finds_on_many_instances(seed: int) -> None:
+    check_per_leg(seed)

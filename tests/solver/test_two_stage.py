@@ -11,6 +11,7 @@ import signal
 from dataclasses import replace
 from pathlib import Path
 from threading import Timer
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -23,11 +24,15 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState
 from sva_bench.mission.instance import Instance, Vehicle, read_instance
 from sva_bench.mission.plan import Plan
-from sva_bench.solver import expected
-from sva_bench.solver.expected import SolveLimits, euler_walk
+from sva_bench.solver import branch_and_price, expected
+from sva_bench.solver import solve as solving
+from sva_bench.solver.expected import euler_walk
+from sva_bench.solver.heuristic import Found
 from sva_bench.solver.highs import Outcome, maximise
+from sva_bench.solver.knowledge import SolveLimits
 from sva_bench.solver.preprocess import is_metric, scope_of
 from sva_bench.solver.refuelling import quickest, road_of
+from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
     plan_deterministic,
@@ -69,7 +74,7 @@ def test_an_optimal_route_may_drive_the_same_station_leg_twice(
         heuristic: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     # base r1 r2 p1 r1 r2 p2 base: 5 + 8 | 5 + 5 | 8 | 5 + 5 s between refuels, F = 10: worth 20; once only: 10.
     if not heuristic:
-        monkeypatch.setattr(expected, "search", lambda roads, weights, start, **_: start)  # noqa: ARG005
+        monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
     instance = instance_of("base r1 r2 p1 p2", (1, 2),
                            vehicle(STATION_LEG_TWICE, [0, 0, 0, 10, 10], capacity=10, limit=60))
     plan = plan_stochastic(instance)
@@ -162,7 +167,7 @@ def test_a_poi_worth_nothing_is_visited_only_as_a_shortcut() -> None:
 
 def test_legs_that_cost_nothing_close_no_loop_apart_from_the_base(monkeypatch: pytest.MonkeyPatch) -> None:
     # p1 and p2 lie in one spot, far from the base: a loop between them is free, but no robot gets there.
-    monkeypatch.setattr(expected, "search", lambda roads, weights, start, **_: start)  # noqa: ARG005
+    monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
     fuel = np.array([[0, 20, 20, 1], [20, 0, 0, 20], [20, 0, 0, 20], [1, 20, 20, 0]], dtype=float)
     for capacity in (30.0, 40.0):
         instance = instance_of("base p1 p2 p3", (), vehicle(fuel, [0, 5, 5, 1], capacity=capacity, limit=50))
@@ -198,10 +203,18 @@ def test_foresight_over_many_outcomes_is_worked_out_only_when_asked() -> None:
     assert wait_and_see(instance, force=True) == pytest.approx(17.0)
 
 
-def test_planning_under_per_leg_failure_is_refused() -> None:
+def test_under_failures_along_the_way_what_earns_most_comes_first() -> None:
+    # The first POI is reached with 1/2, the second with 1/4: 8/2 + 4/4 = 5, the other way round 4/2 + 8/4 = 4.
+    instance = replace(instance_of("base p1 p2", (), vehicle(TRIANGLE, [0, 4, 8], availability=0.5)), failure="per_leg")
+    plan = plan_stochastic(instance)
+    assert plan.routes["a"] == ("base", "p2", "p1", "base")
+    assert plan.value == pytest.approx(5.0)
+
+
+def test_the_collapsed_model_refuses_failures_along_the_way() -> None:
     instance = replace(instance_of("base p1 p2", (), vehicle(TRIANGLE, [0, 5, 5])), failure="per_leg")
-    with pytest.raises(BadInput, match="planned under mission"):
-        plan_stochastic(instance)
+    with pytest.raises(BadInput, match="plans under mission"):
+        plan_stochastic(instance, method="expected")
 
 
 def test_a_plan_to_start_from_must_be_feasible() -> None:
@@ -248,19 +261,22 @@ def test_a_wide_gap_is_enough_when_asked_for() -> None:
     assert bound - value <= 5.0 * value
 
 
-@pytest.mark.parametrize("where", ["search", "maximise"])
-def test_ctrl_c_keeps_the_best_plan_so_far(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("where", "what", "method"), [
+    (solving, "search", "auto"), (branch_and_price, "price", "auto"), (expected, "maximise", "expected")])
+def test_ctrl_c_keeps_the_best_plan_so_far(
+    where: ModuleType, what: str, method: Method, monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(expected, where, interrupt)
+    monkeypatch.setattr(where, what, interrupt)
     instance = scattered(12)
-    plan = plan_stochastic(instance)
+    plan = plan_stochastic(instance, method=method)
     assert plan.status == "interrupted"
     assert certify(instance, plan).reasons == ()
     value, bound = value_and_bound(plan)
     assert value <= bound < math.inf
-    assert where == "search" or value > 0
+    assert what == "search" or value > 0
 
 
 def test_ctrl_c_during_branch_and_bound_ends_it_with_what_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -269,11 +285,10 @@ def test_ctrl_c_during_branch_and_bound_ends_it_with_what_it_has(monkeypatch: py
         return maximise(*arguments, **options)
 
     monkeypatch.setattr(expected, "maximise", interrupted)
-    monkeypatch.setattr(expected, "HEURISTIC_ROUNDS", 10)
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     instance = scattered(25)
     try:
-        plan = plan_stochastic(instance)
+        plan = plan_stochastic(instance, method="expected")
     finally:
         signal.signal(signal.SIGINT, handler)
     assert plan.status == "interrupted"

@@ -1,0 +1,198 @@
+"""The master program of branch-and-price: routes as columns, visits and vehicles as rows.
+
+A *unit* is a vehicle, or several that are alike in everything, on one side of the decisions made so far.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.solver.formulation import LinearModel, Rows
+from sva_bench.solver.highs import Relaxation, Relaxed
+
+Stops = tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Class:
+    """Vehicles that are alike in everything.
+
+    Attributes:
+        vehicles: Their numbers.
+        weights: Reward of a visit, shape (n,).
+        floors: Weight of a visit in each floor, shape (floors, n).
+    """
+
+    vehicles: tuple[int, ...]
+    weights: FloatArray
+    floors: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """So many vehicles of a class, and the POIs that they may not visit."""
+
+    kind: int
+    count: int
+    forbidden: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """What has been decided on the way to a node of the search tree.
+
+    Attributes:
+        units: The vehicles.
+        required: POIs that are visited.
+    """
+
+    units: tuple[Unit, ...]
+    required: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Column:
+    """A route of a class.
+
+    Attributes:
+        kind: The class.
+        route: Sites from base to base.
+        visits: Visits of each site, shape (n,).
+        value: Its rewards less its cost.
+        floors: What it adds to each floor, shape (floors,).
+    """
+
+    kind: int
+    route: Stops
+    visits: FloatArray
+    value: float
+    floors: FloatArray
+
+    def fits(self, unit: Unit) -> bool:
+        """Whether a unit may drive it."""
+        return unit.kind == self.kind and not any(self.visits[j] for j in unit.forbidden)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Prices:
+    """Duals of the master program.
+
+    Attributes:
+        visit: Of each site's visit, shape (n,).
+        unit: Of each unit's vehicles.
+        floor: Of each floor, not positive, shape (floors,).
+    """
+
+    visit: FloatArray
+    unit: FloatArray
+    floor: FloatArray
+
+    def between(self, other: Prices, share: float) -> Prices:
+        """So much of the other, and the rest of this."""
+        return Prices(visit=(1 - share) * self.visit + share * other.visit,
+                      unit=(1 - share) * self.unit + share * other.unit,
+                      floor=(1 - share) * self.floor + share * other.floor)
+
+
+@dataclass(eq=False, kw_only=True)
+class Master:
+    """The master program at a node, open for more columns.
+
+    Attributes:
+        side: The decisions.
+        pois: POIs with a row.
+        floors: Least sum of each floor.
+        penalty: What a unit of a required visit, or of a floor in units of its size, costs if it is missed.
+        entries: Unit and column of each program column after the penalties.
+    """
+
+    side: Side
+    pois: tuple[int, ...]
+    n: int
+    floors: FloatArray
+    penalty: float
+    entries: list[tuple[int, Column]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._row = {j: k for k, j in enumerate(self.pois)}
+        rows = len(self.pois) + len(self.side.units) + len(self.floors)
+        self._size = np.maximum(np.abs(self.floors), 1.0)
+        missed = [self._row[j] for j in sorted(self.side.required)]
+        missed += [len(self.pois) + len(self.side.units) + k for k in range(len(self.floors))]
+        self.penalties = len(missed)
+        lower = np.full(rows, -np.inf)
+        lower[missed[:len(self.side.required)]] = 1.0
+        upper = np.concatenate([np.ones(len(self.pois)), [float(u.count) for u in self.side.units],
+                                np.full(len(self.floors), np.inf)])
+        lower[rows - len(self.floors):] = self.floors / self._size
+        start = np.zeros(rows + 1, dtype=np.int64)
+        start[1:] = np.cumsum(np.bincount(missed, minlength=rows))
+        at = {row: k for k, row in enumerate(missed)}
+        column = np.array([at[row] for row in range(rows) if row in at], dtype=np.int64)
+        self._program = Relaxation(LinearModel(
+            objective=np.full(len(missed), -self.penalty), upper=np.full(len(missed), np.inf),
+            integer=np.zeros(len(missed), dtype=np.bool_),
+            rows=Rows(lower=lower, upper=upper, start=start, column=column, value=np.ones(len(column)))))
+        self._present: set[tuple[int, Stops]] = set()
+
+    def add(self, unit: int, columns: list[Column]) -> int:
+        """Offer columns to a unit; how many are new."""
+        new = [c for c in columns if (unit, c.route) not in self._present]
+        if not new:
+            return 0
+        start, index, value = [0], [], []
+        for c in new:
+            self._present.add((unit, c.route))
+            visited = [j for j in self.pois if c.visits[j]]
+            index += [self._row[j] for j in visited] + [len(self.pois) + unit]
+            value += [float(c.visits[j]) for j in visited] + [1.0]
+            for k in range(len(self.floors)):
+                index.append(len(self.pois) + len(self.side.units) + k)
+                value.append(float(c.floors[k] / self._size[k]))
+            start.append(len(index))
+            self.entries.append((unit, c))
+        self._program.add_columns(
+            np.array([c.value for c in new]), np.array(start, dtype=np.int64), np.array(index, dtype=np.int64),
+            np.array(value))
+        return len(new)
+
+    def solve(self, time_limit_s: float) -> Relaxed:
+        """The relaxation over the columns so far."""
+        return self._program.solve(time_limit_s)
+
+    def prices(self, solved: Relaxed) -> Prices:
+        """Its duals."""
+        visit = np.zeros(self.n)
+        visit[list(self.pois)] = solved.duals[:len(self.pois)]
+        units = len(self.side.units)
+        return Prices(visit=visit, unit=solved.duals[len(self.pois):len(self.pois) + units],
+                      floor=solved.duals[len(self.pois) + units:] / self._size)
+
+    def bound(self, prices: Prices, best: FloatArray) -> float:
+        """Upper bound on the program over all columns, from any prices of the right signs.
+
+        Args:
+            prices: The prices.
+            best: Upper bound on a route's value less its visits' prices, of each unit, shape (units,).
+        """
+        counts = np.array([u.count for u in self.side.units], dtype=np.float64)
+        return float(prices.visit.sum() + prices.floor @ self.floors + counts @ np.maximum(best, 0.0))
+
+    def share(self, solved: Relaxed) -> list[tuple[int, Column, float]]:
+        """The columns in use: unit, column and share."""
+        assert solved.values is not None
+        used = solved.values[self.penalties:]
+        return [(*self.entries[k], float(used[k])) for k in np.flatnonzero(used > 1e-7)]
+
+    def missed(self, solved: Relaxed) -> float:
+        """How much is missed of what is required."""
+        assert solved.values is not None
+        return float(solved.values[:self.penalties].sum())
+
+
+def without(unit: Unit, poi: int) -> Unit:
+    """The unit, no longer allowed to visit a POI."""
+    return replace(unit, forbidden=unit.forbidden | {poi})

@@ -1,0 +1,244 @@
+"""What a solve begins with, how far it has got, and what it came to."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.plan import Status
+from sva_bench.solver.cuts import Cut
+from sva_bench.solver.formulation import Goal
+from sva_bench.solver.heuristic import Orders
+from sva_bench.solver.heuristic import value_of as rewards
+from sva_bench.solver.refuelling import Road, quickest, road_of
+from sva_bench.solver.routes import Tables, tables_of
+
+Routes = tuple[tuple[int, ...], ...]
+"""Sites of each vehicle's route, from base to base; empty for one that stays home."""
+
+_DECIMALS = 1000  # incentives times probabilities are often whole in thousandths
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolveLimits:
+    """When a solve may stop.
+
+    Attributes:
+        time_limit_s: Wall-clock time for one plan [s]; ``None`` = none.
+        gap: Relative gap (absolute below a value of 1) at which a plan counts as optimal.
+    """
+
+    time_limit_s: float | None = None
+    gap: float = 1e-6
+
+    def __post_init__(self) -> None:
+        if self.gap < 0 or (self.time_limit_s is not None and self.time_limit_s < 0):
+            raise ValueError("limits can't be negative")
+
+    def clock(self) -> Clock:
+        """A clock that starts now."""
+        now = time.monotonic()
+        return Clock(started=now, deadline=math.inf if self.time_limit_s is None else now + self.time_limit_s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clock:
+    """Time used and time left, in ``time.monotonic``."""
+
+    started: float
+    deadline: float
+
+    def left_s(self) -> float:
+        """Time left [s]."""
+        return max(self.deadline - time.monotonic(), 0.0)
+
+    def used_s(self) -> float:
+        """Time since the start [s]."""
+        return time.monotonic() - self.started
+
+    def out(self) -> bool:
+        """Whether no time is left."""
+        return time.monotonic() >= self.deadline
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solution:
+    """What a solve came to.
+
+    Attributes:
+        routes: Sites of each vehicle's route.
+        orders: Its POIs alone.
+        value: Value of the goal.
+        bound: Upper bound on it.
+        status: How it ended.
+        nodes: Branch-and-bound nodes.
+        cuts: Connectivity cuts in the last program.
+        rounds: Linear and integer programs solved.
+        seconds: Wall-clock time of each phase [s].
+        method: How it was proved.
+    """
+
+    routes: Routes
+    orders: Orders
+    value: float
+    bound: float
+    status: Status
+    nodes: int
+    cuts: int
+    rounds: int
+    seconds: dict[str, float]
+    method: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Knowledge:
+    """What earlier solves of the same sites and vehicles found; availabilities may differ between them.
+
+    Attributes:
+        instance: The instance it began with.
+        roads: Road of each vehicle.
+        tables: The same for compiled code.
+        cuts: Connectivity cuts, valid for any goal, in order of discovery.
+        orders: Feasible plans, in order of discovery.
+        solutions: Proved solutions by what defines their goal.
+    """
+
+    instance: Instance
+    roads: tuple[Road, ...]
+    tables: Tables
+    cuts: dict[Cut, None] = field(default_factory=dict)
+    orders: dict[Orders, None] = field(default_factory=dict)
+    solutions: dict[tuple[object, ...], Solution] = field(default_factory=dict)
+
+    def check(self, instance: Instance) -> None:
+        """Refuse an instance that differs in more than its availabilities.
+
+        Raises:
+            ValueError: If it does.
+        """
+        first = self.instance
+        same = (first.sites, first.base, first.stations) == (instance.sites, instance.base, instance.stations) \
+            and np.array_equal(first.stop_s, instance.stop_s) and len(first.vehicles) == len(instance.vehicles) \
+            and all(
+                (a.name, a.fuel_capacity_s, a.mission_limit_s) == (b.name, b.fuel_capacity_s, b.mission_limit_s)
+                and np.array_equal(a.fuel_s, b.fuel_s) and np.array_equal(a.incentives, b.incentives)
+                for a, b in zip(first.vehicles, instance.vehicles, strict=True))
+        if not same:
+            raise ValueError(f"what is known of instance {first.name!r} doesn't hold for {instance.name!r}: "
+                             "they differ in more than their availabilities")
+
+
+def knowledge_of(instance: Instance) -> Knowledge:
+    """Nothing known yet."""
+    return Knowledge(instance=instance, roads=tuple(road_of(instance, v) for v in instance.vehicles),
+                     tables=tables_of(instance))
+
+
+@dataclass(eq=False, kw_only=True)
+class Progress:
+    """The state of a solve, kept where Ctrl-C can't lose it."""
+
+    orders: Orders
+    value: float
+    bound: float
+    status: Status = "feasible"
+    nodes: int = 0
+    cuts: int = 0
+    rounds: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+    grain: float = 0.0  # every plan's value is a multiple of it; 0 = unknown
+
+    def tighten(self, bound: float) -> None:
+        """Take up an upper bound, and round it down to a value that a plan can have."""
+        if self.grain and math.isfinite(bound):
+            bound = math.floor(bound / self.grain + 1e-6) * self.grain
+        self.bound = min(self.bound, bound)
+
+    def closed(self, gap: float) -> bool:
+        """Whether nothing is left to prove."""
+        return self.bound - self.value <= gap * max(1.0, abs(self.value))
+
+
+def best_known(goal: Goal, known: Knowledge) -> Orders | None:
+    """The best of the known plans under a goal, without stops that earn nothing; ``None`` if none keeps the floors."""
+    rewarded = goal.rewarded()
+    nobody: Orders = tuple(() for _ in known.roads)
+    candidates = [
+        tuple(without_idle_stops(road, order, rewarded[m])
+              for m, (road, order) in enumerate(zip(known.roads, orders, strict=True)))
+        for orders in (*known.orders, nobody)]
+    kept = [orders for orders in candidates if _keeps_floors(goal, orders)]
+    return max(kept, key=lambda orders: value_of(goal, known.roads, orders)) if kept else None
+
+
+def without_idle_stops(road: Road, order: tuple[int, ...], rewarded: BoolArray) -> tuple[int, ...]:
+    """The order without POIs that count for nothing, but for those that the rest can't be driven without."""
+    if not any(rewarded[j] for j in order):
+        return ()
+    for poi in order:
+        shorter = tuple(j for j in order if j != poi)
+        if not rewarded[poi] and quickest(road, shorter) is not None:
+            order = shorter
+    return order
+
+
+def _keeps_floors(goal: Goal, orders: Orders) -> bool:
+    return all(_sum(weights, orders) >= floor for weights, floor in goal.floors)
+
+
+def adopt(progress: Progress, goal: Goal, known: Knowledge, orders: Orders) -> None:
+    """Make a plan the incumbent if it is better."""
+    value = value_of(goal, known.roads, orders)
+    if value > progress.value and _keeps_floors(goal, orders):
+        progress.orders, progress.value = orders, value
+
+
+def value_of(goal: Goal, roads: Sequence[Road], orders: Orders) -> float:
+    """Value of a feasible plan under a goal."""
+    value = rewards(goal.weights, goal.chances(), orders)
+    if goal.driving:
+        for road, order in zip(roads, orders, strict=True):
+            found = quickest(road, order)
+            if found is None:
+                raise ValueError("an infeasible plan has no value")
+            value -= goal.driving * found.time_s
+    return value
+
+
+def _sum(weights: FloatArray, orders: Orders) -> float:
+    return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
+
+
+def drive(road: Road, order: tuple[int, ...]) -> tuple[int, ...]:
+    """Sites of the quickest route over POIs in this order.
+
+    Raises:
+        RuntimeError: If there is none.
+    """
+    found = quickest(road, order)
+    if found is None:
+        raise RuntimeError(f"no feasible route visits {order}")
+    return found.route
+
+
+def trivial_bound(goal: Goal) -> float:
+    """Every POI visited by whoever earns most there."""
+    if not len(goal.weights):
+        return 0.0
+    return float(np.maximum(goal.weights.max(axis=0), 0.0).sum())
+
+
+def grain_of(goal: Goal) -> float:
+    """The greatest number of which every plan's value is a multiple; 0 where none is plain to see."""
+    scaled = goal.weights * _DECIMALS
+    whole = np.rint(scaled)
+    if goal.driving or goal.survival is not None or np.abs(scaled - whole).max(initial=0.0) > 1e-9 \
+            or np.abs(whole).max(initial=0.0) > 1e9:
+        return 0.0
+    return float(np.gcd.reduce(np.abs(whole).astype(np.int64), axis=None)) / _DECIMALS

@@ -1,0 +1,438 @@
+"""Pricing in compiled code: the routes of greatest reduced value, by labels from both ends.
+
+A label is a way from the base to a site: time, fuel burnt since the last refuel, value, and the set of visited POIs
+that its site remembers (its ng-set). Labels grow up to half the mission limit from either end and are joined over the
+leg that crosses the middle. A label falls to another one at its site that is nowhere worse. What can't beat a
+threshold even with the completion bound is dropped, so a run that finds nothing proves that nothing is there.
+
+Under failure along the route a label also carries the chance to get so far; labels from the end carry what the rest
+is worth, if reached for sure, and what it costs.
+
+Source:
+    Baldacci, Mingozzi, Roberti (2011), "New route relaxation and pricing strategies for the vehicle routing problem";
+    Righini, Salani (2006), "Symmetry helps: bounded bi-directional dynamic programming".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sva_bench.arrays import BoolArray, FloatArray, IntArray
+
+CHUNK = 32  # labels of a site that are tested for dominance together
+KEYS = 5  # POIs by which a site's labels are told apart: only those with a subset of a label's can beat it
+BUCKETS = 256  # of time, by which labels are treated in order
+STEPS = 500  # of time, for completion bounds
+MOST_STEPS = 4000
+_EPSILON = 1e-9
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Graph:
+    """What a vehicle may drive, as pricing reads it.
+
+    Attributes:
+        base: The base.
+        bit: Number of each POI, -1 for base and stations, shape (n,).
+        legs: Whether a leg is of use, shape (n, n).
+        time_s: Time of a leg with half the stops at its ends [s], shape (n, n).
+        fuel_s: Fuel of a leg [s], shape (n, n).
+        capacity_s: Fuel capacity, tolerance included [s].
+        limit_s: Mission limit, tolerance included [s]; finite.
+        survival: Chance to get to the next POI.
+        symmetric: Whether every leg costs the same both ways and the order of visits is indifferent.
+    """
+
+    base: int
+    bit: IntArray
+    legs: BoolArray
+    time_s: FloatArray
+    fuel_s: FloatArray
+    capacity_s: float
+    limit_s: float
+    survival: float
+    symmetric: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Priced:
+    """What a pricing run found.
+
+    Attributes:
+        routes: Sites of the best routes, base to base, best first; they may visit a POI again that they forgot.
+        best: Reduced value of the first; the threshold if there is none.
+        complete: Whether ``best`` is an upper bound on every route's reduced value: labels did not overflow, and the
+            run was exact.
+        labels: Labels kept.
+    """
+
+    routes: tuple[tuple[int, ...], ...]
+    best: float
+    complete: bool
+    labels: int
+
+
+def price(
+    graph: Graph, reward: FloatArray, dual: FloatArray, charge: float, memory: NDArray[np.uint64], *, threshold: float,
+    exact: bool, most_routes: int, most_labels: int,
+) -> Priced:
+    """The routes of greatest reduced value.
+
+    Args:
+        graph: What the vehicle may drive.
+        reward: Reward of each site, shape (n,); ``-inf`` = not to be visited.
+        dual: Price of each site's visit, shape (n,).
+        charge: Price of a second of driving and stopping.
+        memory: ng-sets: which POIs each site remembers, bit by bit, shape (n, words).
+        threshold: Routes worth no more are of no interest.
+        exact: Whether to find the best ng-route; else elementary routes, quickly, some of them good.
+        most_routes: How many to return.
+        most_labels: Labels from one end after which an exact run gives up its proof.
+    """
+    usable = np.isfinite(reward)
+    legs = graph.legs & usable[:, None] & usable[None, :]
+    reward = np.where(usable, reward, 0.0)
+    n = len(reward)
+    half = graph.limit_s / 2
+    if not exact:
+        memory = np.full_like(memory, np.uint64(0xFFFFFFFFFFFFFFFF))
+    bound_ahead = bound_behind = np.zeros((0, n))
+    step = 1.0
+    shortest = float(graph.time_s[legs].min(initial=np.inf)) if exact else 0.0
+    if shortest > graph.limit_s / MOST_STEPS:  # else a leg would take no step, and the bound no end
+        steps = max(STEPS, int(np.ceil(graph.limit_s / shortest)) + 1)
+        step = graph.limit_s / steps
+        gain = graph.survival * reward - dual
+        bound_ahead = completion(legs, graph.time_s, gain, charge, graph.bit, graph.base, step, steps)
+        bound_behind = bound_ahead if graph.symmetric else completion(
+            legs.T.copy(), graph.time_s.T.copy(), gain, charge, graph.bit, graph.base, step, steps)
+    following, count = _adjacent(legs)
+    ahead = behind = grow(
+        following, count, graph.time_s, graph.fuel_s, graph.bit, memory, reward, dual, charge, graph.survival,
+        graph.base, half, graph.capacity_s, graph.limit_s, bound_ahead, step, threshold, exact, True, most_labels)
+    if not graph.symmetric:
+        following, count = _adjacent(legs.T)
+        behind = grow(
+            following, count, graph.time_s.T.copy(), graph.fuel_s.T.copy(), graph.bit, memory, reward, dual, charge,
+            graph.survival, graph.base, half, graph.capacity_s, graph.limit_s, bound_behind, step, threshold, exact,
+            graph.survival == 1.0, most_labels)
+    value, left, right = join(
+        legs, graph.time_s, graph.fuel_s, charge, graph.base, half, graph.capacity_s, graph.limit_s, threshold,
+        graph.survival < 1.0, *ahead[1:6], ahead[7], *behind[1:6], behind[7])
+    order = np.argsort(-value, kind="stable")[:most_routes]
+    routes = []
+    for k in order:
+        first, second = _chain(ahead, int(left[k])), _chain(behind, int(right[k])) if right[k] >= 0 else []
+        routes.append((*first[::-1], *(second or [graph.base])))
+    return Priced(routes=tuple(dict.fromkeys(routes)), best=float(value[order[0]]) if len(order) else threshold,
+                  complete=exact and not ahead[8] and not behind[8], labels=len(ahead[0]))
+
+
+def _adjacent(legs: BoolArray) -> tuple[IntArray, IntArray]:
+    """Sites that follow each site, and how many they are."""
+    count = legs.sum(axis=1)
+    following = np.zeros((len(legs), max(int(count.max(initial=0)), 1)), dtype=np.int64)
+    for i, row in enumerate(legs):
+        following[i, :count[i]] = np.flatnonzero(row)
+    return following, count
+
+
+def _chain(labels: tuple[Any, ...], number: int) -> list[int]:
+    """Sites from a label's own back to the base."""
+    site, parent = labels[0], labels[6]
+    found = []
+    while number >= 0:
+        found.append(int(site[number]))
+        number = int(parent[number])
+    return found
+
+
+@njit(cache=True)
+def completion(legs, time, gain, charge, bit, base, step, steps):
+    """Most value that a way from a site to the base can add in so many steps of time, shape (steps + 1, n).
+
+    Ways may repeat sites but not turn straight back to a POI, and need no fuel; legs take whole steps, rounded down.
+    """
+    n = len(gain)
+    best, second = np.full((steps + 1, n), -np.inf), np.full((steps + 1, n), -np.inf)
+    by = np.full((steps + 1, n), -1, np.int64)
+    for t in range(steps + 1):
+        for i in range(n):
+            if i == base:
+                continue
+            for j in range(n):
+                if not legs[i, j]:
+                    continue
+                left = t - int(time[i, j] / step - 1e-9)
+                if left < 0:
+                    continue
+                value = -charge * time[i, j]
+                if j != base:
+                    # Out of j to somewhere else than back to i, if i is a POI.
+                    back = bit[i] >= 0 and by[left, j] == i
+                    value += gain[j] + (second[left, j] if back else best[left, j])
+                if value > best[t, i]:
+                    second[t, i] = best[t, i]
+                    best[t, i], by[t, i] = value, j
+                elif value > second[t, i]:
+                    second[t, i] = value
+    return best
+
+
+@njit(cache=True)
+def grow(following, count, time, fuel, bit, memory, reward, dual, charge, survival, base, half, capacity, limit, bound,
+         step, threshold, exact, forwards, most):
+    """All labels from one end up to half the limit that no other one beats.
+
+    Returns:
+        Site, time, fuel, value, second value, memory, parent, and labels by site, each site's by decreasing value:
+        first a table of where a site's begin. Then whether there were too many. The second value is the chance to get
+        so far forwards; backwards minus the price of the visits, which is what the rest is worth if never reached.
+    """
+    n, words = memory.shape
+    room = 4096
+    site, parent, after = np.zeros(room, np.int32), np.full(room, -1, np.int32), np.full(room, -1, np.int32)
+    t, q = np.zeros(room), np.zeros(room)
+    x, y = np.zeros(room), np.zeros(room)
+    mask = np.zeros((room, words), np.uint64)
+    kept = np.zeros(room, np.bool_)
+    site[0], y[0], size = base, 1.0 if forwards else 0.0, 1
+    width = half / BUCKETS
+    head = np.full(BUCKETS + 1, -1, np.int64)
+    head[0] = 0
+    # Labels that stand, in chunks by site and key, the latest chunk first.
+    chunks = 256
+    chunk_of, chunk_next, chunk_size = np.full((n, 1 << KEYS), -1, np.int64), np.full(chunks, -1, np.int64), \
+        np.zeros(chunks, np.int64)
+    keys = _keys(bit, memory, time)
+    c_t, c_q = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
+    c_x, c_y = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
+    c_mask = np.zeros((chunks, CHUNK, words), np.uint64)
+    c_least, c_most = np.zeros(chunks), np.zeros(chunks)
+    used, overflow = 0, False
+    bounded = len(bound) > 0
+    new = np.zeros(words, np.uint64)
+    for bucket in range(BUCKETS + 1):
+        while head[bucket] >= 0:
+            number = 0
+            label = head[bucket]
+            while label >= 0:
+                number += 1
+                label = after[label]
+            batch, when = np.zeros(number, np.int64), np.zeros(number)
+            label = head[bucket]
+            for k in range(number):
+                batch[k], when[k] = label, t[label]
+                label = after[label]
+            head[bucket] = -1
+            for position in np.argsort(when):
+                label = batch[position]
+                i = site[label]
+                # Does a standing label beat it?
+                beaten = False
+                key = 0
+                if exact:
+                    for k in range(KEYS):
+                        b = keys[i, k]
+                        if b >= 0 and mask[label, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
+                            key |= 1 << k
+                some = key
+                while not beaten:
+                    chunk = chunk_of[i, some]
+                    while chunk >= 0 and not beaten:
+                        if c_most[chunk] >= x[label] - _EPSILON and c_least[chunk] <= q[label] + _EPSILON:
+                            for k in range(chunk_size[chunk]):
+                                if c_x[chunk, k] >= x[label] - _EPSILON and c_q[chunk, k] <= q[label] + _EPSILON \
+                                        and c_t[chunk, k] <= t[label] + _EPSILON \
+                                        and c_y[chunk, k] >= y[label] - _EPSILON:
+                                    beaten = True
+                                    if exact:
+                                        for w in range(words):
+                                            if c_mask[chunk, k, w] & ~mask[label, w]:
+                                                beaten = False
+                                                break
+                                    if beaten:
+                                        break
+                        chunk = chunk_next[chunk]
+                    if some == 0:
+                        break
+                    some = (some - 1) & key  # the next subset
+                if beaten:
+                    continue
+                kept[label] = True
+                chunk = chunk_of[i, key]
+                if chunk < 0 or chunk_size[chunk] == CHUNK:
+                    if used == chunks:
+                        chunks *= 2
+                        chunk_next, chunk_size = _longer(chunk_next, chunks), _longer(chunk_size, chunks)
+                        c_t, c_q, c_x, c_y = _taller(c_t, chunks), _taller(c_q, chunks), _taller(c_x, chunks), \
+                            _taller(c_y, chunks)
+                        larger = np.zeros((chunks, CHUNK, words), np.uint64)
+                        larger[:used] = c_mask
+                        c_mask = larger
+                        c_least, c_most = _longer(c_least, chunks), _longer(c_most, chunks)
+                    chunk = used
+                    used += 1
+                    chunk_next[chunk], chunk_of[i, key], chunk_size[chunk] = chunk_of[i, key], chunk, 0
+                    c_least[chunk], c_most[chunk] = np.inf, -np.inf
+                k = chunk_size[chunk]
+                chunk_size[chunk] += 1
+                c_t[chunk, k], c_q[chunk, k], c_x[chunk, k], c_y[chunk, k] = t[label], q[label], x[label], y[label]
+                c_least[chunk], c_most[chunk] = min(c_least[chunk], q[label]), max(c_most[chunk], x[label])
+                for w in range(words):
+                    c_mask[chunk, k, w] = mask[label, w]
+                # Onward.
+                for k in range(count[i]):
+                    j = following[i, k]
+                    if j == base:
+                        continue
+                    later = t[label] + time[i, j]
+                    burnt = q[label] + fuel[i, j]
+                    if later > half or burnt > capacity:
+                        continue
+                    b = bit[j]
+                    if b >= 0:
+                        if mask[label, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
+                            continue
+                    else:
+                        burnt = 0.0
+                    value, second = x[label] - charge * time[i, j], y[label]
+                    if survival == 1.0:
+                        value += reward[j] - dual[j]
+                    elif b >= 0:
+                        if forwards:
+                            second = y[label] * survival
+                            value += second * reward[j] - dual[j]
+                        else:
+                            worth = survival * (reward[j] + x[label] - y[label])
+                            second = y[label] - dual[j]
+                            value = worth + second
+                    if bounded and value + bound[int((limit - later) / step + 1e-9), j] <= threshold:
+                        continue
+                    if size == room:
+                        if size >= most:
+                            overflow = True
+                            break
+                        room *= 2
+                        site, parent, after = _longer(site, room), _longer(parent, room), _longer(after, room)
+                        t, q, x, y = _longer(t, room), _longer(q, room), _longer(x, room), _longer(y, room)
+                        mask, kept = _taller(mask, room), _longer(kept, room)
+                    for w in range(words):
+                        new[w] = mask[label, w] & memory[j, w]
+                    if b >= 0:
+                        new[b >> 6] |= np.uint64(1) << np.uint64(b & 63)
+                    site[size], parent[size], kept[size] = j, label, False
+                    t[size], q[size], x[size], y[size] = later, burnt, value, second
+                    for w in range(words):
+                        mask[size, w] = new[w]
+                    place = min(int(later / width), BUCKETS)
+                    after[size], head[place] = head[place], size
+                    size += 1
+                if overflow:
+                    break
+            if overflow:
+                break
+        if overflow:
+            break
+    begin = np.zeros(n + 1, np.int64)
+    for label in range(size):
+        if kept[label]:
+            begin[site[label] + 1] += 1
+    for i in range(n):
+        begin[i + 1] += begin[i]
+    standing = np.flatnonzero(kept[:size])
+    by_value = standing[np.argsort(-x[standing], kind="mergesort")]
+    placed, by_site = begin.copy(), np.zeros(len(standing), np.int64)
+    for label in by_value:
+        by_site[placed[site[label]]] = label
+        placed[site[label]] += 1
+    return site[:size], t[:size], q[:size], x[:size], y[:size], mask[:size], parent[:size], \
+        (begin, by_site), overflow
+
+
+@njit(cache=True)
+def _keys(bit, memory, time):
+    """The POIs by which each site's labels are told apart: the nearest that it remembers, shape (n, KEYS)."""
+    n = len(bit)
+    keys = np.full((n, KEYS), -1, np.int64)
+    for i in range(n):
+        found = 0
+        for j in np.argsort(np.where(time[:, i] > 0, time[:, i], np.inf)):  # 0 stands for a leg of no use
+            b = bit[j]
+            if b >= 0 and j != i and found < KEYS and memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
+                keys[i, found] = b
+                found += 1
+    return keys
+
+
+@njit(cache=True)
+def _longer(array, size):
+    larger = np.zeros(size, array.dtype)
+    larger[:len(array)] = array
+    return larger
+
+
+@njit(cache=True)
+def _taller(array, size):
+    larger = np.zeros((size, array.shape[1]), array.dtype)
+    larger[:len(array)] = array
+    return larger
+
+
+@njit(cache=True)
+def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted,
+         t, q, x, y, mask, of_site, t_b, q_b, x_b, y_b, mask_b, of_site_b):
+    """For each label from the start the best rest of the route worth more than the threshold.
+
+    Returns:
+        Value, label from the start, label from the end or -1 for a leg straight home; of each route found.
+    """
+    begin, by_site = of_site
+    begin_b, by_site_b = of_site_b
+    n, words = len(legs), mask.shape[1]
+    number = len(by_site)
+    value, left, right = np.zeros(number), np.zeros(number, np.int64), np.full(number, -1, np.int64)
+    found = 0
+    for i in range(n):
+        for k in range(begin[i], begin[i + 1]):
+            label = by_site[k]
+            best, partner = threshold, -2
+            if legs[i, base] and t[label] + time[i, base] <= limit and q[label] + fuel[i, base] <= capacity:
+                total = x[label] - charge * time[i, base]
+                if total > best:
+                    best, partner = total, -1
+            for j in range(n):
+                if j == base or not legs[i, j] or t[label] + time[i, j] <= half:
+                    continue
+                most_time = limit - t[label] - time[i, j]
+                most_fuel = capacity - q[label] - fuel[i, j]
+                if most_fuel < 0 or most_time < 0:
+                    continue
+                so_far = x[label] - charge * time[i, j]
+                for k_b in range(begin_b[j], begin_b[j + 1]):
+                    other = by_site_b[k_b]
+                    if so_far + x_b[other] <= best:
+                        break
+                    if t_b[other] > most_time or q_b[other] > most_fuel:
+                        continue
+                    total = so_far + x_b[other]
+                    if discounted:
+                        total = so_far + y[label] * (x_b[other] - y_b[other]) + y_b[other]
+                        if total <= best:
+                            continue
+                    apart = True
+                    for w in range(words):
+                        if mask[label, w] & mask_b[other, w]:
+                            apart = False
+                            break
+                    if apart:
+                        best, partner = total, other
+            if partner > -2:
+                value[found], left[found], right[found] = best, label, partner
+                found += 1
+    return value[:found], left[:found], right[:found]
