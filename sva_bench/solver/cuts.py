@@ -66,7 +66,7 @@ def violated_by_integers(visits: FloatArray, vehicle: int, base: int, pois: froz
         pois: The POIs.
     """
     graph = networkx.DiGraph()
-    graph.add_edges_from((int(i), int(j)) for i, j in np.argwhere(visits > 0.5))
+    graph.add_edges_from((int(i), int(j)) for i, j in np.argwhere(visits > 0.25))
     parts = sorted(tuple(sorted(part)) for part in networkx.strongly_connected_components(graph))
     return [Cut(vehicle=vehicle, inside=part, poi=i) for part in parts if base not in part for i in part if i in pois]
 

@@ -157,7 +157,7 @@ def resources(instance: Instance, scope: Scope) -> tuple[Resource, Resource]:
                      capacity_s=scope.limit_s))
 
 
-class _RowBuilder:
+class RowBuilder:
     """Rows under construction."""
 
     def __init__(self) -> None:
@@ -197,7 +197,7 @@ def formulate(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> tuple[
         the recourse in closed form.
     """
     legs = _legs(instance, scopes)
-    build = _RowBuilder()
+    build = RowBuilder()
     integer = np.zeros(legs.columns, dtype=np.bool_)
     integer[:len(legs.vehicle)] = True
     upper = np.ones(legs.columns)
@@ -247,7 +247,7 @@ def _legs(instance: Instance, scopes: Sequence[Scope]) -> Legs:
                 time_column=carried[1], number=number, columns=columns)
 
 
-def _route_rows(build: _RowBuilder, instance: Instance, legs: Legs, mine: IntArray, scope: Scope) -> None:
+def _route_rows(build: RowBuilder, instance: Instance, legs: Legs, mine: IntArray, scope: Scope) -> None:
     """(1), (2) and (14a) of one vehicle; a POI is visited only if the base is left."""
     origin, destination = legs.origin[mine], legs.destination[mine]
     out_of_base = mine[origin == instance.base]
@@ -269,7 +269,7 @@ def _route_rows(build: _RowBuilder, instance: Instance, legs: Legs, mine: IntArr
         build.add(mine, scope.time_s[origin, destination] / size, -np.inf, (scope.limit_s + SLACK_S) / size)
 
 
-def _flow_rows(build: _RowBuilder, legs: Legs, mine: IntArray, column: IntArray, resource: Resource) -> None:
+def _flow_rows(build: RowBuilder, legs: Legs, mine: IntArray, column: IntArray, resource: Resource) -> None:
     """What is used up on the way, in units of the capacity: conserved at a site, between its bounds on a leg."""
     if not np.isfinite(resource.capacity_s):
         return

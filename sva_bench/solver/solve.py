@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from typing import Literal
 
 from sva_bench.mission.instance import Instance
+from sva_bench.solver.branch_and_cut import prove_by_cuts
 from sva_bench.solver.branch_and_price import BranchAndPrice
-from sva_bench.solver.expected import prove_by_cuts
+from sva_bench.solver.expected import DirectedModel
 from sva_bench.solver.formulation import Goal
 from sva_bench.solver.heuristic import Orders, search, shorten
 from sva_bench.solver.knowledge import (
@@ -25,12 +26,15 @@ from sva_bench.solver.knowledge import (
     value_of,
 )
 from sva_bench.solver.packing import Route
-from sva_bench.solver.preprocess import scope_of
+from sva_bench.solver.preprocess import Scope, scope_of
+from sva_bench.solver.undirected import UndirectedModel, serves
 
-Method = Literal["auto", "expected"]
+Method = Literal["auto", "expected", "undirected", "branch-and-price"]
 
 _log = logging.getLogger(__name__)
 
+LONG = 2.0  # mission limit in longest legs from which routes count as long
+MOST_LONG = 4  # vehicles up to which long routes want the edge model
 STARTS, ROUNDS = 2, 750  # of the heuristic, when a proof is to follow
 _WITHIN = 0.99  # of the gap, for rounding
 
@@ -58,7 +62,10 @@ def solve(
     progress = Progress(orders=start, value=value_of(goal, known.roads, start), bound=trivial_bound(goal),
                         grain=grain_of(goal))
     routes: Sequence[Route] = ()
-    columns = method == "auto" and prefers_columns(instance, goal)
+    rewarded = goal.rewarded()
+    scopes = [scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles)]
+    if method == "auto":
+        method = choice(instance, scopes, goal)
     try:
         if not goal.floors and not goal.driving and bool((goal.weights >= 0).all()):
             began = clock.used_s()
@@ -69,10 +76,12 @@ def solve(
             routes = found.routes
             progress.seconds["heuristic"] = clock.used_s() - began
         if not progress.closed(gap):
-            if columns:
-                _prove_by_columns(instance, goal, known, clock, gap, progress, routes)
+            if method == "branch-and-price":
+                _prove_by_columns(instance, scopes, goal, known, clock, gap, progress, routes)
             else:
-                prove_by_cuts(instance, goal, known, clock, gap, progress)
+                flow = UndirectedModel(instance, scopes, goal) if method == "undirected" else \
+                    DirectedModel(instance, scopes, goal, known.roads)
+                prove_by_cuts(flow, instance, goal, known, clock, gap, progress)
     except KeyboardInterrupt:
         progress.status = "interrupted"
     progress.bound = max(progress.bound, progress.value)
@@ -86,22 +95,33 @@ def solve(
         routes=tuple(drive(road, order) for road, order in zip(known.roads, orders, strict=True)), orders=orders,
         value=progress.value, bound=progress.bound, status=progress.status, nodes=progress.nodes, cuts=progress.cuts,
         rounds=progress.rounds, seconds=progress.seconds,
-        method="branch-and-price" if columns else "expected")
+        method=method)
 
 
-def prefers_columns(instance: Instance, goal: Goal) -> bool:
-    """The rule that chooses: routes as columns, unless a mission limit is missing, which makes routes long."""
-    return goal.survival is not None or all(math.isfinite(v.mission_limit_s) for v in instance.vehicles)
+def choice(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> Method:
+    """The rule that chooses, by what was measured in ``benchmarks/solver``.
+
+    Long routes that never refuel, by few vehicles, over symmetric costs want the edge model. Where a mission limit is
+    missing routes are too long for labels, and the directed model takes over. All else wants routes as columns, and
+    failures along the route leave no other choice.
+    """
+    if goal.survival is not None:
+        return "branch-and-price"
+    if not all(math.isfinite(v.mission_limit_s) for v in instance.vehicles):
+        return "expected"
+    longest = max((float(scope.fuel_s[scope.legs].max(initial=0.0)) for scope in scopes), default=0.0)
+    shortest_limit = min((v.mission_limit_s for v in instance.vehicles), default=0.0)
+    if len(scopes) <= MOST_LONG and shortest_limit >= LONG * longest and serves(instance, scopes):
+        return "undirected"
+    return "branch-and-price"
 
 
 def _prove_by_columns(
-    instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, progress: Progress,
-    routes: Sequence[Route],
+    instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, clock: Clock, gap: float,
+    progress: Progress, routes: Sequence[Route],
 ) -> None:
     """Prove the plan of ``progress``, or a better one, within the gap, by branch-and-price."""
     began = clock.used_s()
-    rewarded = goal.rewarded()
-    scopes = [scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles)]
 
     def cutoff() -> float:
         """Bounds up to here hold nothing better: too close, or below the next value that a plan can have."""
