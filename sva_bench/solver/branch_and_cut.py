@@ -27,6 +27,7 @@ _log = logging.getLogger(__name__)
 ROOT_ROUNDS = 60
 _STALL = 1e-4  # relative gain of the bound below which a round counts as idle
 _IDLE_ROUNDS = 4
+_FIXING = 1e-6  # relative; columns are dropped only if they are worse by more
 
 
 class FlowModel(Protocol):
@@ -56,7 +57,7 @@ def prove_by_cuts(
     size = 1.0 if largest == 0 or 1 <= largest <= 1e4 else largest
     model = replace(flow.model, objective=flow.model.objective / size)
     began = clock.used_s()
-    cuts = _root(flow, instance, known, clock, gap, progress, model, size)
+    cuts, model = _root(flow, instance, known, clock, gap, progress, model, size)
     progress.seconds["root"] = clock.used_s() - began
     began = clock.used_s()
     _branch(flow, instance, goal, known, clock, gap, progress, model, size, cuts)
@@ -66,13 +67,17 @@ def prove_by_cuts(
 def _root(
     flow: FlowModel, instance: Instance, known: Knowledge, clock: Clock, gap: float, progress: Progress,
     model: LinearModel, size: float,
-) -> list[Cut]:
-    """Tighten the relaxation by cuts; the ones that are tight in the end. Lowers the bound of ``progress``."""
+) -> tuple[list[Cut], LinearModel]:
+    """Tighten the relaxation by cuts; those that are tight in the end, and the model without what can't be better.
+
+    Lowers the bound of ``progress``.
+    """
     cuts = list(known.cuts)
     relaxation = Relaxation(model)
     relaxation.add(flow.rows(cuts))
     present, idle, last = set(cuts), 0, math.inf
     activity: FloatArray = np.zeros(0)
+    upper = model.upper.copy()
     for _ in range(ROOT_ROUNDS):
         if clock.out() or progress.closed(gap):
             break
@@ -85,6 +90,9 @@ def _root(
             break
         activity = relaxed.activity
         progress.tighten(relaxed.objective * size)
+        # A column whose reduced cost eats up the gap is in no better plan. Only ours are integer.
+        worse = (relaxed.objective + relaxed.reduced) * size < progress.value - _FIXING * max(1.0, abs(progress.value))
+        upper[model.integer & worse] = 0.0
         idle = idle + 1 if last - relaxed.objective < _STALL * max(abs(relaxed.objective), 1e-9) else 0
         last = relaxed.objective
         new = [cut for cut in _separate(flow, instance, relaxed.values) if cut not in present]
@@ -96,9 +104,9 @@ def _root(
     slack = activity[len(model.rows.lower):]
     tight = [cut for cut, room in zip(cuts, slack, strict=False) if room < 1e-6]
     known.cuts.update(dict.fromkeys(tight))
-    _log.debug("root: bound %.6g, value %.6g, %d of %d cuts kept", progress.bound, progress.value, len(tight),
-               len(cuts))
-    return tight
+    _log.debug("root: bound %.6g, value %.6g, %d of %d cuts kept, %d of %d columns", progress.bound, progress.value,
+               len(tight), len(cuts), int((upper > 0).sum()), len(upper))
+    return tight, replace(model, upper=upper)
 
 
 def _branch(

@@ -93,7 +93,7 @@ class Relaxation:
 
 def maximise(
     model: LinearModel, rows: Rows, *, gap: float, absolute_gap: float, time_limit_s: float,
-    start: FloatArray | None = None, most_nodes: int | None = None,
+    start: FloatArray | None = None, most_nodes: int | None = None, heuristics: float = 0.0,
 ) -> Outcome:
     """Solve a mixed-integer program by branch and bound; Ctrl-C ends it with what it has.
 
@@ -105,6 +105,7 @@ def maximise(
         time_limit_s: Wall-clock limit [s]; ``inf`` = none.
         start: A feasible point to begin with, shape (columns,).
         most_nodes: Branch-and-bound nodes after which it stops; ``None`` = no limit.
+        heuristics: Share of its time that HiGHS may look for better points.
     """
     solver = _open(model)
     if len(rows.lower):
@@ -118,6 +119,7 @@ def maximise(
     _option(solver, "mip_abs_gap", absolute_gap)
     _option(solver, "mip_feasibility_tolerance", INTEGRALITY)
     _option(solver, "mip_allow_restart", False)  # restarts cost up to five times the time here
+    _option(solver, "mip_heuristic_effort", heuristics)
     _option(solver, "time_limit", time_limit_s)
     if most_nodes is not None:
         _option(solver, "mip_max_nodes", most_nodes)

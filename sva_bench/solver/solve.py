@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 LONG = 2.0  # mission limit in longest legs from which routes count as long
 MOST_LONG = 4  # vehicles up to which long routes want the edge model
-STARTS, ROUNDS = 2, 750  # of the heuristic, when a proof is to follow
+STARTS, ROUNDS = 4, 1000  # of the heuristic, when a proof is to follow
 _WITHIN = 0.99  # of the gap, for rounding
 
 
