@@ -15,8 +15,10 @@ from sva_bench.errors import BadInput, ExitCode
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import (
     AsJson,
+    Cuts,
     ExecuteFailure,
     FailureProcess,
+    Family,
     FidelityOption,
     Gap,
     MarginOption,
@@ -32,6 +34,7 @@ from sva_bench.options import (
     Verbose,
     WorkerCount,
     WorldArgument,
+    finite,
 )
 from sva_bench.terminal import (
     messages,
@@ -54,6 +57,8 @@ app = typer.Typer(
 
 world_app = typer.Typer(no_args_is_help=True, help="Check worlds.", rich_markup_mode="rich")
 app.add_typer(world_app, name="world")
+instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
+app.add_typer(instance_app, name="instance")
 
 log = logging.getLogger(__name__)
 
@@ -132,7 +137,9 @@ def plan(
                                                 show_default=False)] = None,
     objective: Annotated[Objective, typer.Option(help="Plan for failures, or take every robot as "
                                                             "available.")] = "stochastic",
-    method: Annotated[Method, typer.Option(help="Solution method; auto chooses.")] = "auto",
+    method: Annotated[Method, typer.Option(help="Solution method: auto chooses; expected is the collapsed model; dep, "
+                                                "relaxed and lshaped are the paper's.")] = "auto",
+    cuts: Annotated[Cuts, typer.Option(help="Optimality cuts of lshaped.")] = "single",
     scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
                                                       "under robots.", show_default=False)] = None,
     time_limit: TimeLimit = None,
@@ -158,10 +165,10 @@ def plan(
         progress("solving", 0, 1)
         limits = SolveLimits(time_limit_s=time_limit, gap=gap)
         if objective == "stochastic":
-            made = plan_stochastic(instance, limits, method=method)
+            made = plan_stochastic(instance, limits, method=method, cuts=cuts)
         else:
-            stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method)
-            made = plan_deterministic(instance, stochastic, limits, method=method).plan
+            stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method, cuts=cuts)
+            made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts).plan
         progress("solving", 1, 1)
     write_result(output, pretty_json(plan_as_dict(made)))
     gap_left = 0.0 if made.value is None or made.bound is None else made.bound - made.value
@@ -356,6 +363,33 @@ def world_schema() -> None:
         from sva_bench.world.schema import WorldFile
 
     print_json(WorldFile.model_json_schema())
+
+
+@instance_app.command("random")
+def random_instances(
+    family: Annotated[Family, typer.Option(help="A: one filling lasts for the mission; B: two to five refuels; C: "
+                                                "short routes.")] = "A",
+    pois: Annotated[int, typer.Option(min=0, max=1000, help="Points of interest.")] = 20,
+    vehicles: Annotated[int, typer.Option(min=0, max=100, help="Vehicles; every second one is uncertain.")] = 2,
+    availability: Annotated[float, typer.Option(min=0, max=1, callback=finite, help="Availability of the uncertain "
+                                                "ones.")] = 0.75,
+    fuel: Annotated[float | None, typer.Option(min=0.01, max=1000, callback=finite, help="Fuel capacity in largest "
+                                               "distances.", show_default="the family's")] = None,
+    tau: Annotated[float | None, typer.Option(min=0.01, max=1000, callback=finite, help="Mission limit in fuel "
+                                              "capacities.", show_default="the family's")] = None,
+    directed: Annotated[bool, typer.Option("--directed", help="Legs cost up to a tenth more, each way.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of places and incentives.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Instance file to write; default: standard "
+                                                "output.", show_default=False)] = None,
+) -> None:
+    """Make a random instance of the paper's kind."""
+    with holding_back_ctrl_c():
+        from sva_bench.mission.generate import random_instance
+        from sva_bench.mission.instance import instance_text
+
+    write_result(output, instance_text(random_instance(
+        family, pois=pois, vehicles=vehicles, availability=availability, fuel_multiple=fuel, tau=tau,
+        directed=directed, seed=seed)))
 
 
 @app.callback(invoke_without_command=True)

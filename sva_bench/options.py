@@ -11,13 +11,15 @@ import typer
 # Spelt out, not imported: the modules that own them take a second to load, and --help should not.
 Fidelity = Literal["kinematic", "rollout", "physics"]
 Planner = Literal["prmstar", "rrtconnect"]
-Method = Literal["auto", "expected"]
+Method = Literal["auto", "expected", "dep", "relaxed", "lshaped"]
+Cuts = Literal["single", "multi", "pareto"]
 FailureProcess = Literal["mission", "per_leg"]
+Family = Literal["A", "B", "C"]
 Objective = Literal["stochastic", "deterministic"]
 
 
 
-def _finite(value: float | None) -> float | None:
+def finite(value: float | None) -> float | None:
     """Refuse inf and nan, which pass bounds."""
     if value is not None and not math.isfinite(value):
         raise typer.BadParameter(f"expected a finite number, found {value}")
@@ -30,10 +32,10 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, 
 PlannerOption = Annotated[Planner, typer.Option(help="OMPL planner: one PRM* roadmap, or RRTConnect pair by pair "
                                                            "(noisy).")]
 MarginOption = Annotated[float | None, typer.Option(
-    min=0, max=1, callback=_finite, help="Planning costs are twin times x (1 + margin); default: the world's.",
+    min=0, max=1, callback=finite, help="Planning costs are twin times x (1 + margin); default: the world's.",
     show_default=False)]
 TimeLimit = Annotated[float | None, typer.Option(
-    metavar="S", min=0, callback=_finite, help="Stop each solve after so many seconds and take its best plan.",
+    metavar="S", min=0, callback=finite, help="Stop each solve after so many seconds and take its best plan.",
     show_default="none")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")]
 Trials = Annotated[int, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.")]
@@ -46,4 +48,4 @@ ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure pro
                                                               show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]
-Gap = Annotated[float, typer.Option(min=0, callback=_finite, help="Relative gap at which a plan counts as optimal.")]
+Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]

@@ -18,13 +18,14 @@ _STREAMS = {"places": 0, "incentives": 1, "winds": 2}
 
 FUEL_MULTIPLE: dict[Family, float] = {"A": 2.25, "B": 1.0, "C": 1.2}
 """Fuel capacity in largest distances; the paper's table has 2.25 to 3."""
-LIMIT_MULTIPLE: dict[Family, float | None] = {"A": None, "B": 2.25, "C": None}
-"""Mission limit in largest distances; ``None`` = as much as the fuel capacity allows."""
+
+FUEL_TIGHT_LIMIT = 2.25
+"""Mission limit of family B in largest distances."""
 
 
 def random_instance(
     family: Family, *, pois: int, vehicles: int, availability: float, seed: int, fuel_multiple: float | None = None,
-    tau: float = 1.0, directed: bool = False,
+    tau: float | None = None, directed: bool = False,
 ) -> Instance:
     """A random instance: base in the middle of a square of side 100, four stations, POIs anywhere.
 
@@ -40,13 +41,14 @@ def random_instance(
         availability: Availability of the uncertain vehicles.
         seed: Seed; places and incentives depend on nothing else but the numbers of POIs and vehicles.
         fuel_multiple: Fuel capacity in largest distances; default: the family's.
-        tau: Mission limit in fuel capacities (families A and C).
+        tau: Mission limit in fuel capacities; default: 1, and in family B what makes it 2.25 largest distances.
         directed: Whether a leg costs up to a tenth more, by chance, each way.
 
     Source:
         Section 5.1 of the paper.
     """
-    if min(pois, vehicles) < 0 or not 0 <= availability <= 1 or tau <= 0 or (fuel_multiple or 1.0) <= 0:
+    multiple = FUEL_MULTIPLE[family] if fuel_multiple is None else fuel_multiple
+    if min(pois, vehicles) < 0 or not 0 <= availability <= 1 or multiple <= 0 or (tau is not None and tau <= 0):
         raise ValueError("numbers and limits can't be negative, and an availability is a probability")
     places, incomes, winds = (np.random.default_rng((seed, stream)) for stream in _STREAMS.values())
     at = np.concatenate([[(SIDE / 2, SIDE / 2)], STATIONS, places.uniform(0, SIDE, size=(pois, 2))])
@@ -57,9 +59,8 @@ def random_instance(
             fuel = np.minimum(fuel, fuel[:, k, None] + fuel[None, k, :])
     fuel = np.ceil(fuel * 10**DECIMALS) / 10**DECIMALS
     longest = float(fuel.max())
-    capacity = (fuel_multiple or FUEL_MULTIPLE[family]) * longest
-    of_limit = LIMIT_MULTIPLE[family]
-    limit = tau * capacity if of_limit is None else of_limit * longest
+    capacity = multiple * longest
+    limit = FUEL_TIGHT_LIMIT * longest if family == "B" and tau is None else (tau or 1.0) * capacity
     first = 1 + len(STATIONS)
     team = []
     for m in range(vehicles):

@@ -88,9 +88,8 @@ class BranchAndPrice:
             else:
                 self.classes.append(own)
                 self.graphs.append(graph)
-        rewarded = self.goal.rewarded()
-        self._rows = tuple(j for j in self._pois if rewarded[:, j].any())
-        # A stop that counts for nothing can be of use only without the triangle inequality; the legs know.
+        # A stop that counts for nothing can be of use without the triangle inequality; the legs know.
+        self._rows = tuple(j for j in self._pois if any(graph.legs[j].any() for graph in self.graphs))
         self.memory = [_neighbours(graph, self._pois) for graph in self.graphs]
         self.pool: dict[tuple[int, tuple[int, ...]], Column] = {}
         total = float(np.abs(self.goal.weights).max(axis=0, initial=0.0).sum())

@@ -22,16 +22,16 @@ class DirectedModel:
     def __init__(self, instance: Instance, scopes: Sequence[Scope], goal: Goal, roads: Sequence[Road]) -> None:
         self._instance, self._scopes, self._roads = instance, scopes, roads
         self.model: LinearModel
-        self.model, self._legs = formulate(instance, scopes, goal)
+        self.model, self.legs = formulate(instance, scopes, goal)
         self._pois = frozenset(instance.pois)
 
     def rows(self, cuts: Sequence[Cut]) -> Rows:
         """The cuts as rows."""
-        return cut_rows(cuts, self._legs, len(self._instance.sites))
+        return cut_rows(cuts, self.legs, len(self._instance.sites))
 
     def visits(self, values: FloatArray, vehicle: int) -> FloatArray:
         """``y`` of a vehicle, shape (n, n)."""
-        return self._legs.matrix(values, vehicle, len(self._instance.sites))
+        return self.legs.matrix(values, vehicle, len(self._instance.sites))
 
     def order(self, values: FloatArray, vehicle: int) -> tuple[int, ...]:
         """POIs of a vehicle's route."""
@@ -41,7 +41,7 @@ class DirectedModel:
     def point(self, orders: Orders) -> FloatArray | None:
         """A plan as a point."""
         routes = [drive(road, order) for road, order in zip(self._roads, orders, strict=True)]
-        return columns_of(self._instance, self._legs, self._scopes, routes)
+        return columns_of(self._instance, self.legs, self._scopes, routes)
 
 
 def euler_walk(visits: FloatArray, base: int) -> list[int]:

@@ -69,6 +69,11 @@ class Relaxation:
         _check(self._solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1],
                                     rows.column, rows.value), "addRows")
 
+    def set_sides(self, lower: FloatArray, upper: FloatArray) -> None:
+        """Change the sides of all rows."""
+        count = len(lower)
+        _check(self._solver.changeRowsBounds(count, np.arange(count, dtype=np.int32), lower, upper), "changeRowsBounds")
+
     def add_columns(self, objective: FloatArray, start: IntArray, row: IntArray, value: FloatArray) -> None:
         """Add columns from 0 up without upper bound; the next solve starts from the last basis."""
         count = len(objective)

@@ -79,6 +79,7 @@ class Solution:
         status: How it ended.
         nodes: Branch-and-bound nodes.
         cuts: Connectivity cuts in the last program.
+        optimality_cuts: Cuts from the second stage, of the L-shaped method.
         rounds: Linear and integer programs solved.
         seconds: Wall-clock time of each phase [s].
         method: How it was proved.
@@ -91,6 +92,7 @@ class Solution:
     status: Status
     nodes: int
     cuts: int
+    optimality_cuts: int
     rounds: int
     seconds: dict[str, float]
     method: str
@@ -150,6 +152,7 @@ class Progress:
     status: Status = "feasible"
     nodes: int = 0
     cuts: int = 0
+    optimality_cuts: int = 0
     rounds: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     grain: float = 0.0  # every plan's value is a multiple of it; 0 = unknown

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.branch_and_cut import prove_by_cuts
+from sva_bench.solver.branch_and_cut import FlowModel, prove_by_cuts
 from sva_bench.solver.branch_and_price import BranchAndPrice
 from sva_bench.solver.expected import DirectedModel
 from sva_bench.solver.formulation import Goal
@@ -25,11 +25,15 @@ from sva_bench.solver.knowledge import (
     trivial_bound,
     value_of,
 )
+from sva_bench.solver.lshaped import Cuts, prove_by_duals
 from sva_bench.solver.packing import Route
 from sva_bench.solver.preprocess import Scope, scope_of
+from sva_bench.solver.recourse import EquivalentModel, Recourse
 from sva_bench.solver.undirected import UndirectedModel, serves
 
-Method = Literal["auto", "expected", "undirected", "branch-and-price"]
+Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
+TWO_STAGE: tuple[Method, ...] = ("dep", "relaxed", "lshaped")
+"""Methods that keep the second stage as the paper has it."""
 
 _log = logging.getLogger(__name__)
 
@@ -41,6 +45,7 @@ _WITHIN = 0.99  # of the gap, for rounding
 
 def solve(
     instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method = "auto",
+    recourse: Recourse | None = None, cuts: Cuts = "single",
 ) -> Solution:
     """The best plan for a goal, with a proof unless time runs out or Ctrl-C is pressed.
 
@@ -50,7 +55,10 @@ def solve(
         known: What earlier solves found; this one adds to it.
         clock: Time left.
         gap: Gap at which the plan counts as optimal.
-        method: ``expected``, the collapsed model by branch and cut, or ``auto``.
+        method: How to prove it: ``auto`` chooses; ``expected`` is the collapsed model by branch and cut; ``dep``,
+            ``relaxed`` and ``lshaped`` keep the second stage.
+        recourse: The second stage, for those that keep it.
+        cuts: Optimality cuts of ``lshaped``.
 
     Raises:
         ValueError: If the goal has floors and no known plan reaches them.
@@ -78,10 +86,11 @@ def solve(
         if not progress.closed(gap):
             if method == "branch-and-price":
                 _prove_by_columns(instance, scopes, goal, known, clock, gap, progress, routes)
+            elif method == "lshaped" and recourse is not None:
+                prove_by_duals(instance, scopes, goal, recourse, cuts, known, clock, gap, progress)
             else:
-                flow = UndirectedModel(instance, scopes, goal) if method == "undirected" else \
-                    DirectedModel(instance, scopes, goal, known.roads)
-                prove_by_cuts(flow, instance, goal, known, clock, gap, progress)
+                prove_by_cuts(_model(instance, scopes, goal, known, method, recourse), instance, goal, known, clock,
+                              gap, progress)
     except KeyboardInterrupt:
         progress.status = "interrupted"
     progress.bound = max(progress.bound, progress.value)
@@ -94,8 +103,21 @@ def solve(
     return Solution(
         routes=tuple(drive(road, order) for road, order in zip(known.roads, orders, strict=True)), orders=orders,
         value=progress.value, bound=progress.bound, status=progress.status, nodes=progress.nodes, cuts=progress.cuts,
-        rounds=progress.rounds, seconds=progress.seconds,
+        optimality_cuts=progress.optimality_cuts, rounds=progress.rounds, seconds=progress.seconds,
         method=method)
+
+
+def _model(
+    instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, method: Method,
+    recourse: Recourse | None,
+) -> FlowModel:
+    if method == "undirected":
+        return UndirectedModel(instance, scopes, goal)
+    if method == "expected":
+        return DirectedModel(instance, scopes, goal, known.roads)
+    if recourse is None:
+        raise ValueError(f"the method {method} needs a second stage")
+    return EquivalentModel(instance, scopes, goal, known.roads, recourse, relaxed=method == "relaxed")
 
 
 def choice(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> Method:

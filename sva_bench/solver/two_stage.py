@@ -18,9 +18,11 @@ from sva_bench.mission.plan import Objective, Plan, Status
 from sva_bench.solver.formulation import Goal
 from sva_bench.solver.heuristic import Orders
 from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of
+from sva_bench.solver.lshaped import Cuts
 from sva_bench.solver.preprocess import warn_of_unreachable
+from sva_bench.solver.recourse import recourse_of
 from sva_bench.solver.refuelling import quickest
-from sva_bench.solver.solve import Method, solve
+from sva_bench.solver.solve import TWO_STAGE, Method, solve
 
 __all__ = ["DeterministicPlans", "Knowledge", "SolveLimits", "knowledge_of", "plan_deterministic", "plan_nominal",
            "plan_stochastic", "wait_and_see"]
@@ -54,7 +56,7 @@ class DeterministicPlans:
 
 def plan_stochastic(
     instance: Instance, limits: SolveLimits | None = None, incumbent: Plan | None = None,
-    known: Knowledge | None = None, method: Method = "auto",
+    known: Knowledge | None = None, method: Method = "auto", cuts: Cuts = "single",
 ) -> Plan:
     """The plan of greatest expected value under the instance's failure process.
 
@@ -64,31 +66,32 @@ def plan_stochastic(
         incumbent: A feasible plan to start from.
         known: What solves of the same instance with other availabilities found.
         method: How to prove it.
+        cuts: Optimality cuts of the method ``lshaped``.
 
     Raises:
-        BadInput: If the incumbent is infeasible, or the method doesn't serve the instance's failure process.
+        BadInput: If the incumbent is infeasible, or the method doesn't serve the instance.
     """
     if instance.failure == "per_leg" and method != "auto":
         raise BadInput(f"instance {instance.name}: {method} plans under mission, the instance fails per leg; take the "
                        "method auto, or set its failure to mission")
-    return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known, method)
+    return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known, method, cuts)
 
 
 def plan_nominal(
     instance: Instance, limits: SolveLimits | None = None, incumbent: Plan | None = None,
-    known: Knowledge | None = None, method: Method = "auto",
+    known: Knowledge | None = None, method: Method = "auto", cuts: Cuts = "single",
 ) -> Plan:
     """A plan with the greatest sum of incentives, every vehicle taken as available; its ties are left open.
 
     It depends on no availability, so all scenarios can share it.
     """
     return _plan(replace(instance, failure="mission"), "deterministic", np.ones(len(instance.vehicles)), limits,
-                 incumbent, known, method)
+                 incumbent, known, method, cuts)
 
 
 def plan_deterministic(
     instance: Instance, stochastic: Plan, limits: SolveLimits | None = None, nominal: Plan | None = None,
-    known: Knowledge | None = None, method: Method = "auto",
+    known: Knowledge | None = None, method: Method = "auto", cuts: Cuts = "single",
 ) -> DeterministicPlans:
     """The deterministic plan, its ties broken in its own favour, and the range that they span.
 
@@ -108,12 +111,12 @@ def plan_deterministic(
     known = known or knowledge_of(instance)
     clock = limits.clock()
     if nominal is None:
-        nominal = plan_nominal(instance, limits, known=known, method=method)
+        nominal = plan_nominal(instance, limits, known=known, method=method, cuts=cuts)
     elif nominal.value is None or nominal.bound is None or nominal.status is None:
         raise ValueError("the nominal plan must state its value, bound and status")
     nominal_orders, stochastic_orders = (_orders(instance, plan, known) for plan in (nominal, stochastic))
     known.orders.update(dict.fromkeys((nominal_orders, stochastic_orders)))
-    ties = _Ties(instance, nominal_orders, known, clock, limits.gap, method)
+    ties = _Ties(instance, nominal_orders, known, clock, limits.gap, "auto" if method in TWO_STAGE else method)
     most, least, soonest = ties.solutions(nominal.status == "interrupted")
     best = soonest or most
     orders = best.orders if best else nominal_orders
@@ -181,7 +184,7 @@ def _outcomes(instance: Instance) -> dict[frozenset[str], float]:
 
 def _plan(
     instance: Instance, objective: Objective, availability: FloatArray, limits: SolveLimits | None,
-    incumbent: Plan | None, known: Knowledge | None, method: Method,
+    incumbent: Plan | None, known: Knowledge | None, method: Method, cuts: Cuts,
 ) -> Plan:
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
@@ -198,7 +201,7 @@ def _plan(
         solution = solve(instance, goal, known, clock, limits.gap)
         return _finish(instance, objective, solution.orders, known, value=solution.value, bound=solution.bound,
                        status=solution.status, solutions=[solution], runtime_s=clock.used_s())
-    solution = _greatest(instance, availability, known, clock, limits.gap, method)
+    solution = _greatest(instance, availability, known, clock, limits.gap, method, cuts)
     scale = float(availability.max(initial=0.0))
     value = _sum(_incentives(instance) * availability[:, None], solution.orders)
     return _finish(instance, objective, solution.orders, known, value=value, bound=max(solution.bound * scale, value),
@@ -207,11 +210,17 @@ def _plan(
 
 def _greatest(
     instance: Instance, availability: FloatArray, known: Knowledge, clock: Clock, gap: float, method: Method = "auto",
+    cuts: Cuts = "single",
 ) -> Solution:
     """The plan of greatest ``sum p e y``, in units in which the greatest ``p`` is 1."""
     scale = float(availability.max(initial=0.0))
     shares = availability / scale if scale > 0 else availability
     goal = Goal(weights=_incentives(instance) * shares[:, None])
+    if method in TWO_STAGE:
+        certain = bool((availability == 1).all())
+        outcomes = {frozenset(v.name for v in instance.vehicles): 1.0} if certain else _outcomes(instance)
+        recourse = recourse_of(instance, outcomes, scale or 1.0)
+        return solve(instance, goal, known, clock, gap, method, recourse, cuts)
     return _once(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap, method)
 
 
@@ -288,6 +297,8 @@ def _finish(
         fuel[vehicle.name] = float(sum(vehicle.fuel_s[i, j] for i, j in itertools.pairwise(drive.route)))
     counted = {"nodes": sum(s.nodes for s in solutions), "cuts": max((s.cuts for s in solutions), default=0),
                "rounds": sum(s.rounds for s in solutions)}
+    if any(s.optimality_cuts for s in solutions):
+        counted["optimality_cuts"] = sum(s.optimality_cuts for s in solutions)
     method = solutions[0].method if solutions else "expected"
     return _certified(instance, Plan(
         routes=routes, instance=instance.name, objective=objective, method=method, status=status, value=value + 0.0,

@@ -25,7 +25,7 @@ class UndirectedModel:
     """The edge model of one goal, as ``branch_and_cut`` wants it."""
 
     def __init__(self, instance: Instance, scopes: Sequence[Scope], goal: Goal) -> None:
-        self._instance = instance
+        self._instance, self._scopes = instance, scopes
         n, base, pois = len(instance.sites), instance.base, instance.pois
         half = instance.stop_s[:, None] / 2 + instance.stop_s[None, :] / 2
         build = RowBuilder()

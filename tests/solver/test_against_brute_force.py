@@ -9,6 +9,7 @@ import pytest
 from sva_bench.mission.certify import certify
 from sva_bench.solver import solve as solving
 from sva_bench.solver.heuristic import Found
+from sva_bench.solver.lshaped import Cuts
 from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
@@ -20,6 +21,8 @@ from sva_bench.solver.two_stage import (
 from tests.solver.oracle import per_leg_optimum, random_instance, truth
 
 METHODS: tuple[Method, ...] = ("auto", "expected")
+PAPERS: tuple[tuple[Method, Cuts], ...] = (
+    ("dep", "single"), ("relaxed", "single"), ("lshaped", "single"), ("lshaped", "multi"), ("lshaped", "pareto"))
 
 
 def check(seed: int, method: Method = "auto") -> None:
@@ -53,6 +56,18 @@ def no_heuristic(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
+def check_two_stages(seed: int, method: Method, cuts: Cuts) -> None:
+    instance = random_instance(seed)
+    want = truth(instance)
+    stochastic = plan_stochastic(instance, method=method, cuts=cuts)
+    assert stochastic.status == "optimal"
+    assert stochastic.method in (method, "expected")
+    assert stochastic.value == pytest.approx(want.stochastic, rel=1e-6, abs=1e-6)
+    assert stochastic.bound == pytest.approx(want.stochastic, rel=1e-6, abs=1e-6)
+    nominal = plan_nominal(instance, method=method, cuts=cuts)
+    assert nominal.value == pytest.approx(want.nominal, rel=1e-6, abs=1e-6)
+
+
 def check_per_leg(seed: int) -> None:
     instance = replace(random_instance(seed), failure="per_leg")
     plan = plan_stochastic(instance)
@@ -73,6 +88,21 @@ def test_plans_are_those_that_enumeration_finds(seed: int, method: Method) -> No
 @pytest.mark.parametrize("seed", range(100, 118))
 def test_the_method_alone_finds_the_plans_that_enumeration_finds(seed: int, method: Method) -> None:
     check(seed, method)
+
+
+@pytest.mark.usefixtures("no_heuristic")
+@pytest.mark.parametrize(("method", "cuts"), PAPERS)
+@pytest.mark.parametrize("seed", range(4))
+def test_the_methods_of_the_paper_find_the_plans_that_enumeration_finds(seed: int, method: Method, cuts: Cuts) -> None:
+    check_two_stages(seed, method, cuts)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("no_heuristic")
+@pytest.mark.parametrize(("method", "cuts"), PAPERS)
+@pytest.mark.parametrize("seed", range(1000, 1050))
+def test_the_methods_of_the_paper_find_them_on_many_instances(seed: int, method: Method, cuts: Cuts) -> None:
+    check_two_stages(seed, method, cuts)
 
 
 @pytest.mark.usefixtures("no_heuristic")

@@ -24,7 +24,7 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState
 from sva_bench.mission.instance import Instance, Vehicle, read_instance
 from sva_bench.mission.plan import Plan
-from sva_bench.solver import branch_and_price, expected
+from sva_bench.solver import branch_and_cut, branch_and_price
 from sva_bench.solver import solve as solving
 from sva_bench.solver.expected import euler_walk
 from sva_bench.solver.heuristic import Found
@@ -262,7 +262,7 @@ def test_a_wide_gap_is_enough_when_asked_for() -> None:
 
 
 @pytest.mark.parametrize(("where", "what", "method"), [
-    (solving, "search", "auto"), (branch_and_price, "price", "auto"), (expected, "maximise", "expected")])
+    (solving, "search", "auto"), (branch_and_price, "price", "auto"), (branch_and_cut, "maximise", "expected")])
 def test_ctrl_c_keeps_the_best_plan_so_far(
     where: ModuleType, what: str, method: Method, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -284,7 +284,7 @@ def test_ctrl_c_during_branch_and_bound_ends_it_with_what_it_has(monkeypatch: py
         Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
         return maximise(*arguments, **options)
 
-    monkeypatch.setattr(expected, "maximise", interrupted)
+    monkeypatch.setattr(branch_and_cut, "maximise", interrupted)
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     instance = scattered(25)
     try:
