@@ -26,6 +26,7 @@ from sva_bench.options import (
     Objective,
     Out,
     PlannerOption,
+    RiskKind,
     Rollouts,
     ScenarioNames,
     Seed,
@@ -140,6 +141,14 @@ def plan(
     method: Annotated[Method, typer.Option(help="Solution method: auto chooses; expected is the collapsed model; dep, "
                                                 "relaxed and lshaped are the paper's.")] = "auto",
     cuts: Annotated[Cuts, typer.Option(help="Optimality cuts of lshaped.")] = "single",
+    risk: Annotated[RiskKind | None, typer.Option(help="Plan for the worst outcomes: their mean, or the shortfall "
+                                                  "below a target.", show_default="none")] = None,
+    beta: Annotated[float, typer.Option(min=0, max=0.999999, callback=finite, help="cvar: the mean of the worst "
+                                        "1 - BETA share of outcomes.")] = 0.9,
+    weight: Annotated[float, typer.Option(min=0, max=1, callback=finite, help="Share of the risk measure in the "
+                                          "objective; the rest is the expected incentive.")] = 1.0,
+    target: Annotated[float | None, typer.Option(min=0, callback=finite, help="excess: the incentive below which the "
+                                                 "shortfall counts.", show_default=False)] = None,
     scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
                                                       "under robots.", show_default=False)] = None,
     time_limit: TimeLimit = None,
@@ -152,9 +161,14 @@ def plan(
         from sva_bench.inputs import instance_of_world
         from sva_bench.mission.instance import read_instance
         from sva_bench.mission.plan import plan_as_dict
-        from sva_bench.solver.two_stage import SolveLimits, plan_deterministic, plan_stochastic
+        from sva_bench.solver.risk import RiskMeasure
+        from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
 
     set_up_logging(verbose)
+    if risk is not None and (objective != "stochastic" or method != "auto"):
+        raise BadInput("--risk goes with the stochastic objective and the method auto alone")
+    if (risk == "excess") != (target is not None):
+        raise BadInput("--risk excess and --target go together")
     with progress_bars() as progress:
         if source.suffix.lower() in (".yaml", ".yml"):
             instance = instance_of_world(source, scenario, "prmstar", None, progress)
@@ -164,7 +178,9 @@ def plan(
             instance = read_instance(source)
         progress("solving", 0, 1)
         limits = SolveLimits(time_limit_s=time_limit, gap=gap)
-        if objective == "stochastic":
+        if risk is not None:
+            made = plan_averse(instance, RiskMeasure(kind=risk, weight=weight, beta=beta, target=target or 0.0), limits)
+        elif objective == "stochastic":
             made = plan_stochastic(instance, limits, method=method, cuts=cuts)
         else:
             stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method, cuts=cuts)

@@ -114,7 +114,7 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
 def _wrong_claims(plan: Plan, expected: float, nominal: float, fuel: dict[str, float]) -> list[str]:
     claims = []
     worth = nominal if plan.objective == "deterministic" else expected
-    if plan.value is not None and plan.objective is not None and \
+    if plan.value is not None and plan.objective in ("stochastic", "deterministic") and \
             abs(plan.value - worth) > VALUE_TOLERANCE * max(1.0, abs(worth)):
         claims.append(f"the plan claims a value of {plan.value:.6g}; it is worth {worth:.6g}")
     claims += [f"{name}: the plan claims {claimed:.3f} s of fuel; it burns {fuel[name]:.3f} s"

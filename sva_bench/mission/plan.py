@@ -14,7 +14,7 @@ from sva_bench.errors import nearest
 from sva_bench.mission.instance import Instance
 
 KIND = "sva-bench/plan@1"
-Objective = Literal["stochastic", "deterministic"]
+Objective = Literal["stochastic", "deterministic", "cvar", "excess"]
 Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 Route = tuple[str, ...]
 """Site names from base to base; empty for a robot that stays home."""

@@ -158,7 +158,8 @@ class BranchAndPrice:
         return self._branch(node.side, solved, used, best, centre), best
 
     def _master(self, side: Side, prices: Prices | None) -> Master:
-        master = Master(side=side, pois=self._rows, n=self._n, floors=self._floors, penalty=self._penalty)
+        master = Master(side=side, pois=self._rows, n=self._n, floors=self._floors, penalty=self._penalty,
+                        risk=self.goal.risk)
         columns = list(self.pool.values())
         if len(columns) > _POOL and prices is not None:
             gain = np.array([self._reduced(c, prices) for c in columns])

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.solver.formulation import LinearModel, Rows
+from sva_bench.solver.formulation import LinearModel, RowBuilder
 from sva_bench.solver.highs import Relaxation, Relaxed
+from sva_bench.solver.risk import Risk
 
 Stops = tuple[int, ...]
 
@@ -106,7 +107,8 @@ class Master:
         pois: POIs with a row.
         floors: Least sum of each floor.
         penalty: What a unit of a required visit, or of a floor in units of its size, costs if it is missed.
-        entries: Unit and column of each program column after the penalties.
+        risk: The measure of risk whose outcomes the floors are.
+        entries: Unit and column of each program column after the penalties and the measure's own.
     """
 
     side: Side
@@ -114,28 +116,36 @@ class Master:
     n: int
     floors: FloatArray
     penalty: float
+    risk: Risk | None = None
     entries: list[tuple[int, Column]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._row = {j: k for k, j in enumerate(self.pois)}
-        rows = len(self.pois) + len(self.side.units) + len(self.floors)
+        first = len(self.pois) + len(self.side.units)
+        rows = first + len(self.floors)
         self._size = np.maximum(np.abs(self.floors), 1.0)
+        # What is required may be missed, at a price; under a risk measure the floors have columns of their own instead.
         missed = [self._row[j] for j in sorted(self.side.required)]
-        missed += [len(self.pois) + len(self.side.units) + k for k in range(len(self.floors))]
-        self.penalties = len(missed)
-        lower = np.full(rows, -np.inf)
-        lower[missed[:len(self.side.required)]] = 1.0
-        upper = np.concatenate([np.ones(len(self.pois)), [float(u.count) for u in self.side.units],
-                                np.full(len(self.floors), np.inf)])
-        lower[rows - len(self.floors):] = self.floors / self._size
-        start = np.zeros(rows + 1, dtype=np.int64)
-        start[1:] = np.cumsum(np.bincount(missed, minlength=rows))
-        at = {row: k for k, row in enumerate(missed)}
-        column = np.array([at[row] for row in range(rows) if row in at], dtype=np.int64)
+        missed += [] if self.risk else list(range(first, rows))
+        costs, entries = self.risk.costs() if self.risk else (np.zeros(0), np.zeros((len(self.floors), 0)))
+        self.penalties, self.others = len(missed), len(missed) + len(costs)
+        build = RowBuilder()
+        for row in range(rows):
+            columns, values = [k for k, at in enumerate(missed) if at == row], [1.0]
+            if row >= first:
+                used = np.flatnonzero(entries[row - first])
+                columns += (self.penalties + used).tolist()
+                values = [1.0] * (len(columns) - len(used))
+                values += (entries[row - first][used] / self._size[row - first]).tolist()
+            if row < len(self.pois):
+                build.add(columns, values[:len(columns)], 1.0 if self.pois[row] in self.side.required else -np.inf, 1.0)
+            elif row < first:
+                build.add([], [], -np.inf, float(self.side.units[row - len(self.pois)].count))
+            else:
+                build.add(columns, values, float(self.floors[row - first] / self._size[row - first]), np.inf)
         self._program = Relaxation(LinearModel(
-            objective=np.full(len(missed), -self.penalty), upper=np.full(len(missed), np.inf),
-            integer=np.zeros(len(missed), dtype=np.bool_),
-            rows=Rows(lower=lower, upper=upper, start=start, column=column, value=np.ones(len(column)))))
+            objective=np.concatenate([np.full(self.penalties, -self.penalty), costs]),
+            upper=np.full(self.others, np.inf), integer=np.zeros(self.others, dtype=np.bool_), rows=build.rows()))
         self._present: set[tuple[int, Stops]] = set()
 
     def add(self, unit: int, columns: list[Column]) -> int:
@@ -184,7 +194,7 @@ class Master:
     def share(self, solved: Relaxed) -> list[tuple[int, Column, float]]:
         """The columns in use: unit, column and share."""
         assert solved.values is not None
-        used = solved.values[self.penalties:]
+        used = solved.values[self.others:]
         return [(*self.entries[k], float(used[k])) for k in np.flatnonzero(used > 1e-7)]
 
     def missed(self, solved: Relaxed) -> float:

@@ -20,6 +20,7 @@ import numpy as np
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.preprocess import Scope
+from sva_bench.solver.risk import Risk
 
 SLACK_S = 5e-7
 """Half the feasibility tolerance: a route that is on its limit but for rounding stays feasible."""
@@ -107,12 +108,15 @@ class Goal:
         driving: What a second of driving and stopping costs.
         survival: Chance of each vehicle to get to its next POI, shape (M,): the k-th visit of a route earns the k-th
             power of it; ``None`` = certain.
+        risk: A measure of risk, whose weight is not in ``weights``; its outcomes are the floors, which are then no
+            constraints.
     """
 
     weights: FloatArray
     floors: tuple[tuple[FloatArray, float], ...] = ()
     driving: float = 0.0
     survival: FloatArray | None = None
+    risk: Risk | None = None
 
     def chances(self) -> FloatArray:
         """``survival``, or ones."""

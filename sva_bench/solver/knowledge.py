@@ -192,7 +192,7 @@ def without_idle_stops(road: Road, order: tuple[int, ...], rewarded: BoolArray) 
 
 
 def _keeps_floors(goal: Goal, orders: Orders) -> bool:
-    return all(_sum(weights, orders) >= floor for weights, floor in goal.floors)
+    return goal.risk is not None or all(_sum(weights, orders) >= floor for weights, floor in goal.floors)
 
 
 def adopt(progress: Progress, goal: Goal, known: Knowledge, orders: Orders) -> None:
@@ -205,6 +205,9 @@ def adopt(progress: Progress, goal: Goal, known: Knowledge, orders: Orders) -> N
 def value_of(goal: Goal, roads: Sequence[Road], orders: Orders) -> float:
     """Value of a feasible plan under a goal."""
     value = rewards(goal.weights, goal.chances(), orders)
+    if goal.risk is not None:
+        sums = np.array([math.fsum(goal.risk.incentives[m, j] for j in order) for m, order in enumerate(orders)])
+        value += goal.risk.measure.weight * goal.risk.of(sums)
     if goal.driving:
         for road, order in zip(roads, orders, strict=True):
             found = quickest(road, order)
@@ -234,14 +237,18 @@ def trivial_bound(goal: Goal) -> float:
     """Every POI visited by whoever earns most there."""
     if not len(goal.weights):
         return 0.0
-    return float(np.maximum(goal.weights.max(axis=0), 0.0).sum())
+    bound = float(np.maximum(goal.weights.max(axis=0), 0.0).sum())
+    if goal.risk is not None and goal.risk.measure.kind == "cvar":
+        bound += goal.risk.measure.weight * float(goal.risk.incentives.max(axis=0).sum())
+    return bound
 
 
 def grain_of(goal: Goal) -> float:
     """The greatest number of which every plan's value is a multiple; 0 where none is plain to see."""
     scaled = goal.weights * _DECIMALS
     whole = np.rint(scaled)
-    if goal.driving or goal.survival is not None or np.abs(scaled - whole).max(initial=0.0) > 1e-9 \
-            or np.abs(whole).max(initial=0.0) > 1e9:
+    if goal.driving or goal.survival is not None or goal.risk is not None:
+        return 0.0
+    if np.abs(scaled - whole).max(initial=0.0) > 1e-9 or np.abs(whole).max(initial=0.0) > 1e9:
         return 0.0
     return float(np.gcd.reduce(np.abs(whole).astype(np.int64), axis=None)) / _DECIMALS

@@ -39,15 +39,25 @@ class Recourse:
     available: FloatArray
 
 
+def refuse_too_many(instance: Instance, outcomes: Mapping[frozenset[str], float]) -> None:
+    """Refuse more outcomes than a program should have rows for.
+
+    Raises:
+        BadInput: If there are.
+    """
+    if len(outcomes) > MOST_OUTCOMES:
+        raise BadInput(f"instance {instance.name}: {len(outcomes)} sets of vehicles can be available, and the program "
+                       f"has rows for each; at most {MOST_OUTCOMES}: plan for the expected incentive instead, by the "
+                       "method auto or expected")
+
+
 def recourse_of(instance: Instance, outcomes: Mapping[frozenset[str], float], scale: float) -> Recourse:
     """The two stages of an instance, rewards divided by ``scale``.
 
     Raises:
         BadInput: If a leg costs nothing, or there are too many outcomes to write down.
     """
-    if len(outcomes) > MOST_OUTCOMES:
-        raise BadInput(f"instance {instance.name}: {len(outcomes)} sets of vehicles can be available, and the paper's "
-                       f"second stage has columns for each; at most {MOST_OUTCOMES}: use the method auto or expected")
+    refuse_too_many(instance, outcomes)
     for vehicle in instance.vehicles:
         free = np.argwhere((vehicle.fuel_s <= 0) & ~np.eye(len(instance.sites), dtype=np.bool_))
         if len(free):

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
+from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.branch_and_cut import FlowModel, prove_by_cuts
 from sva_bench.solver.branch_and_price import BranchAndPrice
@@ -75,11 +76,12 @@ def solve(
     if method == "auto":
         method = choice(instance, scopes, goal)
     try:
-        if not goal.floors and not goal.driving and bool((goal.weights >= 0).all()):
+        if (not goal.floors or goal.risk) and not goal.driving and bool((goal.weights >= 0).all()):
             began = clock.used_s()
             found = search(
-                known.tables, goal.weights, goal.chances(), start, starts=STARTS, rounds=ROUNDS,
-                stop=lambda value: clock.out() or progress.bound - value <= gap * max(1.0, value))
+                known.tables, _searched(goal), goal.chances(), start, starts=STARTS, rounds=ROUNDS,
+                stop=lambda value: clock.out() or (
+                    goal.risk is None and progress.bound - value <= gap * max(1.0, value)))
             adopt(progress, goal, known, found.orders)
             routes = found.routes
             progress.seconds["heuristic"] = clock.used_s() - began
@@ -107,6 +109,14 @@ def solve(
         method=method)
 
 
+def _searched(goal: Goal) -> FloatArray:
+    """What the heuristic maximises: the goal, or under a measure of risk the expected incentive."""
+    if goal.risk is None:
+        return goal.weights
+    expected: FloatArray = goal.risk.incentives * (goal.risk.probability @ goal.risk.available)[:, None]
+    return expected
+
+
 def _model(
     instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, method: Method,
     recourse: Recourse | None,
@@ -125,9 +135,9 @@ def choice(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> Method:
 
     Long routes that never refuel, by few vehicles, over symmetric costs want the edge model. Where a mission limit is
     missing routes are too long for labels, and the directed model takes over. All else wants routes as columns, and
-    failures along the route leave no other choice.
+    failures along the route and measures of risk leave no other choice.
     """
-    if goal.survival is not None:
+    if goal.survival is not None or goal.risk is not None:
         return "branch-and-price"
     if not all(math.isfinite(v.mission_limit_s) for v in instance.vehicles):
         return "expected"

@@ -20,12 +20,22 @@ from sva_bench.solver.heuristic import Orders
 from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of
 from sva_bench.solver.lshaped import Cuts
 from sva_bench.solver.preprocess import warn_of_unreachable
-from sva_bench.solver.recourse import recourse_of
+from sva_bench.solver.recourse import recourse_of, refuse_too_many
 from sva_bench.solver.refuelling import quickest
+from sva_bench.solver.risk import Risk, RiskMeasure
 from sva_bench.solver.solve import TWO_STAGE, Method, solve
 
-__all__ = ["DeterministicPlans", "Knowledge", "SolveLimits", "knowledge_of", "plan_deterministic", "plan_nominal",
-           "plan_stochastic", "wait_and_see"]
+__all__ = [
+    "DeterministicPlans",
+    "Knowledge",
+    "SolveLimits",
+    "knowledge_of",
+    "plan_averse",
+    "plan_deterministic",
+    "plan_nominal",
+    "plan_stochastic",
+    "wait_and_see",
+]
 
 _log = logging.getLogger(__name__)
 
@@ -75,6 +85,39 @@ def plan_stochastic(
         raise BadInput(f"instance {instance.name}: {method} plans under mission, the instance fails per leg; take the "
                        "method auto, or set its failure to mission")
     return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known, method, cuts)
+
+
+def plan_averse(
+    instance: Instance, measure: RiskMeasure, limits: SolveLimits | None = None, known: Knowledge | None = None,
+) -> Plan:
+    """The plan that is best under a measure of risk; failures are those of ``mission``.
+
+    Raises:
+        BadInput: If the instance fails per leg, or too many outcomes are possible.
+    """
+    if instance.failure == "per_leg":
+        raise BadInput(f"instance {instance.name}: measures of risk are over the outcomes of mission, the instance "
+                       "fails per leg; set its failure to mission")
+    outcomes = _outcomes(instance)
+    refuse_too_many(instance, outcomes)
+    limits = limits or SolveLimits()
+    known = known or knowledge_of(instance)
+    known.check(instance)
+    clock = limits.clock()
+    warn_of_unreachable(instance)
+    names, incentives = [v.name for v in instance.vehicles], _incentives(instance)
+    available = np.array([[float(name in there) for name in names] for there in outcomes]).reshape(
+        len(outcomes), len(names))
+    risk = Risk(measure=measure, incentives=incentives, probability=np.array(list(outcomes.values())),
+                available=available)
+    goal = Goal(
+        weights=(1 - measure.weight) * _availability(instance)[:, None] * incentives, risk=risk,
+        floors=tuple((there[:, None] * incentives, risk.side) for there in available) if measure.weight > 0 else ())
+    if measure.weight == 0:
+        goal = replace(goal, risk=None)
+    solution = solve(instance, goal, known, clock, limits.gap)
+    return _finish(instance, measure.kind, solution.orders, known, value=solution.value, bound=solution.bound,
+                   status=solution.status, solutions=[solution], runtime_s=clock.used_s())
 
 
 def plan_nominal(

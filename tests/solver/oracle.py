@@ -9,6 +9,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.solver.risk import RiskMeasure
 
 TOLERANCE = 1e-6
 
@@ -79,6 +80,35 @@ def truth(instance: Instance) -> Truth:
         foresight += probability * float((sums @ np.array(there, dtype=float)).max())
     return Truth(stochastic=float(expected.max()), nominal=float(nominal.max()), most=float(expected[tied].max()),
                  least=float(expected[tied].min()), soonest=float(seconds[best].min()), foresight=foresight)
+
+
+def risk_optimum(instance: Instance, measure: RiskMeasure) -> float:
+    """Greatest value of a plan under a measure of risk, each plan's outcomes sorted by what they pay."""
+    times = [least_times(instance, v) for v in instance.vehicles]
+    outcomes: list[tuple[float, list[bool]]] = []
+    if instance.joint is not None:
+        outcomes = [(s.probability, [v.name in s.available for v in instance.vehicles]) for s in instance.joint]
+    else:
+        for there in itertools.product((True, False), repeat=len(instance.vehicles)):
+            outcomes.append((float(np.prod([v.availability if t else 1 - v.availability
+                                            for v, t in zip(instance.vehicles, there, strict=True)])), list(there)))
+    best = -np.inf
+    for visits in itertools.product(*times):
+        if sum(map(len, visits)) != len(frozenset().union(*visits)):
+            continue
+        sums = [sum(float(v.incentives[j]) for j in s) for v, s in zip(instance.vehicles, visits, strict=True)]
+        paid = sorted((sum(x for x, t in zip(sums, there, strict=True) if t), p) for p, there in outcomes)
+        mean = sum(x * p for x, p in paid)
+        if measure.kind == "excess":
+            bad = -sum(max(measure.target - x, 0.0) * p for x, p in paid)
+        else:
+            left = tail = 1 - measure.beta
+            bad = 0.0
+            for x, p in paid:
+                bad += x * min(p, left) / tail
+                left -= min(p, left)
+        best = max(best, (1 - measure.weight) * mean + measure.weight * bad)
+    return best
 
 
 def per_leg_optimum(instance: Instance) -> float:

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sva_bench.mission.certify import certify
+from sva_bench.mission.failures import JointState, marginals
 from sva_bench.solver import solve as solving
 from sva_bench.solver.heuristic import Found
 from sva_bench.solver.lshaped import Cuts
+from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
+    plan_averse,
     plan_deterministic,
     plan_nominal,
     plan_stochastic,
     wait_and_see,
 )
-from tests.solver.oracle import per_leg_optimum, random_instance, truth
+from tests.solver.oracle import per_leg_optimum, random_instance, risk_optimum, truth
 
 METHODS: tuple[Method, ...] = ("auto", "expected")
 PAPERS: tuple[tuple[Method, Cuts], ...] = (
@@ -75,6 +79,41 @@ def check_per_leg(seed: int) -> None:
     assert plan.value == pytest.approx(per_leg_optimum(instance), rel=1e-6, abs=1e-6)
     assert plan.bound == pytest.approx(plan.value, rel=1e-6, abs=1e-6)
     assert certify(instance, plan).reasons == ()
+
+
+def check_risk(seed: int) -> None:
+    instance = random_instance(seed)
+    rng = np.random.default_rng(seed)
+    if seed % 2:  # correlated
+        p = rng.dirichlet(np.ones(4))
+        names = [v.name for v in instance.vehicles]
+        states = tuple(JointState(probability=float(q), available=frozenset(name for k, name in enumerate(names)
+                                                                            if bits >> k & 1))
+                       for bits, q in enumerate(p))
+        instance = replace(instance, joint=states, vehicles=tuple(
+            replace(v, availability=marginals(states, [v.name])[v.name]) for v in instance.vehicles))
+    weight, beta, target = float(rng.choice([0.3, 1.0])), float(rng.choice([0.0, 0.4, 0.9])), float(rng.integers(90))
+    for measure in (RiskMeasure(kind="cvar", weight=weight, beta=beta),
+                    RiskMeasure(kind="excess", weight=weight, target=target)):
+        plan = plan_averse(instance, measure)
+        assert plan.status == "optimal"
+        want = risk_optimum(instance, measure)
+        assert plan.value == pytest.approx(want, rel=1e-6, abs=1e-6)
+        assert plan.bound == pytest.approx(want, rel=2e-6, abs=2e-6)
+        assert certify(instance, plan).feasible
+
+
+@pytest.mark.usefixtures("no_heuristic")
+@pytest.mark.parametrize("seed", range(14))
+def test_plans_under_a_measure_of_risk_are_those_that_enumeration_finds(seed: int) -> None:
+    check_risk(seed)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("no_heuristic")
+@pytest.mark.parametrize("seed", range(2000, 2300))
+def test_plans_under_a_measure_of_risk_are_those_that_enumeration_finds_on_many_instances(seed: int) -> None:
+    check_risk(seed)
 
 
 @pytest.mark.parametrize("method", METHODS)
