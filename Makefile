@@ -2,7 +2,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: run test test-long lint setup lock bench clean
+.PHONY: run test test-long lint setup lock bench clean bench-solver
 
 run: setup  ## plan, execute and measure the four-rooms mission
 	$(BIN)/sva-bench run worlds/four-rooms.yaml
@@ -33,6 +33,9 @@ lock: setup  ## pin the dependencies anew
 
 clean:
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+bench-solver: setup  ## the speed that the solver promises, by class: takes an hour
+	$(BIN)/python -m benchmarks.solver.classes
 
 bench: setup  ## figures of the README; see benchmarks/
 	for file in travel_times physics recording solver_small; do $(BIN)/python benchmarks/$$file.py || exit 1; done
