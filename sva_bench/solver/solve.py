@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
+import numpy as np
+
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.branch_and_cut import FlowModel, prove_by_cuts
@@ -143,7 +145,8 @@ def choice(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> Method:
         return "branch-and-price"
     if not all(math.isfinite(v.mission_limit_s) for v in instance.vehicles):
         return "expected"
-    longest = max((float(scope.fuel_s[scope.legs].max(initial=0.0)) for scope in scopes), default=0.0)
+    # Of all legs: those that a short limit leaves are short themselves.
+    longest = max((float(v.fuel_s[np.isfinite(v.fuel_s)].max()) for v in instance.vehicles), default=0.0)
     shortest_limit = min((v.mission_limit_s for v in instance.vehicles), default=0.0)
     if len(scopes) <= MOST_LONG and shortest_limit >= LONG * longest and serves(instance, scopes):
         return "undirected"
