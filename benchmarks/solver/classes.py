@@ -59,7 +59,7 @@ CASES = (
     Case(name="per-leg-A-30", family="A", pois=30, vehicles=2, limit_s=10, per_leg=True),
     Case(name="per-leg-C-30", family="C", pois=30, vehicles=2, limit_s=10, per_leg=True),
 )
-GRACE = 3.0  # a solve is stopped at so many times its limit, so that a miss has a figure
+GRACE = 1.5  # a solve is stopped at so many times its limit, so that a miss has a figure
 
 
 def measure(case: Case) -> str:
