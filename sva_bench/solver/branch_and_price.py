@@ -34,6 +34,7 @@ _SLACK = 0.03  # of the gap: a relaxation this close to its bound counts as solv
 _SMOOTHING = 0.5  # share of the best prices so far
 _STRONG = 8  # candidates for branching that are looked at closely
 _EPSILON = 1e-7
+_WITHIN = 0.9  # of the tolerance: sums in another order must not make a route infeasible
 _POOL = 4000  # columns that a new node begins with at most
 
 
@@ -144,7 +145,9 @@ class BranchAndPrice:
             used = master.share(solved)
             visited = [(unit, column) for unit, column, _ in used]
             whole = all(abs(share - round(share)) < 1e-6 for *_, share in used)
-            if self._remember(visited, ignore_most=whole):
+            undecided = self._undecided(node.side, used)
+            # With nothing left to decide only routes that visit a POI again can be in the way.
+            if self._remember(visited, ignore_most=whole or not undecided):
                 self._forget()
             elif whole and master.missed(solved) < 1e-6:
                 self._offer_columns(used)
@@ -155,7 +158,7 @@ class BranchAndPrice:
                 break
         if self.nodes == 1 or self.nodes % 10 == 0:
             self._dive(node.side, centre)
-        return self._branch(node.side, solved, used, best, centre), best
+        return self._branch(node.side, solved, undecided, best, centre), best
 
     def _master(self, side: Side, prices: Prices | None) -> Master:
         master = Master(side=side, pois=self._rows, n=self._n, floors=self._floors, penalty=self._penalty,
@@ -324,25 +327,30 @@ class BranchAndPrice:
             units = [replace(u, forbidden=u.forbidden | gone) for u in units]
         self._offer_columns(fixed)
 
-    def _branch(
-        self, side: Side, solved: Relaxed, used: Sequence[tuple[int, Column, float]], bound: float,
-        prices: Prices | None,
-    ) -> list[_Node]:
-        """The two sides of a decision: is a POI visited, or does a unit visit it."""
+    def _undecided(
+        self, side: Side, used: Sequence[tuple[int, Column, float]],
+    ) -> list[tuple[float, int, int]]:
+        """What a relaxation leaves open: distance from a half, POI, and unit, or -1: visited at all?."""
         each = np.zeros((len(side.units), self._n))
         for number, column, share in used:
             each[number] += share * column.visits
         total = each.sum(axis=0)
-        candidates = [(abs(total[j] - 0.5), j, -1) for j in self._rows if 1e-6 < total[j] < 1 - 1e-6]
-        if not candidates:
-            candidates = [(abs(each[u, j] - 0.5), j, u) for u in range(len(side.units)) for j in self._rows
-                          if 1e-6 < each[u, j] < 1 - 1e-6]
-        if not candidates:  # several alike on whole visits: tell one of them from the others
-            candidates = [(1.0, j, u) for u, unit in enumerate(side.units) if unit.count > 1
-                          for j in self._rows if each[u, j] > 1e-6][:1]
+        found = [(abs(total[j] - 0.5), j, -1) for j in self._rows if 1e-6 < total[j] < 1 - 1e-6]
+        if not found:
+            found = [(abs(each[u, j] - 0.5), j, u) for u in range(len(side.units)) for j in self._rows
+                     if 1e-6 < each[u, j] < 1 - 1e-6]
+        if not found:  # several alike on whole visits: tell one of them from the others
+            found = [(1.0, j, u) for u, unit in enumerate(side.units) if unit.count > 1
+                     for j in self._rows if each[u, j] > 1e-6][:1]
+        return sorted(found)
+
+    def _branch(
+        self, side: Side, solved: Relaxed, candidates: Sequence[tuple[float, int, int]], bound: float,
+        prices: Prices | None,
+    ) -> list[_Node]:
+        """The two sides of a decision: is a POI visited, or does a unit visit it."""
         if not candidates:
             raise RuntimeError("a fractional solution without a fractional visit")
-        candidates.sort()
         best, chosen = -math.inf, self._sides(side, *candidates[0][1:])
         for _, poi, number in candidates[:_STRONG if len(candidates) > 1 else 0]:
             sides = self._sides(side, poi, number)
@@ -386,8 +394,8 @@ def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
     symmetric = survival == 1.0 and np.array_equal(legs, legs.T) and np.array_equal(time[legs], time.T[legs]) \
         and np.array_equal(fuel[legs], fuel.T[legs])
     return Graph(base=instance.base, bit=bit, legs=legs, time_s=np.where(legs, time, 0.0),
-                 fuel_s=np.where(legs, fuel, 0.0), capacity_s=scope.capacity_s + SLACK_S,
-                 limit_s=limit + SLACK_S, survival=survival, symmetric=bool(symmetric))
+                 fuel_s=np.where(legs, fuel, 0.0), capacity_s=scope.capacity_s + _WITHIN * SLACK_S,
+                 limit_s=limit + _WITHIN * SLACK_S, survival=survival, symmetric=bool(symmetric))
 
 
 def _alike(one: Class, other: Class, graph: Graph, other_graph: Graph) -> bool:
