@@ -346,7 +346,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     for i in range(n):
         begin[i + 1] += begin[i]
     standing = np.flatnonzero(kept[:size])
-    by_value = standing[np.argsort(-x[standing], kind="mergesort")]
+    by_value = standing[np.argsort(-x[standing])]
     placed, by_site = begin.copy(), np.zeros(len(standing), np.int64)
     for label in by_value:
         by_site[placed[site[label]]] = label
@@ -359,14 +359,22 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
 def _keys(bit, memory, time):
     """The POIs by which each site's labels are told apart: the nearest that it remembers, shape (n, KEYS)."""
     n = len(bit)
-    keys = np.full((n, KEYS), -1, np.int64)
+    keys, taken = np.full((n, KEYS), -1, np.int64), np.zeros(n, np.bool_)
     for i in range(n):
-        found = 0
-        for j in np.argsort(np.where(time[:, i] > 0, time[:, i], np.inf)):  # 0 stands for a leg of no use
-            b = bit[j]
-            if b >= 0 and j != i and found < KEYS and memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
-                keys[i, found] = b
-                found += 1
+        taken[:] = False
+        for found in range(KEYS):
+            best, least = -1, np.inf
+            for j in range(n):
+                b = bit[j]
+                if b < 0 or j == i or taken[j] or not memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
+                    continue
+                far = time[j, i] if time[j, i] > 0 else 1e300  # 0 stands for a leg of no use
+                if far < least:
+                    best, least = j, far
+            if best < 0:
+                break
+            keys[i, found] = bit[best]
+            taken[best] = True
     return keys
 
 

@@ -110,7 +110,7 @@ def _ways(fuel, time, chain, stations, capacity, quickest):
                     some[number, 1] = time[a, r] + chain[k, l] + time[s, b]
                     some[number, 2] = fuel[s, b]
                     number += 1
-            for x in np.argsort(some[:number, 1], kind="mergesort"):
+            for x in np.argsort(some[:number, 1]):
                 beaten = False
                 for y in range(first[a, b], size):
                     if found[y, 0] <= some[x, 0] and found[y, 2] <= some[x, 2]:

@@ -78,8 +78,8 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
             if np.isinf(route_time(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops,
                                    capacity[k], limit[k], scratch)):
                 lengths[m] = 0  # without the triangle inequality a POI may have been a shortcut
-        power = rng.uniform(0.5, 2.0)
-        ban = rng.uniform(0.0, 0.5) if vehicles > 1 and rng.random() < _BAN else 0.0
+        power = 0.5 + 1.5 * rng.random()
+        ban = 0.5 * rng.random() if vehicles > 1 and rng.random() < _BAN else 0.0
         for m in range(vehicles):
             for j in range(n):
                 allowed[m, j] = weights[m, j] > 0
@@ -87,7 +87,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
         if ban > 0:
             for j in range(n):
                 if rng.random() < ban:
-                    allowed[rng.integers(0, vehicles), j] = False
+                    allowed[int(rng.random() * vehicles), j] = False
         for again in range(2):
             _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel, time, quickest, first, last,
                       hops, capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score,
@@ -125,8 +125,8 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
 @njit(cache=True)
 def _swap(rng, orders, lengths, weights, spare):
     """Let two vehicles drive each other's routes, as far as they earn there and can."""
-    a = rng.integers(0, len(lengths))
-    b = (a + rng.integers(1, len(lengths))) % len(lengths)
+    a = int(rng.random() * len(lengths))
+    b = (a + 1 + int(rng.random() * (len(lengths) - 1))) % len(lengths)
     length = lengths[a]
     spare[:length] = orders[a, :length]
     lengths[a] = 0
@@ -149,15 +149,15 @@ def _ruin(rng, orders, lengths, near, removed):
         visits += lengths[m]
     if visits == 0:
         return
-    count = rng.integers(1, max(2, int(_RUIN * visits) + 1))
-    way = rng.integers(0, 3)
+    count = 1 + int(rng.random() * max(1, int(_RUIN * visits)))
+    way = int(rng.random() * 3)
     removed[:] = False
     if way == 0:  # any: each with the chance that leaves so many on average
         for m in range(len(lengths)):
             for k in range(lengths[m]):
                 removed[orders[m, k]] = rng.random() * visits < count
     else:
-        start = rng.integers(0, visits)
+        start = int(rng.random() * visits)
         seen = 0
         centre = -1
         for m in range(len(lengths)):
@@ -377,7 +377,10 @@ def _keep(order, length, kind, pool, pool_length, pool_kind, size, table, keys, 
 @njit(cache=True)
 def _same(one, other, length, ordered):
     if ordered:
-        return bool((one[:length] == other[:length]).all())
+        for k in range(length):  # noqa: SIM110 - all() takes seconds to compile
+            if one[k] != other[k]:
+                return False
+        return True
     for k in range(length):
         there = False
         for i in range(length):
