@@ -23,6 +23,9 @@ $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	# Compile the solver once, before many processes want it at a time.
+	$(BIN)/sva-bench instance random --family B --pois 8 -o .venv/warm.json
+	$(BIN)/sva-bench plan .venv/warm.json -o .venv/warm-plan.json
 	touch $@
 
 lock: setup  ## pin the dependencies anew
