@@ -15,26 +15,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.columns import Class, Column, Master, Prices, Side, Unit, without
-from sva_bench.solver.formulation import SLACK_S, Goal
+from sva_bench.solver.formulation import Goal
+from sva_bench.solver.graph import NG_MOST, Graph, allowed, graph_of, neighbours
 from sva_bench.solver.highs import Relaxed
-from sva_bench.solver.labelling import Graph, Priced, price
+from sva_bench.solver.labelling import Priced, price
 from sva_bench.solver.preprocess import Scope
 
 _log = logging.getLogger(__name__)
 
-NG_START, NG_MOST = 7, 14  # POIs that a site remembers at first, and at most
 ROUTES_A_ROUND = 40  # columns of one unit and pricing
 MOST_LABELS = 4_000_000
 _SLACK = 0.03  # of the gap: a relaxation this close to its bound counts as solved
 _SMOOTHING = 0.5  # share of the best prices so far
 _STRONG = 8  # candidates for branching that are looked at closely
 _EPSILON = 1e-7
-_WITHIN = 0.9  # of the tolerance: sums in another order must not make a route infeasible
 _POOL = 4000  # columns that a new node begins with at most
 
 
@@ -91,7 +89,7 @@ class BranchAndPrice:
                 self.graphs.append(graph)
         # A stop that counts for nothing can be of use without the triangle inequality; the legs know.
         self._rows = tuple(j for j in self._pois if any(graph.legs[j].any() for graph in self.graphs))
-        self.memory = [_neighbours(graph, self._pois) for graph in self.graphs]
+        self.memory = [neighbours(graph, self._pois) for graph in self.graphs]
         self.pool: dict[tuple[int, tuple[int, ...]], Column] = {}
         total = float(np.abs(self.goal.weights).max(axis=0, initial=0.0).sum())
         longest = sum(graph.limit_s for graph in self.graphs)
@@ -286,7 +284,7 @@ class BranchAndPrice:
     def _forget(self) -> None:
         """Drop the columns that the ng-sets no longer allow."""
         self.pool = {key: c for key, c in self.pool.items()
-                     if c.visits.max() <= 1 or _allowed(c.route, self.graphs[c.kind], self.memory[c.kind])}
+                     if c.visits.max() <= 1 or allowed(c.route, self.graphs[c.kind], self.memory[c.kind])}
 
     def _offer_columns(self, used: Sequence[tuple[int, Column, float]]) -> None:
         """Offer a whole solution as a plan."""
@@ -378,58 +376,12 @@ class BranchAndPrice:
                 replace(side, units=tuple(others), required=side.required | {poi}))
 
 
-def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
-    """What a vehicle may drive, for pricing."""
-    n = len(instance.sites)
-    bit = np.full(n, -1, dtype=np.int64)
-    bit[list(instance.pois)] = np.arange(len(instance.pois))
-    binding = math.isfinite(scope.capacity_s)
-    fuel = scope.fuel_s if binding else np.zeros((n, n))
-    drive = scope.time_s - instance.stop_s[None, :]
-    time = drive + (instance.stop_s[:, None] + instance.stop_s[None, :]) / 2
-    legs = scope.legs
-    # Without a limit no route worth driving takes longer: from a POI to the next by all stations at most.
-    limit = scope.limit_s if math.isfinite(scope.limit_s) else \
-        float(time[legs].max(initial=0.0)) * (len(instance.pois) + 1) * (len(instance.stations) + 1)
-    symmetric = survival == 1.0 and np.array_equal(legs, legs.T) and np.array_equal(time[legs], time.T[legs]) \
-        and np.array_equal(fuel[legs], fuel.T[legs])
-    return Graph(base=instance.base, bit=bit, legs=legs, time_s=np.where(legs, time, 0.0),
-                 fuel_s=np.where(legs, fuel, 0.0), capacity_s=scope.capacity_s + _WITHIN * SLACK_S,
-                 limit_s=limit + _WITHIN * SLACK_S, survival=survival, symmetric=bool(symmetric))
-
-
 def _alike(one: Class, other: Class, graph: Graph, other_graph: Graph) -> bool:
     return np.array_equal(one.weights, other.weights) and np.array_equal(one.floors, other.floors) \
         and (graph.capacity_s, graph.limit_s, graph.survival) == \
         (other_graph.capacity_s, other_graph.limit_s, other_graph.survival) \
         and np.array_equal(graph.legs, other_graph.legs) and np.array_equal(graph.time_s, other_graph.time_s) \
         and np.array_equal(graph.fuel_s, other_graph.fuel_s)
-
-
-def _neighbours(graph: Graph, pois: Sequence[int]) -> NDArray[np.uint64]:
-    """First ng-sets: the nearest POIs of each site, shape (n, words), uint64."""
-    n, words = len(graph.bit), max(1, -(-len(pois) // 64))
-    memory = np.zeros((n, words), dtype=np.uint64)
-    far = np.where(graph.legs, graph.time_s, np.inf)
-    far = np.minimum(far, far.T)
-    np.fill_diagonal(far, 0.0)
-    for i in range(n):
-        for j in sorted(pois, key=lambda j: (far[i, j], j))[:NG_START if graph.bit[i] >= 0 else 2 * NG_START]:
-            memory[i, graph.bit[j] >> 6] |= np.uint64(1) << np.uint64(graph.bit[j] & 63)
-    return memory
-
-
-def _allowed(route: tuple[int, ...], graph: Graph, memory: NDArray[np.uint64]) -> bool:
-    """Whether the ng-sets allow a route."""
-    mask = 0
-    for j in route[1:-1]:
-        b = int(graph.bit[j])
-        if b >= 0 and mask >> b & 1:
-            return False
-        mask &= sum(int(word) << 64 * k for k, word in enumerate(memory[j]))
-        if b >= 0:
-            mask |= 1 << b
-    return True
 
 
 def _fitted(prices: Prices, side: Side, child: Side) -> Prices:

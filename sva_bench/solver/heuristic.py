@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.solver.packing import Route, best_packing
-from sva_bench.solver.routes import Tables, route_time
+from sva_bench.solver.routes import FRONT, Tables
 from sva_bench.solver.ruin_recreate import rounds as run_rounds
 from sva_bench.solver.ruin_recreate import straighten
 
@@ -115,16 +115,8 @@ def shorten(tables: Tables, orders: Orders) -> Orders:
         if length[m]:
             straighten(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
                        tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
-                       np.zeros((4, tables.front)), spare, sums)
+                       np.zeros((4, FRONT)), spare, sums)
     return _as_orders(array, length)
-
-
-def least_time(tables: Tables, kind: int, order: Sequence[int]) -> float:
-    """Least time of a route of a kind of vehicle over POIs in this order [s]; ``inf`` = infeasible."""
-    return float(route_time(
-        np.array(order, dtype=np.int64), len(order), tables.base, tables.fuel_s[kind], tables.time_s[kind],
-        tables.first[kind], tables.last[kind], tables.hops, tables.capacity_s[kind], tables.limit_s[kind],
-        np.zeros((4, tables.front))))
 
 
 def _as_arrays(orders: Orders, n: int) -> tuple[IntArray, IntArray]:

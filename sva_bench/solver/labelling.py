@@ -23,6 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.solver.graph import Graph
 
 CHUNK = 32  # labels of a site that are tested for dominance together
 KEYS = 5  # POIs by which a site's labels are told apart: only those with a subset of a label's can beat it
@@ -30,33 +31,6 @@ BUCKETS = 256  # of time, by which labels are treated in order
 STEPS = 500  # of time, for completion bounds
 MOST_STEPS = 4000
 _EPSILON = 1e-9
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Graph:
-    """What a vehicle may drive, as pricing reads it.
-
-    Attributes:
-        base: The base.
-        bit: Number of each POI, -1 for base and stations, shape (n,).
-        legs: Whether a leg is of use, shape (n, n).
-        time_s: Time of a leg with half the stops at its ends [s], shape (n, n).
-        fuel_s: Fuel of a leg [s], shape (n, n).
-        capacity_s: Fuel capacity, tolerance included [s].
-        limit_s: Mission limit, tolerance included [s]; finite.
-        survival: Chance to get to the next POI.
-        symmetric: Whether every leg costs the same both ways and the order of visits is indifferent.
-    """
-
-    base: int
-    bit: IntArray
-    legs: BoolArray
-    time_s: FloatArray
-    fuel_s: FloatArray
-    capacity_s: float
-    limit_s: float
-    survival: float
-    symmetric: bool
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

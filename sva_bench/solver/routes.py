@@ -49,11 +49,6 @@ class Tables:
     capacity_s: FloatArray
     limit_s: FloatArray
 
-    @property
-    def front(self) -> int:
-        """Most pairs of a front."""
-        return FRONT
-
 
 def tables_of(instance: Instance) -> Tables:
     """The tables of an instance's vehicles."""

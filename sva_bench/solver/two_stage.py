@@ -145,6 +145,7 @@ def plan_deterministic(
         nominal: ``plan_nominal`` of the instance, which scenarios may share.
         known: What solves of the same instance with other availabilities found.
         method: How to prove it.
+        cuts: Optimality cuts of the method ``lshaped``.
 
     Source:
         ``docs/model.md``, section "Ties".
