@@ -206,7 +206,8 @@ def value_of(goal: Goal, roads: Sequence[Road], orders: Orders) -> float:
     """Value of a feasible plan under a goal."""
     value = rewards(goal.weights, goal.chances(), orders)
     if goal.risk is not None:
-        sums = np.array([math.fsum(goal.risk.incentives[m, j] for j in order) for m, order in enumerate(orders)])
+        earned = goal.risk.outcomes.incentives
+        sums = np.array([math.fsum(earned[m, j] for j in order) for m, order in enumerate(orders)])
         value += goal.risk.measure.weight * goal.risk.of(sums)
     if goal.driving:
         for road, order in zip(roads, orders, strict=True):
@@ -239,7 +240,7 @@ def trivial_bound(goal: Goal) -> float:
         return 0.0
     bound = float(np.maximum(goal.weights.max(axis=0), 0.0).sum())
     if goal.risk is not None and goal.risk.measure.kind == "cvar":
-        bound += goal.risk.measure.weight * float(goal.risk.incentives.max(axis=0).sum())
+        bound += goal.risk.measure.weight * float(goal.risk.outcomes.incentives.max(axis=0).sum())
     return bound
 
 

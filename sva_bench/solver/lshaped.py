@@ -26,8 +26,9 @@ from sva_bench.solver.formulation import Goal, LinearModel, RowBuilder, Rows
 from sva_bench.solver.heuristic import Orders
 from sva_bench.solver.highs import Relaxation, maximise
 from sva_bench.solver.knowledge import Clock, Knowledge, Progress, adopt, without_idle_stops
+from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.recourse import Recourse, legs_out_of_pois, together
+from sva_bench.solver.recourse import legs_out_of_pois, together
 
 _log = logging.getLogger(__name__)
 
@@ -37,7 +38,7 @@ _TOLERANCE = 1e-7  # relative; a cut that is broken by less adds nothing
 
 
 def prove_by_duals(
-    instance: Instance, scopes: Sequence[Scope], goal: Goal, recourse: Recourse, kind: Cuts, known: Knowledge,
+    instance: Instance, scopes: Sequence[Scope], goal: Goal, recourse: Outcomes, kind: Cuts, known: Knowledge,
     clock: Clock, gap: float, progress: Progress,
 ) -> None:
     """Prove the plan of ``progress``, or a better one, within the gap, by the L-shaped method."""
@@ -79,7 +80,7 @@ class _Master(DirectedModel):
     """First stage, and ``eta``: the cost of the second, by outcome or in all."""
 
     def __init__(
-        self, instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, recourse: Recourse, kind: Cuts,
+        self, instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, recourse: Outcomes, kind: Cuts,
     ) -> None:
         super().__init__(instance, scopes, replace(goal, weights=recourse.incentives), known.roads)
         self._recourse, self._kind = recourse, kind

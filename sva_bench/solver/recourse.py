@@ -7,8 +7,8 @@ costs nothing could be kept by a vehicle that failed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,65 +18,30 @@ from sva_bench.mission.instance import Instance
 from sva_bench.solver.expected import DirectedModel
 from sva_bench.solver.formulation import Goal, LinearModel, RowBuilder, Rows
 from sva_bench.solver.heuristic import Orders
+from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
 from sva_bench.solver.refuelling import Road
 
-MOST_OUTCOMES = 256
 
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Recourse:
-    """Two stages: what vehicles would earn, and which of them are available with what probability.
-
-    Attributes:
-        incentives: Reward of a visit by vehicle m to site j if it is available, shape (M, n).
-        probability: Probability of each outcome, shape (outcomes,).
-        available: Whether a vehicle is available in an outcome, shape (outcomes, M).
-    """
-
-    incentives: FloatArray
-    probability: FloatArray
-    available: FloatArray
-
-
-def refuse_too_many(instance: Instance, outcomes: Mapping[frozenset[str], float]) -> None:
-    """Refuse more outcomes than a program should have rows for.
+def refuse_free_legs(instance: Instance) -> None:
+    """Refuse an instance in which a leg costs nothing.
 
     Raises:
-        BadInput: If there are.
+        BadInput: If one does.
     """
-    if len(outcomes) > MOST_OUTCOMES:
-        raise BadInput(f"instance {instance.name}: {len(outcomes)} sets of vehicles can be available, and the program "
-                       f"has rows for each; at most {MOST_OUTCOMES}: plan for the expected incentive instead, by the "
-                       "method auto or expected")
-
-
-def recourse_of(instance: Instance, outcomes: Mapping[frozenset[str], float], scale: float) -> Recourse:
-    """The two stages of an instance, rewards divided by ``scale``.
-
-    Raises:
-        BadInput: If a leg costs nothing, or there are too many outcomes to write down.
-    """
-    refuse_too_many(instance, outcomes)
     for vehicle in instance.vehicles:
         free = np.argwhere((vehicle.fuel_s <= 0) & ~np.eye(len(instance.sites), dtype=np.bool_))
         if len(free):
             i, j = (instance.sites[k] for k in free[0])
             raise BadInput(f"instance {instance.name}: {vehicle.name} drives {i} -> {j} for nothing, and the paper's "
                            "second stage needs costs above 0; use the method auto or expected")
-    names = [v.name for v in instance.vehicles]
-    return Recourse(
-        incentives=np.array([v.incentives for v in instance.vehicles]).reshape(len(names), len(instance.sites)) / scale,
-        probability=np.array(list(outcomes.values())),
-        available=np.array([[float(name in there) for name in names] for there in outcomes]).reshape(
-            len(outcomes), len(names)))
 
 
 class EquivalentModel(DirectedModel):
     """The deterministic equivalent: both stages in one program, the second one whole or relaxed."""
 
     def __init__(
-        self, instance: Instance, scopes: Sequence[Scope], goal: Goal, roads: Sequence[Road], recourse: Recourse, *,
+        self, instance: Instance, scopes: Sequence[Scope], goal: Goal, roads: Sequence[Road], recourse: Outcomes, *,
         relaxed: bool,
     ) -> None:
         super().__init__(instance, scopes, replace(goal, weights=recourse.incentives), roads)

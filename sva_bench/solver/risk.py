@@ -20,6 +20,7 @@ from typing import Literal
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.solver.outcomes import Outcomes
 
 RiskKind = Literal["cvar", "excess"]
 
@@ -51,25 +52,21 @@ class Risk:
 
     Attributes:
         measure: The measure.
-        incentives: Reward of a visit by vehicle m to site j if it is available, shape (M, n).
-        probability: Probability of each outcome, shape (outcomes,).
-        available: Whether a vehicle is available in an outcome, shape (outcomes, M).
+        outcomes: The outcomes.
     """
 
     measure: RiskMeasure
-    incentives: FloatArray
-    probability: FloatArray
-    available: FloatArray
+    outcomes: Outcomes
 
     def of(self, sums: FloatArray) -> float:
         """Value of the measure, without its weight, for sums of incentives by vehicle, shape (M,)."""
-        paid = self.available @ sums
+        paid = self.outcomes.available @ sums
         if self.measure.kind == "excess":
-            return -float(self.probability @ np.maximum(self.measure.target - paid, 0.0))
+            return -float(self.outcomes.probability @ np.maximum(self.measure.target - paid, 0.0))
         tail = 1.0 - self.measure.beta
         order = np.argsort(paid, kind="stable")
-        before = np.concatenate([[0.0], np.cumsum(self.probability[order])[:-1]])
-        share = np.clip(tail - before, 0.0, self.probability[order])
+        before = np.concatenate([[0.0], np.cumsum(self.outcomes.probability[order])[:-1]])
+        share = np.clip(tail - before, 0.0, self.outcomes.probability[order])
         return float(share @ paid[order]) / tail
 
     @property
@@ -83,8 +80,8 @@ class Risk:
         Returns:
             Shapes (columns,) and (outcomes, columns). All columns are at least 0: ``eta`` is, as nothing is paid back.
         """
-        outcomes, weight = len(self.probability), self.measure.weight
+        outcomes, weight = len(self.outcomes.probability), self.measure.weight
         if self.measure.kind == "excess":
-            return -weight * self.probability, np.eye(outcomes)
-        lost = -weight * self.probability / (1.0 - self.measure.beta)
+            return -weight * self.outcomes.probability, np.eye(outcomes)
+        lost = -weight * self.outcomes.probability / (1.0 - self.measure.beta)
         return np.append(lost, weight), np.hstack([np.eye(outcomes), -np.ones((outcomes, 1))])

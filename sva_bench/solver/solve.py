@@ -29,9 +29,10 @@ from sva_bench.solver.knowledge import (
     value_of,
 )
 from sva_bench.solver.lshaped import Cuts, prove_by_duals
+from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.packing import Route
 from sva_bench.solver.preprocess import Scope, scope_of
-from sva_bench.solver.recourse import EquivalentModel, Recourse
+from sva_bench.solver.recourse import EquivalentModel
 from sva_bench.solver.undirected import UndirectedModel, serves
 
 Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
@@ -49,7 +50,7 @@ _WITHIN = 0.99  # of the gap, for rounding
 
 def solve(
     instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method = "auto",
-    recourse: Recourse | None = None, cuts: Cuts = "single",
+    recourse: Outcomes | None = None, cuts: Cuts = "single",
 ) -> Solution:
     """The best plan for a goal, with a proof unless time runs out or Ctrl-C is pressed.
 
@@ -117,13 +118,14 @@ def _searched(goal: Goal) -> FloatArray:
     """What the heuristic maximises: the goal, or under a measure of risk the expected incentive."""
     if goal.risk is None:
         return goal.weights
-    expected: FloatArray = goal.risk.incentives * (goal.risk.probability @ goal.risk.available)[:, None]
+    outcomes = goal.risk.outcomes
+    expected: FloatArray = outcomes.incentives * (outcomes.probability @ outcomes.available)[:, None]
     return expected
 
 
 def _model(
     instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, method: Method,
-    recourse: Recourse | None,
+    recourse: Outcomes | None,
 ) -> FlowModel:
     if method == "undirected":
         return UndirectedModel(instance, scopes, goal)

@@ -19,8 +19,9 @@ from sva_bench.solver.formulation import Goal
 from sva_bench.solver.heuristic import Orders
 from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of
 from sva_bench.solver.lshaped import Cuts
+from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
-from sva_bench.solver.recourse import recourse_of, refuse_too_many
+from sva_bench.solver.recourse import refuse_free_legs
 from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.risk import Risk, RiskMeasure
 from sva_bench.solver.solve import TWO_STAGE, Method, solve
@@ -98,21 +99,17 @@ def plan_averse(
     if instance.failure == "per_leg":
         raise BadInput(f"instance {instance.name}: measures of risk are over the outcomes of mission, the instance "
                        "fails per leg; set its failure to mission")
-    outcomes = _outcomes(instance)
-    refuse_too_many(instance, outcomes)
+    outcomes = outcomes_of(instance, possible(instance))
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
     known.check(instance)
     clock = limits.clock()
     warn_of_unreachable(instance)
-    names, incentives = [v.name for v in instance.vehicles], _incentives(instance)
-    available = np.array([[float(name in there) for name in names] for there in outcomes]).reshape(
-        len(outcomes), len(names))
-    risk = Risk(measure=measure, incentives=incentives, probability=np.array(list(outcomes.values())),
-                available=available)
+    risk = Risk(measure=measure, outcomes=outcomes)
     goal = Goal(
-        weights=(1 - measure.weight) * _availability(instance)[:, None] * incentives, risk=risk,
-        floors=tuple((there[:, None] * incentives, risk.side) for there in available) if measure.weight > 0 else ())
+        weights=(1 - measure.weight) * _availability(instance)[:, None] * outcomes.incentives, risk=risk,
+        floors=tuple((there[:, None] * outcomes.incentives, risk.side) for there in outcomes.available)
+        if measure.weight > 0 else ())
     if measure.weight == 0:
         goal = replace(goal, risk=None)
     solution = solve(instance, goal, known, clock, limits.gap)
@@ -194,7 +191,7 @@ def wait_and_see(
     """
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
-    outcomes = _outcomes(instance)
+    outcomes = possible(instance)
     if len(outcomes) > MOST_SUBSETS and not force:
         return None
     clock, total = limits.clock(), 0.0
@@ -207,23 +204,6 @@ def wait_and_see(
             return None
         total += probability * solution.value
     return total
-
-
-def _outcomes(instance: Instance) -> dict[frozenset[str], float]:
-    """The sets of vehicles that can be available, and their probabilities."""
-    found: dict[frozenset[str], float] = {}
-    if instance.joint is not None:
-        for state in instance.joint:
-            if state.probability > 0:
-                found[state.available] = found.get(state.available, 0.0) + state.probability
-        return found
-    certain = [v.name for v in instance.vehicles if v.availability == 1]
-    uncertain = [v for v in instance.vehicles if 0 < v.availability < 1]
-    for there in itertools.product((True, False), repeat=len(uncertain)):
-        names = frozenset([*certain, *(v.name for v, t in zip(uncertain, there, strict=True) if t)])
-        found[names] = math.prod(
-            v.availability if t else 1 - v.availability for v, t in zip(uncertain, there, strict=True))
-    return found
 
 
 def _plan(
@@ -262,9 +242,9 @@ def _greatest(
     goal = Goal(weights=_incentives(instance) * shares[:, None])
     if method in TWO_STAGE:
         certain = bool((availability == 1).all())
-        outcomes = {frozenset(v.name for v in instance.vehicles): 1.0} if certain else _outcomes(instance)
-        recourse = recourse_of(instance, outcomes, scale or 1.0)
-        return solve(instance, goal, known, clock, gap, method, recourse, cuts)
+        sets = {frozenset(v.name for v in instance.vehicles): 1.0} if certain else possible(instance)
+        refuse_free_legs(instance)
+        return solve(instance, goal, known, clock, gap, method, outcomes_of(instance, sets, scale or 1.0), cuts)
     return _once(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap, method)
 
 
