@@ -11,6 +11,7 @@ import typer
 from rich.markup import escape
 
 from sva_bench import __version__
+from sva_bench.cli_inputs import instance_app, world_app
 from sva_bench.errors import BadInput, ExitCode
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import (
@@ -18,7 +19,6 @@ from sva_bench.options import (
     Cuts,
     ExecuteFailure,
     FailureProcess,
-    Family,
     FidelityOption,
     Gap,
     MarginOption,
@@ -56,9 +56,7 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 a fault of the program, 2 bad input or usage, 3 an infeasible plan, "
            "4 some trials unfinished, 130 interrupted.")
 
-world_app = typer.Typer(no_args_is_help=True, help="Check worlds.", rich_markup_mode="rich")
 app.add_typer(world_app, name="world")
-instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
 app.add_typer(instance_app, name="instance")
 
 log = logging.getLogger(__name__)
@@ -340,72 +338,6 @@ def view(
         from sva_bench.recording.viewer import view as open_viewer
 
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
-
-
-@world_app.command("check")
-def check_world(
-    world: WorldArgument,
-    planner: PlannerOption = "prmstar",
-    verbose: Verbose = False,
-) -> None:
-    """Check a world: is the file right, does every robot reach every site, and what can't be part of any plan?"""
-    with holding_back_ctrl_c():
-        from sva_bench.inputs import about, load
-
-    set_up_logging(verbose)
-    loaded = load(world)
-    with holding_back_ctrl_c():
-        from sva_bench.bench import out_of_reach, plan_costs
-
-    with about(world), progress_bars() as progress:
-        costs = plan_costs(loaded, planner, progress)
-    console = results()
-    for cost in costs.values():
-        longest = int(cost.repaired_ms.max()) / 1000
-        console.print(f"{cost.times.model.name}: {cost.pairs} travel times of up to {longest:.1f} s, "
-                      f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
-                      highlight=False)
-    for robot, pois in out_of_reach(loaded, costs).items():
-        console.print(f"{robot} reaches none of {', '.join(pois)} within its fuel and limit, and will never be sent "
-                      "there", highlight=False)
-    console.print(f"{loaded.name} is a good world: {len(loaded.stations)} stations, {len(loaded.pois)} POIs, "
-                  f"{len(loaded.robots)} robots, {len(loaded.scenarios)} scenarios", highlight=False)
-
-
-@world_app.command("schema")
-def world_schema() -> None:
-    """Print the JSON schema of world files, for editors."""
-    with holding_back_ctrl_c():
-        from sva_bench.world.schema import WorldFile
-
-    print_json(WorldFile.model_json_schema())
-
-
-@instance_app.command("random")
-def random_instances(
-    family: Annotated[Family, typer.Option(help="A: one filling lasts for the mission; B: two to five refuels; C: "
-                                                "short routes.")] = "A",
-    pois: Annotated[int, typer.Option(min=0, max=1000, help="Points of interest.")] = 20,
-    vehicles: Annotated[int, typer.Option(min=0, max=100, help="Vehicles; every second one is uncertain.")] = 2,
-    availability: Annotated[float, typer.Option(min=0, max=1, callback=finite, help="Availability of the uncertain "
-                                                "ones.")] = 0.75,
-    fuel: Annotated[float | None, typer.Option(min=0.01, max=1000, callback=finite, help="Fuel capacity in largest "
-                                               "distances.", show_default="the family's")] = None,
-    tau: Annotated[float | None, typer.Option(min=0.01, max=1000, callback=finite, help="Mission limit in fuel "
-                                              "capacities.", show_default="the family's")] = None,
-    directed: Annotated[bool, typer.Option("--directed", help="Legs cost up to a tenth more, each way.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of places and incentives.")] = 0,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Instance file to write; default: standard "
-                                                "output.", show_default=False)] = None,
-) -> None:
-    """Make a random instance of the paper's kind."""
-    with holding_back_ctrl_c():
-        from sva_bench.mission.generate import random_instance
-        from sva_bench.mission.instance import instance_text
-
-    write_result(output, instance_text(random_instance(
-        family, pois=pois, vehicles=vehicles, availability=availability, fuel_multiple=fuel, tau=tau,
-        directed=directed, seed=seed)))
 
 
 @app.callback(invoke_without_command=True)

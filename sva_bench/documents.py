@@ -18,7 +18,8 @@ from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sva_bench.errors import BadFile, nearest
+from sva_bench.complaints import Loc, first_complaint, shown
+from sva_bench.errors import BadFile
 
 MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
 MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 100 MB
@@ -40,7 +41,6 @@ class Section(BaseModel):
 
 
 SectionT = TypeVar("SectionT", bound=BaseModel)
-Loc = tuple[str | int, ...]
 
 
 class Document:
@@ -83,7 +83,7 @@ def dotted(loc: Loc) -> str:
     """``("map", "obstacles", 2)`` as ``map.obstacles[2]``."""
     text = ""
     for part in loc:
-        word = part if isinstance(part, int) or (part.isprintable() and len(part) <= 64) else _shown(part)
+        word = part if isinstance(part, int) or (part.isprintable() and len(part) <= 64) else shown(part)
         text += f"[{word}]" if isinstance(part, int) else f".{word}" if text else str(word)
     return text
 
@@ -176,7 +176,7 @@ def validate(document: Document, schema: type[SectionT], kind: str) -> SectionT:
     try:
         return schema.model_validate(document.data)
     except ValidationError as error:
-        raise _first_complaint(document, schema, error) from None
+        raise document.error(*first_complaint(document.data, schema, error)) from None
 
 
 def check_kind(document: Document, kind: str) -> None:
@@ -187,131 +187,7 @@ def check_kind(document: Document, kind: str) -> None:
     if found is None:
         raise document.error((), f"the key 'format' is missing; add 'format: {kind}'")
     if found != kind:
-        raise document.error(("format",), f"expected {kind!r}, found {_shown(found)}")
-
-
-def _first_complaint(document: Document, schema: type[BaseModel], error: ValidationError) -> BadFile:
-    # An unknown key explains a missing one beside it better than the other way round.
-    details = sorted(_as_meant(document.data, error.errors()), key=lambda d: d["type"] != "extra_forbidden")
-    detail = details[0]
-    loc = _existing(document.data, detail["loc"])
-    if detail["type"] == "extra_forbidden":
-        key = str(detail["loc"][-1])
-        known = _keys_at(schema, detail["loc"][:-1])
-        if key in known:  # of another alternative
-            return document.error(
-                loc, f"the key {_shown(key)} doesn't go with the other keys here; remove one or the other")
-        return document.error(loc, f"unknown key {_shown(key)}; {nearest(key, known)}")
-    if detail["type"] == "missing":
-        return document.error(loc, f"the key {detail['loc'][-1]!r} is missing; add it")
-    if detail["type"] == "string_pattern_mismatch":
-        name = _shown(detail["input"])
-        return document.error(
-            loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit")
-    message = _PLAINLY.get(detail["type"], detail["msg"]).removeprefix("Value error, ").format(
-        **detail.get("ctx", {}) if detail["type"] in _PLAINLY else {})
-    found = detail["input"]
-    shown = f", found {_shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
-    if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
-        shown = f", found the text {_shown(found)}" + (": take the quotes away" if _numeric(found) else "")
-    return document.error(loc, message[:1].lower() + message[1:] + shown)
-
-
-def _numeric(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-_PLAINLY = {  # what pydantic says of its own types, said of the file
-    "too_short": "expected at least {min_length} entries, found {actual_length}",
-    "too_long": "expected at most {max_length} entries, found {actual_length}",
-    "dict_type": "expected a mapping", "model_type": "expected a mapping", "list_type": "expected a list",
-    "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
-    "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",
-    "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
-}
-
-
-def _as_meant(data: Any, details: list[Any]) -> list[Any]:
-    """The complaints of those alternatives of unions that the writer most likely meant.
-
-    A box that is no box is no cylinder and no wall either; only what is wrong with the box is worth telling.
-    """
-    place, depth = _until_union(data, details[0]["loc"])
-    if depth == len(details[0]["loc"]):
-        return details
-    tags: dict[str | int, list[Any]] = {}
-    for detail in details:
-        if _until_union(data, detail["loc"]) == (place, depth) and len(detail["loc"]) > depth:
-            tags.setdefault(detail["loc"][depth], []).append(detail)
-
-    def strangeness(tag: str | int) -> tuple[int, bool]:
-        odd = 0
-        for detail in tags[tag]:
-            whole = len(detail["loc"]) == depth + 1  # the value as a whole
-            holds = isinstance(detail["input"], dict | list)
-            other = detail["type"].endswith("_type") or (detail["type"] == "literal_error" and holds)
-            odd += 100 if whole and other else 0
-            odd += 3 if holds and other else 0  # a list where a number belongs
-            odd += detail["type"] in ("extra_forbidden", "missing")
-        return odd, str(tag).startswith("dict[")
-
-    return tags[min(tags, key=strangeness)] if len(tags) > 1 else details
-
-
-def _until_union(data: Any, loc: Loc) -> tuple[Loc, int]:
-    """How far a location follows the data; what comes next is the name of an alternative, or a missing key."""
-    for depth, part in enumerate(loc):
-        inside = part in data if isinstance(data, dict) else (
-            isinstance(data, list) and isinstance(part, int) and part < len(data))
-        if not inside:
-            return loc[:depth], depth
-        data = data[part]
-    return loc, len(loc)
-
-
-def _shown(value: object) -> str:
-    text = "nothing" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _existing(data: Any, loc: Loc) -> Loc:
-    """``loc`` without the parts that pydantic adds for unions, keys of mappings and the like."""
-    kept: list[str | int] = []
-    for number, part in enumerate(loc):
-        if isinstance(data, dict) and part in data:
-            kept.append(part)
-            data = data[part]
-        elif isinstance(data, dict) and number == len(loc) - 1 and part not in ("[key]",) and "[" not in str(part):
-            kept.append(part)  # a missing key: shown, located at its parent
-        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
-            kept.append(part)
-            data = data[part]
-    return tuple(kept)
-
-
-def _keys_at(schema: type[BaseModel], loc: Loc) -> list[str]:
-    """Keys that the schema knows at ``loc``; those of every alternative of a union."""
-    found: set[type[BaseModel]] = {schema}
-    for part in loc:
-        inner: set[type[BaseModel]] = set()
-        for model in found:
-            field = next((f for n, f in model.model_fields.items() if part in (n, f.alias)), None)
-            inner |= _models_in(field.annotation) if field else set()
-        found = inner or found
-    return sorted({field.alias or name for model in found for name, field in model.model_fields.items()})
-
-
-def _models_in(annotation: Any) -> set[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return {annotation}
-    models: set[type[BaseModel]] = set()
-    for argument in getattr(annotation, "__args__", ()):
-        models |= _models_in(argument)
-    return models
+        raise document.error(("format",), f"expected {kind!r}, found {shown(found)}")
 
 
 def _read(path: Path, limit: int) -> str:
@@ -380,13 +256,13 @@ def _scalar(node: Node, path: Path, loc: Loc) -> Any:
     text, kind = str(node.value), str(node.tag).rpartition(":")[2]
     if not str(node.tag).startswith("tag:yaml.org,2002:") or kind not in _SCALARS:
         raise BadFile(path, node.start_mark.line + 1, dotted(loc),
-                      f"the tag {_shown(str(node.tag))} is not allowed; write a plain value")
+                      f"the tag {shown(str(node.tag))} is not allowed; write a plain value")
     try:
         value = _SCALARS[kind](text)
     except (ValueError, OverflowError):
-        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"{_shown(text)} is no valid {kind}") from None
+        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"{shown(text)} is no valid {kind}") from None
     if isinstance(value, float) and not math.isfinite(value):
-        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"expected a finite number, found {_shown(text)}")
+        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"expected a finite number, found {shown(text)}")
     return value
 
 

@@ -1,0 +1,141 @@
+"""What pydantic says of its own types, said of the file: which key, and what to change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from sva_bench.errors import nearest
+
+Loc = tuple[str | int, ...]
+
+
+def first_complaint(data: Any, schema: type[BaseModel], error: ValidationError) -> tuple[Loc, str]:
+    """Where the first thing to mend stands, and what to change there.
+
+    Args:
+        data: The document's data.
+        schema: The pydantic model that refused it.
+        error: How it did.
+    """
+    # An unknown key explains a missing one beside it better than the other way round.
+    details = sorted(_as_meant(data, error.errors()), key=lambda d: d["type"] != "extra_forbidden")
+    detail = details[0]
+    loc = _existing(data, detail["loc"])
+    if detail["type"] == "extra_forbidden":
+        key = str(detail["loc"][-1])
+        known = _keys_at(schema, detail["loc"][:-1])
+        if key in known:  # of another alternative
+            return loc, f"the key {shown(key)} doesn't go with the other keys here; remove one or the other"
+        return loc, f"unknown key {shown(key)}; {nearest(key, known)}"
+    if detail["type"] == "missing":
+        return loc, f"the key {detail['loc'][-1]!r} is missing; add it"
+    if detail["type"] == "string_pattern_mismatch":
+        name = shown(detail["input"])
+        return loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit"
+    message = _PLAINLY.get(detail["type"], detail["msg"]).removeprefix("Value error, ").format(
+        **detail.get("ctx", {}) if detail["type"] in _PLAINLY else {})
+    found = detail["input"]
+    also = f", found {shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
+    if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
+        also = f", found the text {shown(found)}" + (": take the quotes away" if _numeric(found) else "")
+    return loc, message[:1].lower() + message[1:] + also
+
+
+def _numeric(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+_PLAINLY = {  # what pydantic says of its own types, said of the file
+    "too_short": "expected at least {min_length} entries, found {actual_length}",
+    "too_long": "expected at most {max_length} entries, found {actual_length}",
+    "dict_type": "expected a mapping", "model_type": "expected a mapping", "list_type": "expected a list",
+    "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
+    "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",
+    "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
+}
+
+
+def _as_meant(data: Any, details: list[Any]) -> list[Any]:
+    """The complaints of those alternatives of unions that the writer most likely meant.
+
+    A box that is no box is no cylinder and no wall either; only what is wrong with the box is worth telling.
+    """
+    place, depth = _until_union(data, details[0]["loc"])
+    if depth == len(details[0]["loc"]):
+        return details
+    tags: dict[str | int, list[Any]] = {}
+    for detail in details:
+        if _until_union(data, detail["loc"]) == (place, depth) and len(detail["loc"]) > depth:
+            tags.setdefault(detail["loc"][depth], []).append(detail)
+
+    def strangeness(tag: str | int) -> tuple[int, bool]:
+        odd = 0
+        for detail in tags[tag]:
+            whole = len(detail["loc"]) == depth + 1  # the value as a whole
+            holds = isinstance(detail["input"], dict | list)
+            other = detail["type"].endswith("_type") or (detail["type"] == "literal_error" and holds)
+            odd += 100 if whole and other else 0
+            odd += 3 if holds and other else 0  # a list where a number belongs
+            odd += detail["type"] in ("extra_forbidden", "missing")
+        return odd, str(tag).startswith("dict[")
+
+    return tags[min(tags, key=strangeness)] if len(tags) > 1 else details
+
+
+def _until_union(data: Any, loc: Loc) -> tuple[Loc, int]:
+    """How far a location follows the data; what comes next is the name of an alternative, or a missing key."""
+    for depth, part in enumerate(loc):
+        inside = part in data if isinstance(data, dict) else (
+            isinstance(data, list) and isinstance(part, int) and part < len(data))
+        if not inside:
+            return loc[:depth], depth
+        data = data[part]
+    return loc, len(loc)
+
+
+def shown(value: object) -> str:
+    """A value as a complaint quotes it, cut short."""
+    text = "nothing" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _existing(data: Any, loc: Loc) -> Loc:
+    """``loc`` without the parts that pydantic adds for unions, keys of mappings and the like."""
+    kept: list[str | int] = []
+    for number, part in enumerate(loc):
+        if isinstance(data, dict) and part in data:
+            kept.append(part)
+            data = data[part]
+        elif isinstance(data, dict) and number == len(loc) - 1 and part not in ("[key]",) and "[" not in str(part):
+            kept.append(part)  # a missing key: shown, located at its parent
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            kept.append(part)
+            data = data[part]
+    return tuple(kept)
+
+
+def _keys_at(schema: type[BaseModel], loc: Loc) -> list[str]:
+    """Keys that the schema knows at ``loc``; those of every alternative of a union."""
+    found: set[type[BaseModel]] = {schema}
+    for part in loc:
+        inner: set[type[BaseModel]] = set()
+        for model in found:
+            field = next((f for n, f in model.model_fields.items() if part in (n, f.alias)), None)
+            inner |= _models_in(field.annotation) if field else set()
+        found = inner or found
+    return sorted({field.alias or name for model in found for name, field in model.model_fields.items()})
+
+
+def _models_in(annotation: Any) -> set[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return {annotation}
+    models: set[type[BaseModel]] = set()
+    for argument in getattr(annotation, "__args__", ()):
+        models |= _models_in(argument)
+    return models
