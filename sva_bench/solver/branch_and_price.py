@@ -22,8 +22,8 @@ from sva_bench.solver.columns import Class, Column, Master, Prices, Side, Unit, 
 from sva_bench.solver.formulation import Goal
 from sva_bench.solver.graph import NG_MOST, Graph, allowed, graph_of, neighbours
 from sva_bench.solver.highs import Relaxed
-from sva_bench.solver.labelling import Priced, price
 from sva_bench.solver.preprocess import Scope
+from sva_bench.solver.pricing import Priced, price
 
 _log = logging.getLogger(__name__)
 

@@ -129,20 +129,18 @@ class Master:
         missed += [] if self.risk else list(range(first, rows))
         costs, entries = self.risk.costs() if self.risk else (np.zeros(0), np.zeros((len(self.floors), 0)))
         self.penalties, self.others = len(missed), len(missed) + len(costs)
+        own = {row: k for k, row in enumerate(missed)}
         build = RowBuilder()
-        for row in range(rows):
-            columns, values = [k for k, at in enumerate(missed) if at == row], [1.0]
-            if row >= first:
-                used = np.flatnonzero(entries[row - first])
-                columns += (self.penalties + used).tolist()
-                values = [1.0] * (len(columns) - len(used))
-                values += (entries[row - first][used] / self._size[row - first]).tolist()
-            if row < len(self.pois):
-                build.add(columns, values[:len(columns)], 1.0 if self.pois[row] in self.side.required else -np.inf, 1.0)
-            elif row < first:
-                build.add([], [], -np.inf, float(self.side.units[row - len(self.pois)].count))
-            else:
-                build.add(columns, values, float(self.floors[row - first] / self._size[row - first]), np.inf)
+        for row in range(len(self.pois)):
+            build.add([own[row]] if row in own else [], [1.0] * (row in own), 1.0 if row in own else -np.inf, 1.0)
+        for unit in self.side.units:
+            build.add([], [], -np.inf, float(unit.count))
+        for k, floor in enumerate(self.floors):
+            used = np.flatnonzero(entries[k])
+            columns, values = self.penalties + used, entries[k][used] / self._size[k]
+            if not self.risk:
+                columns, values = np.array([own[first + k]]), np.ones(1)
+            build.add(columns, values, float(floor / self._size[k]), np.inf)
         self._program = Relaxation(LinearModel(
             objective=np.concatenate([np.full(self.penalties, -self.penalty), costs]),
             upper=np.full(self.others, np.inf), integer=np.zeros(self.others, dtype=np.bool_), rows=build.rows()))

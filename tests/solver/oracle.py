@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,18 @@ from sva_bench.solver.risk import RiskMeasure
 TOLERANCE = 1e-6
 
 
+def moves(
+    instance: Instance, vehicle: Vehicle, site: int, visited: frozenset[int], fuel: float, time: float,
+) -> Iterator[tuple[int, float, float]]:
+    """Where a vehicle can go next: the site, fuel burnt since the last refuel, and time on arrival."""
+    for j in range(len(instance.sites)):
+        burnt = fuel + float(vehicle.fuel_s[site, j])
+        later = time + float(vehicle.fuel_s[site, j]) + float(instance.stop_s[j])
+        if j != site and j not in visited and burnt <= vehicle.fuel_capacity_s + TOLERANCE \
+                and later <= vehicle.mission_limit_s + TOLERANCE and np.isfinite(later):
+            yield j, burnt, later
+
+
 def least_times(instance: Instance, vehicle: Vehicle) -> dict[frozenset[int], float]:
     """Least time of a route for every set of POIs that the vehicle can visit: labels (site, visited, fuel, time)."""
     pois = set(instance.pois)
@@ -22,12 +35,7 @@ def least_times(instance: Instance, vehicle: Vehicle) -> dict[frozenset[int], fl
     waiting = [(instance.base, frozenset[int](), 0.0, 0.0)]
     while waiting:
         site, visited, fuel, time = waiting.pop()
-        for j in range(len(instance.sites)):
-            burnt = fuel + float(vehicle.fuel_s[site, j])
-            later = time + float(vehicle.fuel_s[site, j]) + float(instance.stop_s[j])
-            if j == site or j in visited or burnt > vehicle.fuel_capacity_s + TOLERANCE \
-                    or later > vehicle.mission_limit_s + TOLERANCE or not np.isfinite(later):
-                continue
+        for j, burnt, later in moves(instance, vehicle, site, visited, fuel, time):
             if j == instance.base:
                 found[visited] = min(found.get(visited, np.inf), later)
                 continue
@@ -129,12 +137,7 @@ def _best_orders(instance: Instance, vehicle: Vehicle) -> dict[frozenset[int], f
     waiting = [(instance.base, frozenset[int](), 0.0, 0.0, 0.0)]
     while waiting:
         site, visited, fuel, time, value = waiting.pop()
-        for j in range(len(instance.sites)):
-            burnt = fuel + float(vehicle.fuel_s[site, j])
-            later = time + float(vehicle.fuel_s[site, j]) + float(instance.stop_s[j])
-            if j == site or j in visited or burnt > vehicle.fuel_capacity_s + TOLERANCE \
-                    or later > vehicle.mission_limit_s + TOLERANCE or not np.isfinite(later):
-                continue
+        for j, burnt, later in moves(instance, vehicle, site, visited, fuel, time):
             if j == instance.base:
                 found[visited] = max(found.get(visited, 0.0), value)
                 continue
