@@ -15,6 +15,7 @@ from sva_bench.solver.highs import Relaxation, Relaxed
 from sva_bench.solver.risk import Risk
 
 Stops = tuple[int, ...]
+"""Sites of a route, from base to base."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -22,7 +22,8 @@ Orders = tuple[tuple[int, ...], ...]
 """POIs of each vehicle, in order of visit."""
 
 STARTS = 4
-ROUNDS = 1000
+ROUNDS = 1000  # after each start
+_LARGE = 120  # sites from which on rounds get fewer, for they get slower
 _POOL = 5000  # routes kept of one start
 _CYCLE = 50  # rounds between two returns to the best plan, or to nothing
 _HEAT = 0.03  # loss that is taken at the start of a cycle, relative to the best value
@@ -44,8 +45,8 @@ class Found:
 
 
 def search(
-    tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, starts: int = STARTS,
-    rounds: int = ROUNDS, seed: int = 0, stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
+    tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, seed: int = 0,
+    stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
 ) -> Found:
     """A plan worth at least as much as the one it starts from.
 
@@ -55,8 +56,6 @@ def search(
         survival: Chance of a vehicle to get to its next POI, which multiplies its rewards, shape (M,); 1 = order is
             indifferent.
         start: A feasible plan.
-        starts: How often to begin anew.
-        rounds: How often to ruin and recreate after each.
         seed: Seed of the random choices.
         stop: Whether to stop, given the best value so far.
     """
@@ -70,7 +69,8 @@ def search(
     legs = both_ways[np.isfinite(both_ways) & (both_ways > 0)] / 2
     detour = _DETOUR * float(np.median(legs)) if len(legs) else _DETOUR
     ordered = bool((survival < 1).any())
-    for number in range(starts):
+    rounds = int(ROUNDS * min(1.0, (_LARGE / n) ** 1.5)) + 1
+    for number in range(STARTS):
         if number and stop(value_of(weights, survival, best)):
             break
         rng = np.random.default_rng((seed, number))

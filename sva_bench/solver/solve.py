@@ -43,8 +43,6 @@ _log = logging.getLogger(__name__)
 
 LONG = 2.0  # mission limit in longest legs from which routes count as long
 MOST_LONG = 4  # vehicles up to which long routes want the edge model
-STARTS, ROUNDS = 4, 1000  # of the heuristic, when a proof is to follow
-_LARGE = 120  # sites from which on its rounds get fewer, for they get slower
 _WITHIN = 0.99  # of the gap, for rounding
 
 
@@ -83,8 +81,7 @@ def solve(
         if (not goal.floors or goal.risk) and not goal.driving and bool((goal.weights >= 0).all()):
             began = clock.used_s()
             found = search(
-                known.tables, _searched(goal), goal.chances(), start, starts=STARTS,
-                rounds=int(ROUNDS * min(1.0, (_LARGE / len(instance.sites)) ** 1.5)) + 1,
+                known.tables, _searched(goal), goal.chances(), start,
                 stop=lambda value: clock.out() or (
                     goal.risk is None and progress.bound - value <= gap * max(1.0, value)))
             adopt(progress, goal, known, found.orders)
