@@ -5,13 +5,14 @@ A *unit* is a vehicle, or several that are alike in everything, on one side of t
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sva_bench.arrays import FloatArray
+from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.solver.formulation import LinearModel, RowBuilder
-from sva_bench.solver.highs import Relaxation, Relaxed
+from sva_bench.solver.highs import Outcome, Relaxation, Relaxed
 from sva_bench.solver.risk import Risk
 
 Stops = tuple[int, ...]
@@ -86,17 +87,20 @@ class Prices:
         visit: Of each site's visit, shape (n,).
         unit: Of each unit's vehicles.
         floor: Of each floor, not positive, shape (floors,).
+        cut: Of each cut, not negative, shape (cuts,).
     """
 
     visit: FloatArray
     unit: FloatArray
     floor: FloatArray
+    cut: FloatArray
 
     def between(self, other: Prices, share: float) -> Prices:
         """So much of the other, and the rest of this."""
         return Prices(visit=(1 - share) * self.visit + share * other.visit,
                       unit=(1 - share) * self.unit + share * other.unit,
-                      floor=(1 - share) * self.floor + share * other.floor)
+                      floor=(1 - share) * self.floor + share * other.floor,
+                      cut=(1 - share) * self.cut + share * other.cut)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -107,6 +111,8 @@ class Master:
         side: The decisions.
         pois: POIs with a row.
         floors: Least sum of each floor.
+        cuts: How many cuts there are; of the routes a cut counts, one is in use at most.
+        counted: How often each cut counts a route, shape (cuts,).
         penalty: What a unit of a required visit, or of a floor in units of its size, costs if it is missed.
         risk: The measure of risk whose outcomes the floors are.
         entries: Unit and column of each program column after the penalties and the measure's own.
@@ -116,6 +122,8 @@ class Master:
     pois: tuple[int, ...]
     n: int
     floors: FloatArray
+    cuts: int
+    counted: Callable[[Column], FloatArray]
     penalty: float
     risk: Risk | None = None
     entries: list[tuple[int, Column]] = field(default_factory=list)
@@ -142,31 +150,41 @@ class Master:
             if not self.risk:
                 columns, values = np.array([own[first + k]]), np.ones(1)
             build.add(columns, values, float(floor / self._size[k]), np.inf)
+        for _ in range(self.cuts):
+            build.add([], [], -np.inf, 1.0)
         self._program = Relaxation(LinearModel(
             objective=np.concatenate([np.full(self.penalties, -self.penalty), costs]),
             upper=np.full(self.others, np.inf), integer=np.zeros(self.others, dtype=np.bool_), rows=build.rows()))
         self._present: set[tuple[int, Stops]] = set()
+        self._blocks: list[tuple[IntArray, FloatArray, FloatArray]] = []
 
-    def add(self, unit: int, columns: list[Column]) -> int:
+    def add(self, unit: int, columns: Sequence[Column]) -> int:
         """Offer columns to a unit; how many are new."""
         new = [c for c in columns if (unit, c.route) not in self._present]
         if not new:
             return 0
-        start, index, value = [0], [], []
-        for c in new:
-            self._present.add((unit, c.route))
-            visited = [j for j in self.pois if c.visits[j]]
-            index += [self._row[j] for j in visited] + [len(self.pois) + unit]
-            value += [float(c.visits[j]) for j in visited] + [1.0]
-            for k in range(len(self.floors)):
-                index.append(len(self.pois) + len(self.side.units) + k)
-                value.append(float(c.floors[k] / self._size[k]))
-            start.append(len(index))
-            self.entries.append((unit, c))
-        self._program.add_columns(
-            np.array([c.value for c in new]), np.array(start, dtype=np.int64), np.array(index, dtype=np.int64),
-            np.array(value))
+        units, floors = len(self.side.units), len(self.floors)
+        visits = np.array([c.visits for c in new])
+        counted = np.array([self.counted(c) for c in new]).reshape(len(new), self.cuts)
+        levels = np.array([c.floors for c in new]).reshape(len(new), floors)
+        values = np.array([c.value for c in new])
+        matrix = np.hstack([visits[:, list(self.pois)], np.zeros((len(new), units)), levels / self._size, counted])
+        matrix[:, len(self.pois) + unit] = 1.0
+        column, row = np.nonzero(matrix)
+        self._program.add_columns(values, np.searchsorted(column, np.arange(len(new) + 1)), row, matrix[column, row])
+        self._present.update((unit, c.route) for c in new)
+        self.entries += [(unit, c) for c in new]
+        self._blocks.append((np.full(len(new), unit), values, np.hstack([visits, levels, counted])))
         return len(new)
+
+    def most(self, prices: Prices) -> FloatArray:
+        """Greatest value of each unit's routes less the prices of what they take; 0 at least, shape (units,)."""
+        found = np.zeros(len(self.side.units))
+        if self._blocks:
+            self._blocks = [tuple(np.concatenate(part) for part in zip(*self._blocks, strict=True))]  # type: ignore[list-item]
+            unit, value, taken = self._blocks[0]
+            np.maximum.at(found, unit, value - taken @ np.concatenate([prices.visit, prices.floor, prices.cut]))
+        return found
 
     def solve(self, time_limit_s: float) -> Relaxed:
         """The relaxation over the columns so far."""
@@ -176,9 +194,9 @@ class Master:
         """Its duals."""
         visit = np.zeros(self.n)
         visit[list(self.pois)] = solved.duals[:len(self.pois)]
-        units = len(self.side.units)
-        return Prices(visit=visit, unit=solved.duals[len(self.pois):len(self.pois) + units],
-                      floor=solved.duals[len(self.pois) + units:] / self._size)
+        unit, floor, cut = np.split(solved.duals[len(self.pois):],
+                                    np.cumsum([len(self.side.units), len(self.floors)]))
+        return Prices(visit=visit, unit=unit, floor=floor / self._size, cut=np.maximum(cut, 0.0))
 
     def bound(self, prices: Prices, best: FloatArray) -> float:
         """Upper bound on the program over all columns, from any prices of the right signs.
@@ -188,18 +206,21 @@ class Master:
             best: Upper bound on a route's value less its visits' prices, of each unit, shape (units,).
         """
         counts = np.array([u.count for u in self.side.units], dtype=np.float64)
-        return float(prices.visit.sum() + prices.floor @ self.floors + counts @ np.maximum(best, 0.0))
+        return float(prices.visit.sum() + prices.floor @ self.floors + prices.cut.sum()
+                     + counts @ np.maximum(best, 0.0))
 
-    def share(self, solved: Relaxed) -> list[tuple[int, Column, float]]:
-        """The columns in use: unit, column and share."""
-        assert solved.values is not None
-        used = solved.values[self.others:]
+    def solve_whole(self, time_limit_s: float) -> Outcome:
+        """The best choice of whole columns; the program is then of no more use."""
+        return self._program.solve_whole(np.arange(self.others, self.others + len(self.entries)), time_limit_s)
+
+    def share(self, values: FloatArray) -> list[tuple[int, Column, float]]:
+        """The columns in use at a point: unit, column and share."""
+        used = values[self.others:]
         return [(*self.entries[k], float(used[k])) for k in np.flatnonzero(used > 1e-7)]
 
-    def missed(self, solved: Relaxed) -> float:
-        """How much is missed of what is required."""
-        assert solved.values is not None
-        return float(solved.values[:self.penalties].sum())
+    def missed(self, values: FloatArray) -> float:
+        """How much is missed of what is required at a point."""
+        return float(values[:self.penalties].sum())
 
 
 def without(unit: Unit, poi: int) -> Unit:

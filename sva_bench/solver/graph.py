@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.formulation import SLACK_S
-from sva_bench.solver.preprocess import Scope
+from sva_bench.solver.preprocess import Scope, is_metric
 
 NG_START, NG_MOST = 7, 14  # POIs that a site remembers at first, and at most
 _WITHIN = 0.9  # of the tolerance: sums in another order must not make a route infeasible
@@ -32,6 +32,7 @@ class Graph:
         limit_s: Mission limit, tolerance included [s]; finite.
         survival: Chance to get to the next POI.
         symmetric: Whether every leg costs the same both ways and the order of visits is indifferent.
+        metric: Whether no detour is quicker, or burns less, than a direct leg.
     """
 
     base: int
@@ -43,6 +44,7 @@ class Graph:
     limit_s: float
     survival: float
     symmetric: bool
+    metric: bool
 
 
 def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
@@ -62,7 +64,8 @@ def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
         and np.array_equal(fuel[legs], fuel.T[legs])
     return Graph(base=instance.base, bit=bit, legs=legs, time_s=np.where(legs, time, 0.0),
                  fuel_s=np.where(legs, fuel, 0.0), capacity_s=scope.capacity_s + _WITHIN * SLACK_S,
-                 limit_s=limit + _WITHIN * SLACK_S, survival=survival, symmetric=bool(symmetric))
+                 limit_s=limit + _WITHIN * SLACK_S, survival=survival, symmetric=bool(symmetric),
+                 metric=is_metric(scope.fuel_s, instance.base, tolerance_s=0.0))
 
 
 def neighbours(graph: Graph, pois: Sequence[int]) -> NDArray[np.uint64]:

@@ -96,6 +96,13 @@ class Relaxation:
             activity=np.array(solution.row_value), duals=np.array(solution.row_dual))
 
 
+    def solve_whole(self, columns: IntArray, time_limit_s: float) -> Outcome:
+        """The optimum over whole values of some columns, proved but for rounding; the relaxation is lost."""
+        _set_whole(self._solver, columns)
+        return _branch_and_bound(self._solver, gap=0.0, absolute_gap=1e-6, time_limit_s=time_limit_s, most_nodes=None,
+                                 heuristics=0.05)
+
+
 def maximise(
     model: LinearModel, rows: Rows, *, gap: float, absolute_gap: float, time_limit_s: float,
     start: FloatArray | None = None, most_nodes: int | None = None, heuristics: float = 0.0,
@@ -116,10 +123,23 @@ def maximise(
     if len(rows.lower):
         _check(solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1], rows.column,
                               rows.value), "addRows")
-    whole = np.flatnonzero(model.integer).astype(np.int32)
-    _check(solver.changeColsIntegrality(len(whole), whole,
-                                        np.full(len(whole), int(highspy.HighsVarType.kInteger), dtype=np.uint8)),
-           "changeColsIntegrality")
+    _set_whole(solver, np.flatnonzero(model.integer))
+    if start is not None:
+        solution = highspy.HighsSolution()
+        solution.col_value = start.tolist()
+        _check(solver.setSolution(solution), "setSolution")
+    return _branch_and_bound(solver, gap=gap, absolute_gap=absolute_gap, time_limit_s=time_limit_s,
+                             most_nodes=most_nodes, heuristics=heuristics)
+
+
+def _set_whole(solver: Any, columns: IntArray) -> None:
+    kinds = np.full(len(columns), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
+    _check(solver.changeColsIntegrality(len(columns), columns.astype(np.int32), kinds), "changeColsIntegrality")
+
+
+def _branch_and_bound(
+    solver: Any, *, gap: float, absolute_gap: float, time_limit_s: float, most_nodes: int | None, heuristics: float,
+) -> Outcome:
     _option(solver, "mip_rel_gap", gap)
     _option(solver, "mip_abs_gap", absolute_gap)
     _option(solver, "mip_feasibility_tolerance", INTEGRALITY)
@@ -128,10 +148,6 @@ def maximise(
     _option(solver, "time_limit", time_limit_s)
     if most_nodes is not None:
         _option(solver, "mip_max_nodes", most_nodes)
-    if start is not None:
-        solution = highspy.HighsSolution()
-        solution.col_value = start.tolist()
-        _check(solver.setSolution(solution), "setSolution")
     interrupted = _run_interruptibly(solver)
     status: SolveStatus = "interrupted" if interrupted else _status(solver)
     info = solver.getInfo()

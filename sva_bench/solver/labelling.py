@@ -58,13 +58,14 @@ def completion(legs, time, gain, charge, bit, base, step, steps):
 
 @njit(cache=True)
 def grow(following, count, time, fuel, bit, memory, reward, dual, charge, survival, base, half, capacity, limit, bound,
-         step, threshold, exact, forwards, most):
+         step, threshold, exact, forwards, most, touch, recall, once, toll):
     """All labels from one end up to half the limit that no other one beats.
 
     Returns:
-        Site, time, fuel, value, second value, memory, parent, and labels by site, each site's by decreasing value:
-        first a table of where a site's begin. Then whether there were too many. The second value is the chance to get
-        so far forwards; backwards minus the price of the visits, which is what the rest is worth if never reached.
+        Site, time, fuel, value, second value, memory, tolls ahead, parent, and labels by site, each site's by
+        decreasing value: first a table of where a site's begin. Then whether there were too many. The second value is
+        the chance to get so far forwards; backwards minus the price of the visits, which is what the rest is worth if
+        never reached.
     """
     n, words = memory.shape
     room = 4096
@@ -72,8 +73,10 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     t, q = np.zeros(room), np.zeros(room)
     x, y = np.zeros(room), np.zeros(room)
     mask = np.zeros((room, words), np.uint64)
+    due = np.zeros(room, np.uint64)  # tolls that its next visit to one of their POIs costs
     kept = np.zeros(room, np.bool_)
-    site[0], y[0], size = base, 1.0 if forwards else 0.0, 1
+    site[0], y[0], due[0], size = base, 1.0 if forwards else 0.0, once, 1
+    tolled = len(toll) > 0
     width = half / BUCKETS
     head = np.full(BUCKETS + 1, -1, np.int64)
     head[0] = 0
@@ -84,7 +87,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     keys = _keys(bit, memory, time)
     c_t, c_q = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
     c_x, c_y = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
-    c_mask = np.zeros((chunks, CHUNK, words), np.uint64)
+    c_mask, c_due = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
     c_least, c_most = np.zeros(chunks), np.zeros(chunks)
     used, overflow = 0, False
     bounded = len(bound) > 0
@@ -128,6 +131,9 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                                             if c_mask[chunk, k, w] & ~mask[label, w]:
                                                 beaten = False
                                                 break
+                                        if beaten and tolled:
+                                            more = charged(toll, c_due[chunk, k] & ~due[label])
+                                            beaten = c_x[chunk, k] - more >= x[label] - _EPSILON
                                     if beaten:
                                         break
                         chunk = chunk_next[chunk]
@@ -146,7 +152,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                             _taller(c_y, chunks)
                         larger = np.zeros((chunks, CHUNK, words), np.uint64)
                         larger[:used] = c_mask
-                        c_mask = larger
+                        c_mask, c_due = larger, _taller(c_due, chunks)
                         c_least, c_most = _longer(c_least, chunks), _longer(c_most, chunks)
                     chunk = used
                     used += 1
@@ -156,6 +162,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                 chunk_size[chunk] += 1
                 c_t[chunk, k], c_q[chunk, k], c_x[chunk, k], c_y[chunk, k] = t[label], q[label], x[label], y[label]
                 c_least[chunk], c_most[chunk] = min(c_least[chunk], q[label]), max(c_most[chunk], x[label])
+                c_due[chunk, k] = due[label]
                 for w in range(words):
                     c_mask[chunk, k, w] = mask[label, w]
                 # Onward.
@@ -184,6 +191,10 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                             worth = survival * (reward[j] + x[label] - y[label])
                             second = y[label] - dual[j]
                             value = worth + second
+                    ahead = due[label] & recall[j]
+                    if tolled and touch[j]:
+                        value -= charged(toll, ahead & touch[j])
+                        ahead = (ahead ^ (touch[j] & ~once)) & ~(touch[j] & once)
                     if bounded and value + bound[int((limit - later) / step + 1e-9), j] <= threshold:
                         continue
                     if size == room:
@@ -193,12 +204,12 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                         room *= 2
                         site, parent, after = _longer(site, room), _longer(parent, room), _longer(after, room)
                         t, q, x, y = _longer(t, room), _longer(q, room), _longer(x, room), _longer(y, room)
-                        mask, kept = _taller(mask, room), _longer(kept, room)
+                        mask, kept, due = _taller(mask, room), _longer(kept, room), _longer(due, room)
                     for w in range(words):
                         new[w] = mask[label, w] & memory[j, w]
                     if b >= 0:
                         new[b >> 6] |= np.uint64(1) << np.uint64(b & 63)
-                    site[size], parent[size], kept[size] = j, label, False
+                    site[size], parent[size], kept[size], due[size] = j, label, False, ahead
                     t[size], q[size], x[size], y[size] = later, burnt, value, second
                     for w in range(words):
                         mask[size, w] = new[w]
@@ -223,7 +234,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     for label in by_value:
         by_site[placed[site[label]]] = label
         placed[site[label]] += 1
-    return site[:size], t[:size], q[:size], x[:size], y[:size], mask[:size], parent[:size], \
+    return site[:size], t[:size], q[:size], x[:size], y[:size], mask[:size], due[:size], parent[:size], \
         (begin, by_site), overflow
 
 
@@ -251,6 +262,18 @@ def _keys(bit, memory, time):
 
 
 @njit(cache=True)
+def charged(toll, which):
+    """Sum of some tolls, given bit by bit."""
+    total, k = 0.0, 0
+    while which:
+        if which & np.uint64(1):
+            total += toll[k]
+        which >>= np.uint64(1)
+        k += 1
+    return total
+
+
+@njit(cache=True)
 def _longer(array, size):
     larger = np.zeros(size, array.dtype)
     larger[:len(array)] = array
@@ -265,8 +288,8 @@ def _taller(array, size):
 
 
 @njit(cache=True)
-def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted,
-         t, q, x, y, mask, of_site, t_b, q_b, x_b, y_b, mask_b, of_site_b):
+def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, once, toll,
+         t, q, x, y, mask, due, of_site, t_b, q_b, x_b, y_b, mask_b, due_b, of_site_b):
     """For each label from the start the best rest of the route worth more than the threshold.
 
     Returns:
@@ -294,17 +317,22 @@ def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, disco
                 if most_fuel < 0 or most_time < 0:
                     continue
                 so_far = x[label] - charge * time[i, j]
+                # A toll for the first visit is no second one's: both ends may have paid it.
+                refund = charged(toll, once & ~due[label])
                 for k_b in range(begin_b[j], begin_b[j + 1]):
                     other = by_site_b[k_b]
-                    if so_far + x_b[other] <= best:
+                    if so_far + x_b[other] + refund <= best:
                         break
                     if t_b[other] > most_time or q_b[other] > most_fuel:
                         continue
                     total = so_far + x_b[other]
+                    if len(toll) > 0:
+                        total += charged(toll, once & ~due[label] & ~due_b[other]) \
+                            - charged(toll, ~once & due[label] & due_b[other])
                     if discounted:
                         total = so_far + y[label] * (x_b[other] - y_b[other]) + y_b[other]
-                        if total <= best:
-                            continue
+                    if total <= best:
+                        continue
                     apart = True
                     for w in range(words):
                         if mask[label, w] & mask_b[other, w]:

@@ -16,6 +16,9 @@ from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 _log = logging.getLogger(__name__)
 
 
+_ROUNDING_S = 1e-9  # of sums of legs
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scope:
     """The legs that one vehicle may drive, and the bounds on its fuel.
@@ -43,11 +46,11 @@ class Scope:
     limit_s: float
 
 
-def is_metric(cost: FloatArray, base: int) -> bool:
+def is_metric(cost: FloatArray, base: int, *, tolerance_s: float = TOLERANCE_S) -> bool:
     """Whether no detour is cheaper than a direct leg, but for detours over the base, which no route can take."""
     for k in range(len(cost)):
         if k != base:
-            excess = cost > cost[:, k, None] + cost[None, k, :] + TOLERANCE_S
+            excess = cost > cost[:, k, None] + cost[None, k, :] + max(tolerance_s, _ROUNDING_S)
             np.fill_diagonal(excess, False)
             if excess.any():
                 return False

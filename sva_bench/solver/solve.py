@@ -13,6 +13,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.branch_and_cut import FlowModel, prove_by_cuts
 from sva_bench.solver.branch_and_price import BranchAndPrice
+from sva_bench.solver.column_generation import ColumnGeneration
 from sva_bench.solver.expected import DirectedModel
 from sva_bench.solver.formulation import Goal
 from sva_bench.solver.heuristic import Orders, search, shorten
@@ -167,16 +168,17 @@ def _prove_by_columns(
     def offer(orders: Orders) -> None:
         adopt(progress, goal, known, orders)
 
-    search_tree = BranchAndPrice(instance=instance, goal=goal, scopes=scopes, survival=goal.chances(), offer=offer,
-                                 cutoff=cutoff, out=clock.out, tell=progress.tighten)
+    generation = ColumnGeneration(instance=instance, goal=goal, scopes=scopes, survival=goal.chances(), cutoff=cutoff,
+                                  out=clock.out)
     for m, order in (*enumerate(progress.orders), *routes):
-        search_tree.add_route(m, drive(known.roads[m], order))
+        generation.add_route(m, drive(known.roads[m], order))
+    search_tree = BranchAndPrice(generation=generation, offer=offer, left_s=clock.left_s, tell=progress.tighten)
     try:
         if search_tree.run():
             progress.tighten(cutoff())
         elif clock.out():
             progress.status = "time_limit"
     finally:
-        progress.nodes, progress.rounds = search_tree.nodes, search_tree.priced
+        progress.nodes, progress.rounds = search_tree.nodes, generation.priced
         progress.seconds["columns"] = clock.used_s() - began
-        _log.debug("columns: %d nodes, %d columns, %s", search_tree.nodes, len(search_tree.pool), search_tree.calls)
+        _log.debug("columns: %d nodes, %d columns, %s", search_tree.nodes, len(generation.pool), generation.calls)

@@ -24,7 +24,7 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState
 from sva_bench.mission.instance import Instance, Vehicle, read_instance
 from sva_bench.mission.plan import Plan
-from sva_bench.solver import branch_and_cut, branch_and_price
+from sva_bench.solver import branch_and_cut, column_generation
 from sva_bench.solver import solve as solving
 from sva_bench.solver.expected import euler_walk
 from sva_bench.solver.heuristic import Found
@@ -262,7 +262,7 @@ def test_a_wide_gap_is_enough_when_asked_for() -> None:
 
 
 @pytest.mark.parametrize(("where", "what", "method"), [
-    (solving, "search", "auto"), (branch_and_price, "price", "auto"), (branch_and_cut, "maximise", "expected")])
+    (solving, "search", "auto"), (column_generation, "best_routes", "auto"), (branch_and_cut, "maximise", "expected")])
 def test_ctrl_c_keeps_the_best_plan_so_far(
     where: ModuleType, what: str, method: Method, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
