@@ -23,8 +23,8 @@ $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	# Compile the solver once, before many processes want it at a time.
-	$(BIN)/sva-bench instance random --family B --pois 8 -o .venv/warm.json
+	# Compile the solver once, before many processes want it at a time; smaller instances never get to its pricing.
+	$(BIN)/sva-bench instance random --family B --pois 12 -o .venv/warm.json
 	$(BIN)/sva-bench plan .venv/warm.json -o .venv/warm-plan.json
 	touch $@
 

@@ -93,7 +93,7 @@ def alone(instance: Instance) -> float:
 
 def main(names: list[str]) -> None:
     """Print the table."""
-    for warm in (Case(name="", family="B", pois=8, vehicles=2, limit_s=9),
+    for warm in (Case(name="", family="B", pois=12, vehicles=2, limit_s=9),
                  Case(name="", family="A", pois=8, vehicles=2, limit_s=9, directed=True, per_leg=True)):
         plan_stochastic(warm.instance(0))
     for case in CASES:
