@@ -2,7 +2,7 @@ PYTHON ?= python3.11
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: run test test-long lint setup lock bench clean bench-solver
+.PHONY: run test test-long lint setup lock bench clean bench-solver bench-paper
 
 run: setup  ## plan, execute and measure the four-rooms mission
 	$(BIN)/sva-bench run worlds/four-rooms.yaml
@@ -39,6 +39,9 @@ clean:
 
 bench-solver: setup  ## the speed that the solver promises, by class: takes an hour
 	$(BIN)/python -m benchmarks.solver.classes
+
+bench-paper: setup  ## a part of the paper's own table of runtimes: under ten minutes on an idle core
+	$(BIN)/python -m benchmarks.solver.paper --quick
 
 bench: setup  ## figures of the README; see benchmarks/
 	for file in travel_times physics recording solver_small; do $(BIN)/python benchmarks/$$file.py || exit 1; done

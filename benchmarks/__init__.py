@@ -1,0 +1,1 @@
+"""Measurements of sva-bench itself; each file says how it is run."""
