@@ -19,6 +19,7 @@ from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import plan_stochastic
 
 PAPER = Path(__file__).parents[2] / "../shared/paper.tex"
+DOCS = Path(__file__).parents[2] / "docs"
 # A mission limit of 0.6 fuel capacities leaves POIs behind, so that there is something to prove and to cut.
 TINY = Study(pois=(6,), seeds=(1,), fuel_multiples=(2.25,), availabilities=(0.75,), tau=0.6)
 
@@ -122,12 +123,28 @@ def test_methods_that_contradict_each_other_are_called_out() -> None:
     assert "THAN ANOTHER METHOD'S BOUND" in checks([row(10, "dep"), row(10, "auto", value=90.0, bound=95.0)])[1]
 
 
+def test_a_report_says_that_the_machine_was_busy() -> None:
+    late = row(10, "dep", bound=110.0, process_s=10.0)
+    assert "busy" not in markdown([late], QUICK)
+    # 4 s of processor time in 10 s
+    assert "had 40 % of a core" in markdown([replace(late, process_s=4.0)], QUICK)
+
+
 def test_a_report_of_half_a_run_says_so(tmp_path: Path) -> None:
     text = write_report([row(10, "dep")], QUICK, tmp_path)
     assert "1 of 80 solves" in text
     assert "**10 s for each solve**" in text
+    assert "Proved: `dep` 1 of 1." in text
+    assert "by availability" not in text  # there is but one
     assert (tmp_path / "paper-runtimes.md").read_text(encoding="utf-8") == text
     assert "Nothing is solved" in markdown([], QUICK)
+
+
+def test_the_shipped_report_says_what_its_rows_say() -> None:
+    rows = read_rows(DOCS / "paper-runtimes.csv")
+    study = replace(QUICK, time_limit_s=rows[0].time_limit_s)
+    assert {one.case for one in rows} == set(study.cases())
+    assert (DOCS / "paper-runtimes.md").read_text(encoding="utf-8") == markdown(rows, study, "paper-runtimes.png")
 
 
 def test_the_picture_is_the_same_each_time(tmp_path: Path) -> None:
