@@ -22,6 +22,7 @@ from sva_bench.solver.highs import Relaxed
 _log = logging.getLogger(__name__)
 
 _SLACK = 0.03  # of the gap: a relaxation this close to its bound counts as solved
+_COARSE = 0.3  # ... as long as its routes visit POIs again: they tell what to remember soon enough
 _STRONG = 8  # candidates for branching that are looked at closely
 CUTTING = 6  # vehicles from which subset-row cuts are worth their labels
 _TAIL = 0.02  # of the gap: cuts that lower the bound by less aren't worth it
@@ -76,7 +77,7 @@ class BranchAndPrice:
     def _process(self, node: _Node) -> tuple[list[_Node] | None, float]:
         """Solve a node; its children, ``None`` if time ran out or labels overflowed, and its bound."""
         generation, cutoff = self.generation, self.generation.cutoff
-        centre, best, slack, before, dived = node.prices, node.bound, _SLACK, math.inf, False
+        centre, best, slack, before, dived = node.prices, node.bound, _COARSE, math.inf, False
         while True:
             master = generation.master(node.side, centre)
             made = generation.generate(master, node.side, centre, known=best, slack=slack,
@@ -92,6 +93,9 @@ class BranchAndPrice:
             whole = not undecided or all(abs(share - round(share)) < 1e-6 for *_, share in used)
             # With nothing left to decide only routes that visit a POI again can be in the way.
             if generation.remember([column for _, column, _ in used], ignore_most=whole):
+                continue
+            if slack == _COARSE:
+                slack = _SLACK
                 continue
             if whole and master.missed(solved.values) < 1e-6:
                 self._offer_columns(used)
