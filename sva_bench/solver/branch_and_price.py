@@ -22,6 +22,7 @@ from sva_bench.solver.highs import Relaxed
 _log = logging.getLogger(__name__)
 
 _SLACK = 0.03  # of the gap: a relaxation this close to its bound counts as solved
+_MISSED = 1e-6  # of what is required: no more than rounding
 _COARSE = 0.3  # ... as long as its routes visit POIs again: they tell what to remember soon enough
 _STRONG = 8  # candidates for branching that are looked at closely
 CUTTING = 6  # vehicles from which subset-row cuts are worth their labels
@@ -97,7 +98,10 @@ class BranchAndPrice:
             if slack == _COARSE:
                 slack = _SLACK
                 continue
-            if whole and master.missed(solved.values) < 1e-6:
+            if whole and master.missed(solved.values) > _MISSED:
+                generation.penalty *= 10.0  # missing a floor by a little cost less than any plan that reaches it
+                continue
+            if whole:
                 self._offer_columns(used)
                 if best <= cutoff() or slack == 0.0:
                     return [], min(best, cutoff())
@@ -124,13 +128,17 @@ class BranchAndPrice:
         entries = self.generation.enumerate(side, made)
         if entries is None:
             return None
-        master = self.generation.master(side, None, entries)
-        outcome = master.solve_whole(self.left_s())
-        _log.debug("enumerated %d routes: %s, %.6g of %.6g, %d nodes", len(master.entries), outcome.status,
-                   outcome.objective, outcome.bound, outcome.nodes)
-        if outcome.values is not None and master.missed(outcome.values) < 1e-6:
-            self._offer_columns(master.share(outcome.values))
-        return max(min(outcome.bound, made.bound), self.generation.cutoff())
+        while True:
+            master = self.generation.master(side, None, entries)
+            outcome = master.solve_whole(self.left_s())
+            _log.debug("listed %d routes: %s, %.6g of %.6g, %d nodes", len(master.entries), outcome.status,
+                       outcome.objective, outcome.bound, outcome.nodes)
+            if outcome.values is not None and master.missed(outcome.values) <= _MISSED:
+                self._offer_columns(master.share(outcome.values))
+            elif outcome.status == "optimal" and outcome.bound > self.generation.cutoff():
+                self.generation.penalty *= 10.0
+                continue
+            return max(min(outcome.bound, made.bound), self.generation.cutoff())
 
     def _offer_columns(self, used: Sequence[tuple[int, Column, float]]) -> None:
         """Offer a whole solution as a plan; a vehicle that drives parts of several routes over the same POIs may drive

@@ -71,6 +71,7 @@ class ColumnGeneration:
         out: Whether to stop.
         classes: Vehicles that are alike.
         graphs: What each class may drive.
+        penalty: What it costs to miss a required visit, or a floor by its size.
         calls: Pricing runs and labels.
     """
 
@@ -82,6 +83,7 @@ class ColumnGeneration:
     out: Callable[[], bool]
     classes: list[Class] = field(default_factory=list)
     graphs: list[Graph] = field(default_factory=list)
+    penalty: float = field(init=False)
     calls: dict[str, int] = field(default_factory=lambda: {"heuristic": 0, "exact": 0, "labels": 0})
 
     def __post_init__(self) -> None:
@@ -113,7 +115,7 @@ class ColumnGeneration:
         self._counts: dict[tuple[int, tuple[int, ...]], FloatArray] = {}
         total = float(np.abs(self.goal.weights).max(axis=0, initial=0.0).sum())
         longest = sum(graph.limit_s for graph in self.graphs)
-        self._penalty = 10.0 * (total + self.goal.driving * longest + 1.0)
+        self.penalty = 10.0 * (total + self.goal.driving * longest + 1.0)
 
     @property
     def priced(self) -> int:
@@ -129,7 +131,7 @@ class ColumnGeneration:
     def master(self, side: Side, prices: Prices | None, entries: Sequence[Sequence[Column]] | None = None) -> Master:
         """The program at a node, with columns that are good at some prices, or with those given of each unit."""
         master = Master(side=side, pois=self.rows, n=self._n, floors=self._floors, cuts=len(self.cuts),
-                        counted=self._counted, penalty=self._penalty, risk=self.goal.risk)
+                        counted=self._counted, penalty=self.penalty, risk=self.goal.risk)
         if entries is not None:
             for number, columns in enumerate(entries):
                 master.add(number, columns)

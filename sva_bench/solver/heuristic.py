@@ -27,7 +27,7 @@ _LARGE = 120  # sites from which on rounds get fewer, for they get slower
 _POOL = 5000  # routes kept of one start
 _CYCLE = 50  # rounds between two returns to the best plan, or to nothing
 _HEAT = 0.03  # loss that is taken at the start of a cycle, relative to the best value
-_STRIDE = 250  # rounds between two looks at the clock
+_LOOKS = 4  # at the clock, in the rounds after a start
 _DETOUR = 0.01  # of the median leg; keeps a POI on the way from looking infinitely good
 
 
@@ -79,7 +79,8 @@ def search(
         pool, length, kind = np.zeros((_POOL, n), np.int16), np.zeros(_POOL, np.int64), np.zeros(_POOL, np.int64)
         table, keys = np.full(2 * _POOL + 1, -1, np.int64), rng.integers(0, 2**63, n, dtype=np.uint64)
         size = 0
-        for done, until in itertools.pairwise((0, *range(1, rounds, _STRIDE), rounds)):  # a first plan at once
+        looks = (0, *range(1, rounds, -(-rounds // _LOOKS)), rounds)  # a first plan at once
+        for done, until in itertools.pairwise(looks):
             size = run_rounds(
                 rng, until - done, done, _CYCLE, _HEAT, tables.kind, tables.base, tables.fuel_s,
                 tables.time_s, tables.quickest_s, tables.first, tables.last, tables.hops, tables.capacity_s,
