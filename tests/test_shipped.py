@@ -19,7 +19,7 @@ def test_a_shipped_world_has_what_the_paper_has(path: Path) -> None:
     world = load_world(path)
     assert world.name == path.stem
     assert len(world.stations) == 5
-    assert 10 <= len(world.pois) <= 12
+    assert 15 <= len(world.pois) <= 20
     assert [s.name for s in world.scenarios] == ["S1", "S2", "S3", "S4"]
     unreliable = world.robots[-1].name
     assert [s.availability[unreliable] for s in world.scenarios] == [1.0, 0.75, 0.25, 0.0]
