@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.options import Family, PlannerOption, Verbose, WorldArgument, finite
+from sva_bench.options import Family, PlannerOption, Verbose, WorldArgument, WorldFamily, finite
 from sva_bench.terminal import print_json, progress_bars, results, set_up_logging, write_result
 
-world_app = typer.Typer(no_args_is_help=True, help="Check worlds.", rich_markup_mode="rich")
+world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
 
 
@@ -43,6 +43,35 @@ def check_world(
                       "there", highlight=False)
     console.print(f"{loaded.name} is a good world: {len(loaded.stations)} stations, {len(loaded.pois)} POIs, "
                   f"{len(loaded.robots)} robots, {len(loaded.scenarios)} scenarios", highlight=False)
+
+
+@world_app.command("random")
+def make_random_world(
+    family: Annotated[WorldFamily, typer.Option(help="What stands there: walls with doors and furniture, scattered "
+                                                     "obstacles, racks, or a maze.")] = "rooms",
+    size: Annotated[float, typer.Option(metavar="METRES", min=10, max=100, callback=finite, help="Side of the "
+                                        "square.")] = 18,
+    density: Annotated[float | None, typer.Option(
+        min=0, max=1, callback=finite, help="Share of the area that furniture, obstacles or racks cover; of a maze, "
+        "share of its walls that stand: 1 leaves no loops.", show_default="rooms 0.06, field 0.1, aisles 0.2, "
+        "maze 0.8")] = None,
+    pois: Annotated[int, typer.Option(min=4, max=100, help="Points of interest, at least two for each robot.")] = 10,
+    stations: Annotated[int, typer.Option(min=0, max=30, help="Refuelling stations.")] = 5,
+    robots: Annotated[int, typer.Option(min=2, max=10, help="Robots; half of them, rounded down, are uncertain.")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of terrain, sites and incentives.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="World file to write; default: standard "
+                                                "output.", show_default=False)] = None,
+    verbose: Verbose = False,
+) -> None:
+    """Make a random world, with a mission that is neither trivial nor hopeless and the paper's scenarios S1 to S4."""
+    with holding_back_ctrl_c():
+        from sva_bench.worlds import random_world
+
+    set_up_logging(verbose)
+    with progress_bars() as progress:
+        text = random_world(family, size_m=size, density=density, pois=pois, stations=stations, robots=robots,
+                            seed=seed, progress=progress)
+    write_result(output, text)
 
 
 @world_app.command("schema")

@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sva_bench.complaints import Loc, first_complaint, shown
+from sva_bench.complaints import Loc as Loc
+from sva_bench.complaints import first_complaint, shown
 from sva_bench.errors import BadFile
 
 MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
@@ -94,7 +97,15 @@ def read_yaml(path: Path) -> Document:
     Raises:
         BadFile: If it cannot be read, is too large, or is not plain YAML.
     """
-    text = _read(path, MAX_YAML_BYTES)
+    return parse_yaml(_read(path, MAX_YAML_BYTES), path)
+
+
+def parse_yaml(text: str, path: Path) -> Document:
+    """What the text of such a file says, read from ``path`` or about to be written there.
+
+    Raises:
+        BadFile: If it is not plain YAML.
+    """
     try:
         root = _compose(text)
     except MarkedYAMLError as error:
@@ -299,6 +310,47 @@ def pretty_json(data: Any, indent: int = 0, width: int = 116) -> str:
         rows = [pad + (json.dumps(item) if not _deep(item) else pretty_json(item, indent + 1)) for item in data]
         text = "[\n" + ",\n".join(rows) + "\n" + " " * indent + "]"
     return text + ("\n" if indent == 0 else "")
+
+
+def pretty_yaml(data: Mapping[str, Any], remarks: Mapping[Loc, str], width: int = 116) -> str:
+    """YAML that a person can read: what holds no mapping inside stands on one line.
+
+    Args:
+        data: The content.
+        remarks: Comments by the key or list item that they stand above; ``()`` is the head of the file. One that
+            begins with a newline has an empty line above it.
+        width: Where long lines are broken.
+    """
+    yaml = YAML()
+    yaml.width = width
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    root = _commented(data, (), remarks)
+    if () in remarks:
+        root.yaml_set_start_comment(remarks[()])
+    stream = StringIO()
+    yaml.dump(root, stream)
+    return "".join(line.rstrip() + "\n" for line in stream.getvalue().rstrip().splitlines())
+
+
+def _commented(item: Any, loc: Loc, remarks: Mapping[Loc, str]) -> Any:
+    if not isinstance(item, Mapping | list):
+        return item
+    named = isinstance(item, Mapping)
+    pairs = [(key, _commented(value, (*loc, key), remarks))
+             for key, value in (item.items() if isinstance(item, Mapping) else enumerate(item))]
+    node = CommentedMap(pairs) if named else CommentedSeq(value for _, value in pairs)
+    if not item or (loc and not any(_holds_mapping(value) for _, value in pairs)):
+        node.fa.set_flow_style()
+        return node
+    node.fa.set_block_style()
+    for key, _ in pairs:
+        if (*loc, key) in remarks:
+            node.yaml_set_comment_before_after_key(key, before=remarks[*loc, key], indent=2 * len(loc))
+    return node
+
+
+def _holds_mapping(item: Any) -> bool:
+    return isinstance(item, Mapping) or (isinstance(item, list) and any(_holds_mapping(x) for x in item))
 
 
 def _deep(item: Any) -> bool:

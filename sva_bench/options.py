@@ -16,6 +16,7 @@ Cuts = Literal["single", "multi", "pareto"]
 RiskKind = Literal["cvar", "excess"]
 FailureProcess = Literal["mission", "per_leg"]
 Family = Literal["A", "B", "C"]
+WorldFamily = Literal["rooms", "field", "aisles", "maze"]
 Objective = Literal["stochastic", "deterministic"]
 
 

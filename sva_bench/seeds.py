@@ -16,6 +16,8 @@ class Stream(IntEnum):
     NOISE = 1
     INCENTIVE = 2
     JOINT_FAILURE = 4
+    RANDOM_WORLD = 7
+    PROPOSED_MISSION = 8
 
 
 def seed_for(root: int, stream: Stream, *index: int) -> np.random.SeedSequence:

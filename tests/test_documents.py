@@ -7,17 +7,20 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import Field
 
 from sva_bench.documents import (
     MAX_YAML_BYTES,
     Bounded,
+    Loc,
     Name,
     Section,
     dotted,
+    parse_yaml,
     pretty_json,
+    pretty_yaml,
     read_json,
     read_yaml,
     validate,
@@ -188,3 +191,26 @@ def test_pretty_json_keeps_rows_on_their_lines_and_refuses_nan() -> None:
     assert pretty_json({"fuel_s": matrix}).count("\n") == 16  # a row a line, and two brackets each for list and dict
     with pytest.raises(ValueError, match="not JSON compliant"):
         pretty_json({"a": float("nan")})
+
+
+names = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,8}", fullmatch=True) | st.sampled_from(["null", "true", "1e5"])
+leaves = st.booleans() | st.none() | st.integers(-10**6, 10**6) | names | st.floats(-1e9, 1e9)
+nested = st.recursive(leaves, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(names, inner, max_size=8),
+                      max_leaves=12)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.dictionaries(names, nested, min_size=1, max_size=4))
+def test_pretty_yaml_reads_as_what_it_was_made_of(data: dict[str, Any]) -> None:
+    remarks: dict[Loc, str] = {(): "what this is", **{(key,): "\nabove" for key in data}}
+    text = pretty_yaml(data, remarks)
+    assert parse_yaml(text, Path("made.yaml")).data == data
+    assert text.startswith("# what this is\n")
+    assert not any(line != line.rstrip() for line in text.split("\n"))
+
+
+def test_pretty_yaml_puts_what_holds_no_mapping_on_a_line_and_remarks_above_it() -> None:
+    data = {"map": {"shapes": [{"wall": [[0, 1], [2.5, 1]]}, {"post": [3, 4]}]}, "part": {"size_m": 2, "sub": {}}}
+    assert pretty_yaml(data, {(): "a map", ("map", "shapes", 1): "posts", ("part",): "\n"}) == (
+        "# a map\nmap:\n  shapes:\n    - {wall: [[0, 1], [2.5, 1]]}\n    # posts\n    - {post: [3, 4]}\n\n"
+        "part:\n  size_m: 2\n  sub: {}\n")

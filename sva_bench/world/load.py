@@ -35,9 +35,17 @@ def load_world(path: Path) -> World:
     Raises:
         BadFile: With file, line, key and what to change.
     """
-    document = read_yaml(path)
+    return world_of(read_yaml(path))
+
+
+def world_of(document: Document) -> World:
+    """Resolve a world file's content.
+
+    Raises:
+        BadFile: As ``load_world``.
+    """
     file = validate(document, WorldFile, KIND)
-    obstacles = _obstacles(file.map.shapes)
+    obstacles = obstacles_of(file.map.shapes)
     robots = tuple(_robot(document, name, entry, list(file.sites.pois)) for name, entry in file.robots.items())
     widest = max(robot.model.radius_m for robot in robots)
     sites = _sites(document, file, obstacles, widest)
@@ -50,7 +58,8 @@ def load_world(path: Path) -> World:
     )
 
 
-def _obstacles(shapes: Shapes) -> Obstacles:
+def obstacles_of(shapes: Shapes) -> Obstacles:
+    """What a description by shapes puts into the world."""
     boxes, cylinders = [], []
     for shape in shapes.obstacles:
         if isinstance(shape, Cylinder):

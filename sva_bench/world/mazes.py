@@ -1,0 +1,59 @@
+"""Walls of a maze without closed cells."""
+
+from __future__ import annotations
+
+import numpy as np
+
+Line = tuple[tuple[float, float], tuple[float, float]]
+
+
+def maze_walls(size_m: float, cell_m: float, density: float, rng: np.random.Generator) -> list[Line]:
+    """Inner walls of a square maze, as lines.
+
+    A random walk that backs out of dead ends opens a way from each cell to each other and no loop; of the walls that
+    it leaves, a share stands.
+
+    Args:
+        size_m: Side of the square.
+        cell_m: Side of a cell, about.
+        density: Share of the walls that stand; 1 leaves no loops.
+        rng: Random numbers.
+
+    Source:
+        The recursive backtracker, a randomised depth-first search.
+    """
+    n = max(round(size_m / cell_m), 2)
+    opened: set[tuple[tuple[int, int], tuple[int, int]]] = set()
+    here = (int(rng.integers(n)), int(rng.integers(n)))
+    seen, way = {here}, [here]
+    while way:
+        x, y = here = way[-1]
+        fresh = [(i, j) for i, j in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1))
+                 if 0 <= i < n and 0 <= j < n and (i, j) not in seen]
+        if not fresh:
+            way.pop()
+            continue
+        there = fresh[int(rng.integers(len(fresh)))]
+        opened |= {(here, there), (there, here)}
+        seen.add(there)
+        way.append(there)
+    # A wall by the line it is on (0 = x, 1 = y fixed; its number) and the cell that it runs along.
+    walls = [(0, x + 1, y) for x in range(n - 1) for y in range(n) if ((x, y), (x + 1, y)) not in opened]
+    walls += [(1, y + 1, x) for y in range(n - 1) for x in range(n) if ((x, y), (x, y + 1)) not in opened]
+    order = rng.permutation(len(walls))[:round(density * len(walls))]
+    return _joined(sorted(walls[int(k)] for k in order), size_m / n)
+
+
+def _joined(walls: list[tuple[int, int, int]], cell_m: float) -> list[Line]:
+    """Walls as lines; those that go on in one another as one."""
+    runs: list[list[int]] = []
+    for axis, line, cell in walls:
+        if runs and runs[-1][:2] == [axis, line] and runs[-1][3] == cell:
+            runs[-1][3] = cell + 1
+        else:
+            runs.append([axis, line, cell, cell + 1])
+    lines: list[Line] = []
+    for axis, line, first, last in runs:
+        at, start, end = (round(k * cell_m, 2) for k in (line, first, last))
+        lines.append(((at, start), (at, end)) if axis == 0 else ((start, at), (end, at)))
+    return lines
