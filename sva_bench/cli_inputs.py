@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import Family, PlannerOption, Verbose, WorldArgument, WorldFamily, finite
 from sva_bench.terminal import print_json, progress_bars, results, set_up_logging, write_result
@@ -72,6 +73,35 @@ def make_random_world(
         text = random_world(family, size_m=size, density=density, pois=pois, stations=stations, robots=robots,
                             seed=seed, progress=progress)
     write_result(output, text)
+
+
+@world_app.command("draw")
+def draw(
+    world: WorldArgument,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="PICTURE.png|svg", help="Picture to write.",
+                                         show_default=False)],
+    roadmap: Annotated[bool, typer.Option("--roadmap", help="Show the roadmap that paths are planned on.")] = False,
+    paths: Annotated[bool, typer.Option("--paths", help="Show the paths between all sites.")] = False,
+    plan: Annotated[Path | None, typer.Option(metavar="PLAN.json", help="Show the routes of a plan.",
+                                              show_default="none")] = None,
+    verbose: Verbose = False,
+) -> None:
+    """Draw a world to scale: map, sites, incentives; on request roadmap, paths and a plan's routes."""
+    kind = output.suffix.lower()[1:]
+    if kind not in ("png", "svg"):
+        raise BadInput(f"{output}: pictures are written as PNG or SVG; let the name end in .png or .svg")
+    with holding_back_ctrl_c():
+        from sva_bench.inputs import about, load
+
+    set_up_logging(verbose)
+    loaded = load(world)
+    with holding_back_ctrl_c():
+        from sva_bench.pictures import picture_of
+
+    with about(world), progress_bars() as progress:
+        content = picture_of(loaded, "svg" if kind == "svg" else "png", roadmap=roadmap, paths=paths, plan=plan,
+                             progress=progress)
+    write_result(output, content)
 
 
 @world_app.command("schema")

@@ -31,18 +31,22 @@ def print_json(data: Any) -> None:
     sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
-def write_result(path: Path | None, text: str) -> None:
+def write_result(path: Path | None, content: str | bytes) -> None:
     """Write a result to a file, whole or not at all, or to standard output; pipes and devices are written through."""
+    data = content.encode("utf-8") if isinstance(content, str) else content
     if path is None:
-        sys.stdout.write(text)
+        if isinstance(content, str):
+            sys.stdout.write(content)
+        else:
+            sys.stdout.buffer.write(content)
         return
     target = path.resolve()  # a link stays one
     draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         if target.exists() and not target.is_file():
-            path.write_text(text, encoding="utf-8")
+            path.write_bytes(data)
         else:
-            draft.write_text(text, encoding="utf-8")
+            draft.write_bytes(data)
             draft.replace(target)
     except OSError as error:
         draft.unlink(missing_ok=True)

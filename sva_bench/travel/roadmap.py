@@ -18,7 +18,7 @@ from ompl import geometric as og
 from ompl import util as ou
 from scipy.ndimage import label
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.stats import qmc
 
 from sva_bench.arrays import BoolArray, FloatArray
@@ -141,22 +141,8 @@ def _prmstar(
 ) -> list[list[FloatArray | None]]:
     if len(points) < 2:
         return [[None] for _ in points]
-    si, _ = _space(obstacles, clearance_m)
-    samples = roadmap_samples(obstacles, clearance_m, milestones)
-    si.setValidStateSamplerAllocator(lambda inner: _SampleQueue(inner, samples))
-    problem = ob.ProblemDefinition(si)
-    # Each site once: of two vertices in one place, chance decides which gets an edge.
-    for point in points[1:]:
-        problem.addStartState(_state(si, point))
-    problem.setGoalState(_state(si, points[0]))
-    planner = og.PRMstar(si)
-    planner.setProblemDefinition(problem)
-    planner.setup()
-    planner.solve(ob.plannerAlwaysTerminatingCondition())  # inserts the sites; a Python condition would deadlock here
-    total = len(points) + len(samples)
-    planner.growRoadmapPtc(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= total))
-    vertices, graph = _read_roadmap(si, planner)
-    at = [int(np.argmin(np.hypot(*(vertices - point).T))) for point in points]
+    si, vertices, graph = _grown(obstacles, points, clearance_m, milestones)
+    at = _nearest(vertices, points)
     lengths, before = dijkstra(graph, directed=False, indices=at, return_predecessors=True)
     n = len(points)
     paths: list[list[FloatArray | None]] = [[None] * n for _ in range(n)]
@@ -172,6 +158,45 @@ def _prmstar(
             path[0], path[-1] = points[i], points[j]
             paths[i][j], paths[j][i] = path, path[::-1].copy()
     return paths
+
+
+def roadmap_edges(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> FloatArray:
+    """The edges of the roadmap that ``plan_paths`` plans on, for looking at: both ends of each [m], shape (e, 2, 2)."""
+    if len(points) < 2:
+        return np.empty((0, 2, 2))
+    for milestones in _MILESTONES:
+        _, vertices, graph = _grown(obstacles, points, clearance_m, milestones)
+        _, part = connected_components(graph, directed=False)
+        if len(set(part[_nearest(vertices, points)].tolist())) == 1:
+            break
+    one, other = graph.nonzero()
+    ends: FloatArray = np.stack([vertices[one], vertices[other]], axis=1)
+    return ends[one < other]
+
+
+def _nearest(vertices: FloatArray, points: FloatArray) -> list[int]:
+    return [int(np.argmin(np.hypot(*(vertices - point).T))) for point in points]
+
+
+def _grown(
+    obstacles: Obstacles, points: FloatArray, clearance_m: float, milestones: int
+) -> tuple[Any, FloatArray, csr_array]:
+    """OMPL's space, and the vertices and edges of a roadmap of so many milestones."""
+    si, _ = _space(obstacles, clearance_m)
+    samples = roadmap_samples(obstacles, clearance_m, milestones)
+    si.setValidStateSamplerAllocator(lambda inner: _SampleQueue(inner, samples))
+    problem = ob.ProblemDefinition(si)
+    # Each site once: of two vertices in one place, chance decides which gets an edge.
+    for point in points[1:]:
+        problem.addStartState(_state(si, point))
+    problem.setGoalState(_state(si, points[0]))
+    planner = og.PRMstar(si)
+    planner.setProblemDefinition(problem)
+    planner.setup()
+    planner.solve(ob.plannerAlwaysTerminatingCondition())  # inserts the sites; a Python condition would deadlock here
+    total = len(points) + len(samples)
+    planner.growRoadmapPtc(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= total))
+    return si, *_read_roadmap(si, planner)
 
 
 def _read_roadmap(si: Any, planner: Any) -> tuple[FloatArray, csr_array]:

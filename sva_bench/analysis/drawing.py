@@ -1,0 +1,305 @@
+"""Worlds as pictures, to scale, for print and for colour-blind readers. The only importer of matplotlib.
+
+Colours are those of Okabe and Ito, and nothing is told apart by colour alone: kinds of sites differ in shape, robots in
+the style of their line. Same world, same picture, byte by byte.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch, Rectangle
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
+from matplotlib.ticker import MultipleLocator
+
+from sva_bench.analysis.labels import place_labels
+from sva_bench.arrays import FloatArray
+from sva_bench.world.model import SiteKind, World
+
+Kind = Literal["png", "svg"]
+
+OBSTACLE_RGB = (150, 150, 150)
+"""Colour of obstacles and outer walls; what is free stays white."""
+DPI = 200
+"""Resolution of pictures in pixels."""
+
+_GREY = "#969696"
+_MARKERS: dict[SiteKind, tuple[str, str, float]] = {  # shape, colour, size [pt]
+    "base": ("s", "#000000", 10.0), "station": ("^", "#0072B2", 9.5), "poi": ("o", "#E69F00", 7.5)}
+_KINDS: dict[SiteKind, str] = {"base": "base", "station": "refuelling station", "poi": "point of interest"}
+_ROUTES: tuple[tuple[str, Any, float], ...] = (  # colour, style, width [pt]; later ones lie on top, so thinner
+    ("#D55E00", "-", 2.6), ("#009E73", (0, (5, 2)), 2.0), ("#CC79A7", (0, (1.2, 1.5)), 2.0),
+    ("#56B4E9", (0, (6, 1.5, 1.2, 1.5)), 1.8), ("#000000", (0, (3, 4)), 1.4))
+_HALO = withStroke(linewidth=2.2, foreground="white")
+_SETTINGS: dict[Any, Any] = {
+    "svg.hashsalt": "sva-bench", "svg.fonttype": "path", "font.family": "DejaVu Sans", "font.size": 8.0,
+    "axes.linewidth": 0.6, "path.simplify": False}
+_PER_LINE = 4  # incentives on a line of a label
+_MOST_MINDED = 300  # paths that labels try to leave free; more leave no room anyway
+_MANY = 2000  # boxes, or edges, from which on an SVG holds them as an image
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Leg:
+    """A leg of a route: where it ends, and the path there [m], shape (k, 2)."""
+
+    destination: str
+    path: FloatArray
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Overlays:
+    """What is shown beside map and sites.
+
+    Attributes:
+        roadmap: Both ends of each edge [m], shape (e, 2, 2).
+        paths: Paths between sites [m], each of shape (k, 2).
+        routes: Legs of each robot's route.
+    """
+
+    roadmap: FloatArray | None = None
+    paths: Sequence[FloatArray] = ()
+    routes: Mapping[str, Sequence[Leg]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """Where the map lies in the picture, all in inches but for metres.
+
+    Attributes:
+        width_in, height_in: Size of the picture.
+        left_in, bottom_in: Lower left corner of the map.
+        in_per_m: Scale.
+        x0_m, y0_m, x1_m, y1_m: What the map shows: the bounds and the wall about them.
+    """
+
+    width_in: float
+    height_in: float
+    left_in: float
+    bottom_in: float
+    in_per_m: float
+    x0_m: float
+    y0_m: float
+    x1_m: float
+    y1_m: float
+
+    def pixel(self, x_m: float, y_m: float) -> tuple[int, int]:
+        """Row and column of a place in a PNG."""
+        column = (self.left_in + (x_m - self.x0_m) * self.in_per_m) * DPI
+        row = (self.height_in - self.bottom_in - (y_m - self.y0_m) * self.in_per_m) * DPI
+        return math.floor(row), math.floor(column)
+
+
+def frame_of(world: World) -> Frame:
+    """The frame of a world's picture: larger where there are many sites."""
+    x0, y0, x1, y1 = world.obstacles.bounds_m.tolist()
+    longest = max(x1 - x0, y1 - y0)
+    wall = 0.012 * longest
+    in_per_m = min(max(1.55 * math.sqrt(len(world.sites)), 6.0), 16.0) / longest
+    width, height = ((high - low + 2 * wall) * in_per_m for low, high in ((x0, x1), (y0, y1)))
+    return Frame(width_in=round(width + 3.0, 2), height_in=round(max(height + 1.05, 4.0), 2), left_in=0.6,
+                 bottom_in=round(max(height + 1.05, 4.0), 2) - 0.45 - height, in_per_m=in_per_m, x0_m=x0 - wall,
+                 y0_m=y0 - wall, x1_m=x1 + wall, y1_m=y1 + wall)
+
+
+def draw_world(world: World, kind: Kind, overlays: Overlays) -> bytes:
+    """A picture of a world, as the content of its file."""
+    with mpl.rc_context():
+        mpl.rcdefaults()  # whatever a user has set up
+        mpl.rcParams.update(_SETTINGS)
+        frame = frame_of(world)
+        figure = Figure(figsize=(frame.width_in, frame.height_in), dpi=DPI, facecolor="white")
+        FigureCanvasAgg(figure)
+        axes = _map(figure, frame, world)
+        _planned(axes, overlays)
+        _routes(axes, overlays)
+        _sites(figure, axes, world, overlays)
+        _legend(figure, frame, world, overlays)
+        stream = io.BytesIO()
+        # A date or a version in the file would make equal pictures differ.
+        figure.savefig(stream, format=kind, dpi=DPI, metadata={
+            "Date": None, "Creator": None} if kind == "svg" else {"Software": None})
+    return stream.getvalue()
+
+
+def _map(figure: Figure, frame: Frame, world: World) -> Axes:
+    """Bounds, obstacles and scales in metres."""
+    axes = figure.add_axes((
+        frame.left_in / frame.width_in, frame.bottom_in / frame.height_in,
+        (frame.x1_m - frame.x0_m) * frame.in_per_m / frame.width_in,
+        (frame.y1_m - frame.y0_m) * frame.in_per_m / frame.height_in))
+    axes.set_xlim(frame.x0_m, frame.x1_m)
+    axes.set_ylim(frame.y0_m, frame.y1_m)
+    axes.spines[:].set_visible(False)
+    step = _tick_step(max(frame.x1_m - frame.x0_m, frame.y1_m - frame.y0_m))
+    axes.xaxis.set_major_locator(MultipleLocator(step))
+    axes.yaxis.set_major_locator(MultipleLocator(step))
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    figure.text(frame.left_in / frame.width_in, 1 - 0.15 / frame.height_in, world.name, fontsize=12, weight="bold",
+                va="top")
+    x0, y0, x1, y1 = world.obstacles.bounds_m.tolist()
+    axes.add_patch(Rectangle((frame.x0_m, frame.y0_m), frame.x1_m - frame.x0_m, frame.y1_m - frame.y0_m,
+                             facecolor=_GREY, edgecolor="none", zorder=0))
+    axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="white", edgecolor="none", zorder=0))
+    if len(world.obstacles.boxes):
+        # The hairline keeps boxes that touch from showing a seam.
+        axes.add_collection(PolyCollection(
+            list(_corners(world.obstacles.boxes)), facecolors=_GREY, edgecolors=_GREY, linewidths=0.2, zorder=1,
+            rasterized=len(world.obstacles.boxes) > _MANY), autolim=False)
+    for x, y, radius in world.obstacles.cylinders.tolist():
+        axes.add_patch(Circle((x, y), radius, facecolor=_GREY, edgecolor="none", zorder=1))
+    return axes
+
+
+def _tick_step(length_m: float) -> float:
+    """The least of 1, 2, 5, 10, ... m that makes twelve ticks at most."""
+    steps = (step * 10.0**power for power in range(-3, 6) for step in (1, 2, 5))
+    return next(step for step in steps if length_m <= 12 * step)
+
+
+def _corners(boxes: FloatArray) -> FloatArray:
+    """Corners of boxes, shape (k, 4, 2)."""
+    cosine, sine = np.cos(boxes[:, 4])[:, None], np.sin(boxes[:, 4])[:, None]
+    along, across = boxes[:, 2, None] * np.array([1, -1, -1, 1]), boxes[:, 3, None] * np.array([1, 1, -1, -1])
+    return np.stack([boxes[:, 0, None] + cosine * along - sine * across,
+                     boxes[:, 1, None] + sine * along + cosine * across], axis=-1)
+
+
+def _planned(axes: Axes, overlays: Overlays) -> None:
+    if overlays.roadmap is not None:
+        axes.add_collection(LineCollection(list(overlays.roadmap), colors="#56B4E9", linewidths=0.1, zorder=2,
+                                           rasterized=len(overlays.roadmap) > _MANY), autolim=False)
+    axes.add_collection(LineCollection(list(overlays.paths), colors="#0072B2", linewidths=0.6, zorder=3),
+                        autolim=False)
+
+
+def _routes(axes: Axes, overlays: Overlays) -> None:
+    for number, legs in enumerate(overlays.routes.values()):
+        colour, style, width = _ROUTES[number % len(_ROUTES)]
+        for leg in legs:
+            axes.plot(*leg.path.T, color=colour, linestyle=style, linewidth=width, zorder=4 + 0.01 * number,
+                      dash_capstyle="butt", solid_capstyle="round")
+            _arrow(axes, leg.path, colour)
+
+
+def _arrow(axes: Axes, path: FloatArray, colour: str) -> None:
+    """A head in the middle of a path."""
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    middle = int(np.clip(np.searchsorted(arc, arc[-1] / 2), 1, len(path) - 1))
+    (ax, ay), (bx, by) = path[middle - 1], path[middle]
+    share = (arc[-1] / 2 - arc[middle - 1]) / max(steps[middle - 1], 1e-9)
+    angle = math.degrees(math.atan2(by - ay, bx - ax))
+    axes.plot(ax + share * (bx - ax), ay + share * (by - ay), marker=(3, 0, angle - 90), markersize=9, color=colour,
+              markeredgecolor="white", markeredgewidth=0.7, zorder=5)
+
+
+def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None:
+    """Markers and labels of all sites."""
+    labels: list[tuple[Text, ...]] = []
+    for site in world.sites:
+        marker, colour, size = _MARKERS[site.kind]
+        axes.plot(site.x_m, site.y_m, marker=marker, markersize=size, color=colour, markeredgecolor="black",
+                  markeredgewidth=0.8, zorder=7)
+        earned = _earned(world, site.name) if site.kind == "poi" else []
+        labels.append((Text(text=site.name, fontsize=8, weight="bold"),
+                       *(Text(text=line, fontsize=7) for line in earned)))
+    for label in labels:
+        for line in label:
+            line.set(zorder=8, path_effects=[_HALO], ha="center", va="center")
+            axes.add_artist(line)
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    boxes = [[line.get_window_extent(renderer) for line in lines] for lines in labels]
+    to_pixels = axes.transData.transform
+    at = to_pixels(np.array([(site.x_m, site.y_m) for site in world.sites]))
+    drawn = [_every(to_pixels(leg.path)) for legs in overlays.routes.values() for leg in legs]
+    if len(overlays.paths) <= _MOST_MINDED:
+        drawn += [_every(to_pixels(path), 16.0) for path in overlays.paths]
+    x0, y0, x1, y1 = world.obstacles.bounds_m.tolist()
+    centres = place_labels(
+        at, np.array([[max(box.width for box in group), sum(box.height for box in group)] for group in boxes]),
+        radii=np.array([_MARKERS[site.kind][2] for site in world.sites]) * DPI / 72 / 2,
+        frame=np.concatenate([to_pixels((x0, y0)), to_pixels((x1, y1))]),
+        lines=np.concatenate(drawn) if drawn else np.empty((0, 2)), solid=to_pixels(_within(world)))
+    back = axes.transData.inverted().transform
+    for (x, y), lines, group in zip(centres, labels, boxes, strict=True):
+        top = y + sum(box.height for box in group) / 2
+        for line, box in zip(lines, group, strict=True):
+            line.set_position(tuple(back((x, top - box.height / 2)).tolist()))
+            top -= box.height
+
+
+def _earned(world: World, poi: str) -> list[str]:
+    """What each robot earns at a POI, in a few lines."""
+    values = [f"{value:g}" if (value := robot.incentives.get(poi, 0.0)) else "–" for robot in world.robots]
+    return [" | ".join(values[k:k + _PER_LINE]) for k in range(0, len(values), _PER_LINE)]
+
+
+def _within(world: World) -> FloatArray:
+    """Points in obstacles, about 0.2 m apart: where a label is harder to read."""
+    points = []
+    for x, y, hx, hy, yaw in world.obstacles.boxes[:_MANY].tolist():
+        a, b = (np.linspace(-h, h, min(int(2 * h / 0.2) + 2, 60)) for h in (hx, hy))
+        grid = np.stack(np.meshgrid(a, b), axis=-1).reshape(-1, 2)
+        points.append(grid @ np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]) + (x, y))
+    for x, y, radius in world.obstacles.cylinders.tolist():
+        angles = np.linspace(0, 2 * math.pi, 12)
+        points.append(np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles)], axis=-1))
+    return np.concatenate(points) if points else np.empty((0, 2))
+
+
+def _every(path: FloatArray, step: float = 8.0) -> FloatArray:
+    """Points along a path, so many pixels apart."""
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    at = np.arange(0, arc[-1] + step, step)
+    return np.column_stack([np.interp(at, arc, path[:, 0]), np.interp(at, arc, path[:, 1])])
+
+
+def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> None:
+    """What is what, to the right of the map."""
+    handles: list[Any] = []
+    kinds = {site.kind for site in world.sites}
+    for kind, (marker, colour, size) in _MARKERS.items():
+        if kind in kinds:
+            handles.append(Line2D([], [], linestyle="none", marker=marker, color=colour, markersize=size,
+                                  markeredgecolor="black", markeredgewidth=0.8, label=_KINDS[kind]))
+    handles.append(Patch(facecolor=_GREY, label="obstacle"))
+    if overlays.roadmap is not None:
+        handles.append(Line2D([], [], color="#56B4E9", linewidth=0.8, label="roadmap"))
+    if overlays.paths:
+        handles.append(Line2D([], [], color="#0072B2", linewidth=0.8, label="path between two sites"))
+    for number, (robot, legs) in enumerate(overlays.routes.items()):
+        colour, style, width = _ROUTES[number % len(_ROUTES)]
+        stops = ", ".join(leg.destination for leg in legs) or "stays home"
+        handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=width,
+                              label=textwrap.fill(f"{robot}: {stops}", 30)))
+    left = frame.left_in + (frame.x1_m - frame.x0_m) * frame.in_per_m + 0.15
+    top = frame.bottom_in + (frame.y1_m - frame.y0_m) * frame.in_per_m
+    legend = figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(
+        left / frame.width_in, top / frame.height_in), frameon=False, borderpad=0, borderaxespad=0, handlelength=2.6,
+        labelspacing=0.9, alignment="left")
+    box = legend.get_window_extent(figure.canvas.get_renderer())  # type: ignore[attr-defined]
+    names = " | ".join(robot.name for robot in world.robots)
+    robots = [f"{robot.name}: {_limits(robot.fuel_capacity_s, robot.mission_limit_s)}" for robot in world.robots]
+    said = ["Incentives below a point of interest:", *textwrap.wrap(names, 36), "", *robots]
+    figure.text(left / frame.width_in, box.y0 / DPI / frame.height_in - 0.18 / frame.height_in, "\n".join(said),
+                va="top", fontsize=8, linespacing=1.45)
+
+
+def _limits(fuel_s: float, mission_s: float) -> str:
+    fuel = f"{fuel_s:g} s of fuel" if math.isfinite(fuel_s) else "fuel without end"
+    return f"{fuel}, home in {mission_s:g} s" if math.isfinite(mission_s) else f"{fuel}, no time limit"

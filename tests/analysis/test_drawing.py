@@ -1,0 +1,126 @@
+"""Pictures of worlds: to scale, the same each time, and in agreement with what the planner takes as free."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from sva_bench.__main__ import run_command_line
+from sva_bench.analysis.drawing import _ROUTES, OBSTACLE_RGB, Kind, Leg, Overlays, draw_world, frame_of
+from sva_bench.analysis.labels import place_labels
+from sva_bench.arrays import FloatArray
+from sva_bench.world.generate import Family, random_places, random_terrain
+from sva_bench.world.model import World
+from tests.oracles.distances import points_clearance
+from tests.worlds_for_tests import SMALL, world_of
+
+ROUTE = Leg(destination="p1", path=np.array([[0.8, 0.8], [2.2, 0.8]]))
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> World:
+    return world_of(tmp_path)
+
+
+def pixels(world: World, overlays: Overlays) -> FloatArray:
+    """The picture as red, green and blue from 0 to 255, shape (rows, columns, 3)."""
+    image: FloatArray = np.rint(imread(io.BytesIO(draw_world(world, "png", overlays)), format="png")[..., :3] * 255)
+    return image
+
+
+@pytest.mark.parametrize("family", ["small", "field", "aisles"])
+def test_what_is_drawn_as_an_obstacle_is_one_and_what_is_white_is_free(family: str, small: World) -> None:
+    world = small
+    if family in ("field", "aisles"):
+        kind: Family = "field" if family == "field" else "aisles"
+        obstacles = random_terrain(kind, size_m=10, density=0.12, seed=2).obstacles
+        x, y = random_places(obstacles, stations=0, pois=0, seed=2).base
+        world = replace(small, obstacles=obstacles, sites=(replace(small.sites[0], x_m=x, y_m=y),))
+    frame, image = frame_of(world), pixels(world, Overlays())
+    # From a little outside the bounds, where the outer wall is.
+    places = np.random.default_rng(0).uniform(frame.x0_m, frame.x1_m, (4000, 2))
+    gap = points_clearance(world.obstacles, places)
+    pixel_m = 1 / (frame.in_per_m * 200)
+    colours = np.array([image[frame.pixel(x, y)] for x, y in places])
+    solid, white = (colours == OBSTACLE_RGB).all(axis=1), (colours == 255).all(axis=1)
+    assert (solid | white).mean() > 0.9  # the rest is markers, labels and edges
+    assert solid.sum() > 100
+    # Edges are blurred over a pixel, and boxes have a hairline: two pixels either way are left open.
+    assert (gap[solid] < 2 * pixel_m).all()
+    smaller = replace(
+        world.obstacles, bounds_m=world.obstacles.bounds_m + np.array([-2, -2, 2, 2]) * pixel_m,
+        boxes=world.obstacles.boxes - np.array([0, 0, 2, 2, 0]) * pixel_m,
+        cylinders=world.obstacles.cylinders - np.array([0, 0, 2]) * pixel_m)
+    assert (points_clearance(smaller, places[white]) > 0).all()
+
+
+def test_the_same_world_gives_the_same_bytes_whatever_the_user_has_set_up(small: World) -> None:
+    overlays = Overlays(roadmap=np.array([[[0.5, 0.5], [1.0, 3.0]]]), paths=(ROUTE.path,), routes={"uv1": [ROUTE]})
+    kinds: tuple[Kind, ...] = ("png", "svg")
+    for kind in kinds:
+        first = draw_world(small, kind, overlays)
+        with mpl.rc_context({"font.size": 20.0, "svg.hashsalt": None, "axes.facecolor": "red"}):
+            assert draw_world(small, kind, overlays) == first
+        assert b"dc:date" not in first
+
+
+def test_roadmap_paths_and_routes_are_where_they_are_planned(small: World) -> None:
+    frame, plain = frame_of(small), pixels(small, Overlays())
+    at = frame.pixel(1.2, 0.8)  # a place on the route, away from its arrow and ends
+    assert (plain[at] == 255).all()
+    for overlays in (Overlays(routes={"uv1": [ROUTE]}), Overlays(paths=(ROUTE.path,)),
+                     Overlays(roadmap=np.array([ROUTE.path]))):
+        changed = (pixels(small, overlays) != plain).any(axis=2)
+        row, column = at
+        assert changed[row - 2:row + 3, column].any()
+        assert not changed[frame.pixel(1.2, 3.0)]
+
+
+def test_robots_are_told_apart_without_colour() -> None:
+    styles = [(str(style), width) for _, style, width in _ROUTES]
+    assert len(set(styles)) == len(styles)
+
+
+def test_labels_keep_off_markers_lines_and_each_other() -> None:
+    # Two markers 30 apart with labels 60 wide: side by side they would collide.
+    at, sizes = np.array([[100.0, 100.0], [130.0, 100.0]]), np.array([[60.0, 20.0], [60.0, 20.0]])
+    line = np.column_stack([np.linspace(0, 100, 50), np.full(50, 100.0)])  # comes from the left
+    centres = place_labels(at, sizes, radii=np.array([5.0, 5.0]), frame=np.array([0.0, 0.0, 200.0, 200.0]), lines=line,
+                           solid=np.empty((0, 2)))
+    low, high = centres - sizes / 2, centres + sizes / 2
+    assert (low[0] >= high[1]).any() or (low[1] >= high[0]).any()
+    for marker in at:
+        assert ((marker + 5 <= low) | (marker - 5 >= high)).any(axis=1).all()
+    assert not any(((point > a) & (point < b)).all() for point in line for a, b in zip(low, high, strict=True))
+
+
+def test_labels_stay_inside_the_frame_in_a_corner() -> None:
+    nothing = np.empty((0, 2))
+    centres = place_labels(np.array([[6.0, 6.0]]), np.array([[40.0, 20.0]]), radii=np.array([5.0]), lines=nothing,
+                           frame=np.array([0.0, 0.0, 200.0, 200.0]), solid=nothing)
+    assert (centres - [20, 10] >= 0).all()
+
+
+def test_the_command_draws_a_plan_and_leaves_nothing_half_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    world, plan, picture = tmp_path / "w.yaml", tmp_path / "p.json", tmp_path / "w.svg"
+    world.write_text(SMALL)
+    plan.write_text(json.dumps({"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "r1", "base"]}}))
+    arguments = ["world", "draw", str(world), "-o", str(picture), "--plan", str(plan), "--roadmap", "--paths"]
+    assert run_command_line(arguments) == 0
+    assert picture.read_bytes().startswith(b"<?xml")
+    picture.unlink()
+    plan.write_text(json.dumps({"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p9", "base"]}}))
+    assert run_command_line(arguments) == 2
+    assert "there is no site 'p9'" in " ".join(capsys.readouterr().err.split())
+    assert run_command_line(["world", "draw", str(world), "-o", str(tmp_path / "w.jpg")]) == 2
+    assert "let the name end in .png or .svg" in " ".join(capsys.readouterr().err.split())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["p.json", "w.yaml"]
