@@ -88,8 +88,9 @@ def run_batch(
 
 def settings_of(worlds: Sequence[World], seeds: Sequence[int], options: Options) -> dict[str, Any]:
     """Everything that the rows of a batch depend on."""
+    files = {world.name: world.map_source.digests() for world in worlds if world.map_source is not None}
     return {"version": __version__, "worlds": {world.name: world_as_dict(world) for world in worlds},
-            "seeds": list(seeds), "options": options.as_dict()}
+            **({"files": files} if files else {}), "seeds": list(seeds), "options": options.as_dict()}
 
 
 def batch_name(settings: Mapping[str, Any]) -> str:

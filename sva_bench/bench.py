@@ -28,6 +28,7 @@ from sva_bench.runs import (
     run_name,
     write_json,
     write_legs,
+    write_map,
     write_outcomes,
     write_travel_times,
 )
@@ -250,10 +251,12 @@ def _publish(
     """Write the run folder; ``identity`` is what results depend on beside world, options and seed."""
     resolved = world_as_dict(world)
     name = run_name(world.name, options.seed,
-                    {"world": resolved, "options": options.as_dict(), **(identity or {})})
+                    {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
+        if world.map_source is not None:
+            write_map(folder, world.map_source)
         write_travel_times(folder / "travel_times.parquet", list(costs.values()))
         for scenario, instance in instances.items():
             write_instance(folder / f"instance-{scenario}.json", instance)
@@ -270,6 +273,11 @@ def _publish(
         write_json(folder / "manifest.json", manifest(
             resolved, options.seed, options.as_dict(), clock.started, clock.seconds))
     return Run(folder=out / name, summary=summary)
+
+
+def _digests(world: World) -> dict[str, Any]:
+    """Digests of the files that a world names, by name; nothing if it names none."""
+    return {} if world.map_source is None else {"files": world.map_source.digests()}
 
 
 def plan_costs(world: World, planner: PlannerName, progress: Progress) -> dict[str, FuelCosts]:

@@ -24,7 +24,7 @@ from sva_bench.errors import BadFile, BadInput
 from sva_bench.execution.execute import Executed
 from sva_bench.execution.outcome import ENDS
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import World
+from sva_bench.world.model import MapSource, World
 
 _PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
 
@@ -83,6 +83,14 @@ def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], st
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
     """Write a JSON file that a person can read."""
     path.write_text(pretty_json(dict(data)), encoding="utf-8")
+
+
+def write_map(folder: Path, source: MapSource) -> None:
+    """Write the files that the world's map was read from, as ``map/`` and the names that the world has for them."""
+    for file in source.files:
+        path = folder / "map" / file.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(file.content)
 
 
 def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:

@@ -35,7 +35,7 @@ ONLY_IN = {
     "pybullet": "execution/simulator.py", "pybullet_data": "execution/simulator.py",
     "pybullet_utils": "execution/simulator.py", "ompl": "travel/roadmap.py", "highspy": "solver/highs.py",
     "rerun": "recording/rerun.py", "networkx": "solver/cuts.py", "ruamel": "documents.py",
-    "matplotlib": "analysis/drawing.py",
+    "matplotlib": "analysis/drawing.py", "PIL": "world/images.py",
 }
 MOST_LINES = 450
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -215,6 +215,7 @@ def _tasks(
     """The drives that some trial needs: a robot that fails at the base in all its trials drives none."""
     tasks: dict[Key, DriveTask] = {}
     base = world.sites[0]
+    solids = replace(world.obstacles, cells=None)  # a worker needs the boxes alone
     for own, failed in zip(orders, fails, strict=True):
         for number, (robot, order) in enumerate(zip(world.robots, own, strict=True)):
             legs = _legs(costs[robot.model.name], order.route)
@@ -223,7 +224,7 @@ def _tasks(
                 if key is None or key in tasks:
                     continue
                 tasks[key] = DriveTask(
-                    obstacles=world.obstacles, model=robot.model, start=(base.x_m, base.y_m, base.heading_rad),
+                    obstacles=solids, model=robot.model, start=(base.x_m, base.y_m, base.heading_rad),
                     legs=legs[: len(key[1]) - 1],
                     wheel_gains=wheel_gains(settings.seed, key[2], number, world.noise),
                     fidelity=settings.fidelity, traced=trial == 0 or (key[2] == 0 and settings.fidelity != "physics"))

@@ -10,23 +10,28 @@ from typing import Any
 import numpy as np
 
 from sva_bench.documents import Document, read_yaml, validate
-from sva_bench.errors import nearest
+from sva_bench.errors import BadFile, nearest
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
+from sva_bench.world.cells import bounds_of, boxes_of
 from sva_bench.world.clearance import clearance, open_heading
-from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, Site, SiteKind, World
+from sva_bench.world.maps import read_movingai_map, read_ros_map
+from sva_bench.world.model import MapSource, Noise, Obstacles, Robot, Scenario, Site, SiteKind, World
 from sva_bench.world.schema import (
     KIND,
     Box,
     Cylinder,
     Drawn,
     Joint,
+    Map,
     RobotEntry,
     Shapes,
     SiteEntry,
     WorldFile,
 )
+
+MAX_BOXES = 50_000  # for a compound body
 
 
 def load_world(path: Path) -> World:
@@ -45,7 +50,7 @@ def world_of(document: Document) -> World:
         BadFile: As ``load_world``.
     """
     file = validate(document, WorldFile, KIND)
-    obstacles = obstacles_of(file.map.shapes)
+    obstacles, source = _map(document, file.map)
     robots = tuple(_robot(document, name, entry, list(file.sites.pois)) for name, entry in file.robots.items())
     widest = max(robot.model.radius_m for robot in robots)
     sites = _sites(document, file, obstacles, widest)
@@ -54,8 +59,33 @@ def world_of(document: Document) -> World:
     return World(
         name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=_scenarios(document, file),
         plan_failure=plan, execute_failure=execute, margin=file.margin,
-        noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd),
+        noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd), map_source=source,
     )
+
+
+def _map(document: Document, section: Map) -> tuple[Obstacles, MapSource | None]:
+    if section.shapes is not None:
+        return obstacles_of(section.shapes), None
+    root, kind = document.path.parent, "movingai" if section.ros is None else "ros"
+    entry: dict[str, str | float]
+    try:
+        if section.ros is not None:
+            entry = {"file": section.ros.file, "unknown": section.ros.unknown}
+            cells, files = read_ros_map(root, section.ros.file, section.ros.unknown)
+        else:
+            assert section.movingai is not None, "the schema lets nothing else in"
+            entry = {"file": section.movingai.file, "cell_m": section.movingai.cell_m}
+            cells, files = read_movingai_map(root, section.movingai.file, section.movingai.cell_m)
+    except BadFile as error:
+        if error.path == entry["file"]:  # said of a name, not of a file: the world's to mend
+            raise document.error(("map", kind, "file"), error.problem) from None
+        raise
+    boxes = boxes_of(cells)
+    if len(boxes) > MAX_BOXES:
+        raise document.error(("map", kind, "file"), f"its occupied cells take {len(boxes)} boxes to cover, and physics "
+                             f"holds {MAX_BOXES}; clean the map of speckles, or cut it")
+    obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes, cylinders=np.empty((0, 3)), cells=cells)
+    return obstacles, MapSource(section={kind: entry}, files=files)
 
 
 def obstacles_of(shapes: Shapes) -> Obstacles:
@@ -185,13 +215,18 @@ def world_as_dict(world: World) -> dict[str, Any]:
     def limit(seconds: float) -> float | None:
         return seconds if math.isfinite(seconds) else None
 
+    def map_section() -> dict[str, Any]:
+        if world.map_source is not None:
+            return {kind: dict(entry) for kind, entry in world.map_source.section.items()}
+        return {"shapes": {"bounds_m": o.bounds_m.tolist(), "obstacles": shapes}}
+
     o = world.obstacles
     shapes: list[dict[str, Any]] = [
         {"box": [b[0], b[1]], "size_m": [2 * b[2], 2 * b[3]], "yaw_deg": _degrees(b[4])} for b in o.boxes.tolist()]
     shapes += [{"cylinder": [c[0], c[1]], "radius_m": c[2]} for c in o.cylinders.tolist()]
     return {
         "format": KIND, "name": world.name,
-        "map": {"shapes": {"bounds_m": o.bounds_m.tolist(), "obstacles": shapes}},
+        "map": map_section(),
         "sites": {"base": entry(world.sites[0]), "stations": {s.name: entry(s) for s in world.stations},
                   "pois": {s.name: entry(s) for s in world.pois}},
         "robots": {r.name: {

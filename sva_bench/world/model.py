@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -11,6 +12,8 @@ import numpy as np
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.mission.failures import FailureProcess, JointState
 from sva_bench.robot.model import RobotModel
+from sva_bench.world.cells import Cells
+from sva_bench.world.maps import MapFile
 
 SiteKind = Literal["base", "station", "poi"]
 
@@ -23,11 +26,13 @@ class Obstacles:
         bounds_m: x_min, y_min, x_max, y_max; walls stand around them. Shape (4,).
         boxes: Centre x, y, half length, half width [m], yaw [rad]; shape (k, 5). Walls are boxes too.
         cylinders: Centre x, y, radius [m]; shape (c, 3).
+        cells: The occupancy grid that ``boxes`` cover, where there is one: what it holds, the boxes hold already.
     """
 
     bounds_m: FloatArray
     boxes: FloatArray
     cylinders: FloatArray
+    cells: Cells | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bounds_m", frozen(self.bounds_m, (4,)))
@@ -116,6 +121,23 @@ class Noise:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class MapSource:
+    """Where a world's occupancy grid comes from.
+
+    Attributes:
+        section: What stands under ``map:`` in the world file.
+        files: The files behind it, as they were read.
+    """
+
+    section: Mapping[str, Mapping[str, str | float]]
+    files: tuple[MapFile, ...]
+
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of each file, by name: what results depend on beside the world file."""
+        return {file.name: hashlib.sha256(file.content).hexdigest() for file in self.files}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class World:
     """A mission's world, resolved: every heading computed, every incentive drawn.
 
@@ -129,6 +151,7 @@ class World:
         execute_failure: Failure process that they are executed under.
         margin: Planning costs are twin times x (1 + margin).
         noise: Noise of the execution.
+        map_source: Files that the obstacles come from; ``None`` if they are shapes.
     """
 
     name: str
@@ -140,6 +163,7 @@ class World:
     execute_failure: FailureProcess
     margin: float
     noise: Noise
+    map_source: MapSource | None = None
 
     @property
     def stations(self) -> tuple[Site, ...]:

@@ -54,8 +54,42 @@ class Shapes(Section):
         return bounds
 
 
+FileName = Annotated[str, Field(min_length=1, max_length=1000)]
+
+
+class RosMap(Section):
+    """A map of map_server or Nav2: its YAML file."""
+
+    file: FileName
+    unknown: Literal["occupied", "free"] = "occupied"
+
+
+class MovingAiMap(Section):
+    """An octile map of the MovingAI benchmarks."""
+
+    file: FileName
+    cell_m: Annotated[Positive, Field(ge=1e-3, le=100)] = 1.0
+
+
 class Map(Section):
-    shapes: Shapes
+    """Exactly one of these."""
+
+    shapes: Shapes | None = None
+    ros: RosMap | None = None
+    movingai: MovingAiMap | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_of_one_kind(cls, data: object) -> object:
+        if isinstance(data, dict):
+            kinds = [kind for kind in ("shapes", "ros", "movingai") if kind in data]
+            if len(kinds) != 1 and not set(data) - {"shapes", "ros", "movingai"}:
+                found = " and ".join(kinds) or "none"
+                raise ValueError(f"expected exactly one of shapes, ros and movingai, found {found}")
+            for kind in kinds:
+                if data[kind] is None:
+                    raise ValueError(f"there is nothing below {kind!r}; say what the map is")
+        return data
 
 
 _EMPTY_IS_NONE = BeforeValidator(lambda value: {} if value is None else value)  # a heading with nothing below
@@ -144,10 +178,6 @@ class WorldFile(Section):
     @model_validator(mode="before")
     @classmethod
     def _say_what_is_not_there_yet(cls, data: object) -> object:
-        if isinstance(data, dict):
-            kinds = data.get("map")
-            if isinstance(kinds, dict) and {"ros", "movingai"} & set(kinds):
-                raise ValueError("this version reads only 'map: shapes', no occupancy grids")
-            if data.get("interaction") == "shared":
-                raise ValueError("this version knows only 'interaction: independent'")
+        if isinstance(data, dict) and data.get("interaction") == "shared":
+            raise ValueError("this version knows only 'interaction: independent'")
         return data
