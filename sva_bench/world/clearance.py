@@ -12,7 +12,7 @@ from sva_bench.world.model import Obstacles
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+def point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     dx, dy = bx - ax, by - ay
     squared = dx * dx + dy * dy
     t = 0.0 if squared == 0.0 else min(max(((px - ax) * dx + (py - ay) * dy) / squared, 0.0), 1.0)
@@ -20,7 +20,7 @@ def _point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: fl
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _point_box(px: float, py: float, hx: float, hy: float) -> float:
+def point_box(px: float, py: float, hx: float, hy: float) -> float:
     return math.hypot(max(abs(px) - hx, 0.0), max(abs(py) - hy, 0.0))
 
 
@@ -39,6 +39,34 @@ def _meets_box(ax: float, ay: float, bx: float, by: float, hx: float, hy: float)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
+def segment_box(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, hx: float, hy: float, c: float, s: float,
+    far: float,
+) -> float:
+    """Distance from a segment to a box [m]; ``inf`` if it is surely more than ``far``.
+
+    Args:
+        ax, ay, bx, by: Ends of the segment [m].
+        cx, cy, hx, hy, c, s: Centre, half length, half width [m], cosine and sine of the yaw.
+        far: Distance beyond which nobody asks.
+    """
+    # Circles about both say quickly that most boxes are far away.
+    mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay)
+    if math.hypot(mx - cx, my - cy) - half - math.hypot(hx, hy) > far:
+        return math.inf
+    px, py = c * (ax - cx) + s * (ay - cy), -s * (ax - cx) + c * (ay - cy)
+    qx, qy = c * (bx - cx) + s * (by - cy), -s * (bx - cx) + c * (by - cy)
+    if _meets_box(px, py, qx, qy, hx, hy):
+        return 0.0
+    gap = min(point_box(px, py, hx, hy), point_box(qx, qy, hx, hy))
+    if ax != bx or ay != by:
+        for sx in (-hx, hx):
+            for sy in (-hy, hy):
+                gap = min(gap, point_segment(sx, sy, px, py, qx, qy))
+    return float(gap)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def segment_distance(
     bounds: FloatArray, boxes: FloatArray, cylinders: FloatArray, ax: float, ay: float, bx: float, by: float,
     enough: float,
@@ -54,27 +82,13 @@ def segment_distance(
     for k in range(len(cylinders)):
         if nearest < enough:
             return float(nearest)
-        gap = _point_segment(cylinders[k, 0], cylinders[k, 1], ax, ay, bx, by) - cylinders[k, 2]
+        gap = point_segment(cylinders[k, 0], cylinders[k, 1], ax, ay, bx, by) - cylinders[k, 2]
         nearest = min(nearest, max(gap, 0.0))
-    mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay)
     for k in range(len(boxes)):
         if nearest < enough:
             return float(nearest)
-        hx, hy = boxes[k, 2], boxes[k, 3]
-        ox, oy = boxes[k, 0], boxes[k, 1]
-        # Circles about both say quickly that most boxes are far away.
-        if math.hypot(mx - ox, my - oy) - half - math.hypot(hx, hy) > max(nearest, 0.0):
-            continue
-        c, s = math.cos(boxes[k, 4]), math.sin(boxes[k, 4])
-        px, py = c * (ax - ox) + s * (ay - oy), -s * (ax - ox) + c * (ay - oy)
-        qx, qy = c * (bx - ox) + s * (by - oy), -s * (bx - ox) + c * (by - oy)
-        if _meets_box(px, py, qx, qy, hx, hy):
-            nearest = min(nearest, 0.0)
-            continue
-        gap = min(_point_box(px, py, hx, hy), _point_box(qx, qy, hx, hy))
-        for sx in (-hx, hx):
-            for sy in (-hy, hy):
-                gap = min(gap, _point_segment(sx, sy, px, py, qx, qy))
+        gap = segment_box(ax, ay, bx, by, boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3], math.cos(boxes[k, 4]),
+                          math.sin(boxes[k, 4]), max(nearest, 0.0))
         nearest = min(nearest, gap)
     return float(nearest)
 

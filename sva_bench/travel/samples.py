@@ -1,0 +1,159 @@
+"""Where the roadmap's milestones lie: round the corners that shortest paths bend about, and all over the free space."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from scipy.stats import qmc
+
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.world.cells import Cells, convex_corners
+from sva_bench.world.model import Obstacles
+from sva_bench.world.near import keeps_clearance
+
+_GRAZE_M = 1e-4  # boundary samples keep this far outside, so that edges along the boundary are free
+_MOST_ARC_POINTS = 8000  # all pairs of them are looked at for tangents
+
+
+def arc_points(obstacles: Obstacles, clearance_m: float, per_corner: int) -> FloatArray:
+    """Free points round the corners and circles that shortest paths bend about.
+
+    They are the vertices of polygons about the arcs: inscribed ones would leave the ring between their vertices, and
+    so be blocked.
+
+    Args:
+        obstacles: What stands in the way.
+        clearance_m: Distance to keep.
+        per_corner: Vertices on a quarter circle.
+
+    Returns:
+        x, y, the arc's centre x, y [m], and the sine of half the angle between vertices: within so much of a right
+        angle to the radius a line touches the arc; shape (k, 5), at most ``_MOST_ARC_POINTS``.
+    """
+    ring, half = clearance_m + _GRAZE_M, math.pi / (4 * per_corner)
+    angles = (np.arange(per_corner) + 0.5) / per_corner * (math.pi / 2)
+    quarter = np.column_stack([np.cos(angles), np.sin(angles)])
+    corners = _corners_of_boxes(obstacles) if obstacles.cells is None else _corners_of_cells(obstacles.cells)
+    centres = np.repeat(corners[:, :2], per_corner, axis=0)
+    # Each corner has the directions of its two sides.
+    aside = quarter @ corners[:, 2:].reshape(-1, 2, 2)
+    points = centres + ring / math.cos(half) * aside.reshape(-1, 2)
+    if len(obstacles.cylinders):
+        around = np.arange(4 * per_corner) * 2 * half
+        circle = np.column_stack([np.cos(around), np.sin(around)])
+        reach = (obstacles.cylinders[:, 2] + ring) / math.cos(half)
+        posts = obstacles.cylinders[:, None, :2] + reach[:, None, None] * circle
+        points = np.concatenate([points, posts.reshape(-1, 2)])
+        centres = np.concatenate([centres, np.repeat(obstacles.cylinders[:, :2], len(around), axis=0)])
+    arcs = np.column_stack([points, centres, np.full(len(points), math.sin(1.05 * half))])
+    arcs = arcs[keeps_clearance(obstacles, points, clearance_m)]
+    return arcs[_thinned(np.ascontiguousarray(arcs[:, :2]), _MOST_ARC_POINTS)]
+
+
+def roadmap_samples(obstacles: Obstacles, clearance_m: float, count: int, arcs: FloatArray) -> FloatArray:
+    """Free samples: half on the inflated obstacles' boundary, where shortest paths bend, half a Halton sequence.
+
+    Args:
+        obstacles: What stands in the way.
+        clearance_m: Distance to keep.
+        count: How many.
+        arcs: Points round corners, as ``arc_points`` gives them.
+
+    Returns:
+        Shape (about ``count``, 2); fewer where no more free ones are found.
+    """
+    boundary = np.ascontiguousarray(arcs[:, :2])
+    boundary = boundary[_thinned(boundary, count // 2)]
+    if obstacles.cells is None:
+        along = _along_edges(obstacles, clearance_m + _GRAZE_M, count // 2 - len(boundary))
+        boundary = np.concatenate([boundary, _free(obstacles, along, clearance_m)])
+    low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
+    halton = qmc.Halton(2, scramble=False)
+    spread = np.empty((0, 2))
+    wanted = count - len(boundary)
+    for _ in range(8):  # an eighth of the area free is the least that fills the count
+        spread = np.concatenate([spread, _free(obstacles, low + halton.random(count) * (high - low), clearance_m)])
+        if len(spread) >= wanted:
+            break
+    return np.concatenate([boundary, spread[:wanted]])
+
+
+def _corners_of_boxes(obstacles: Obstacles) -> FloatArray:
+    """Corner x, y and the outward directions of its two sides; shape (4 k, 6)."""
+    x, y, hx, hy, yaw = obstacles.boxes.T
+    ahead, left = np.column_stack([np.cos(yaw), np.sin(yaw)]), np.column_stack([-np.sin(yaw), np.cos(yaw)])
+    return np.concatenate([np.column_stack([
+        np.column_stack([x, y]) + sx * hx[:, None] * ahead + sy * hy[:, None] * left, sx * ahead, sy * left])
+        for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
+
+
+def _corners_of_cells(cells: Cells) -> FloatArray:
+    """The same of the corners of the occupied area that stick out."""
+    corners = convex_corners(cells)
+    yaw = float(cells.origin[2])
+    ahead, left = np.array([[math.cos(yaw), math.sin(yaw)]]), np.array([[-math.sin(yaw), math.cos(yaw)]])
+    return np.column_stack([cells.to_world(corners[:, :2]), corners[:, 2:3] * ahead, corners[:, 3:4] * left])
+
+
+def _along_edges(obstacles: Obstacles, ring: float, count: int) -> FloatArray:
+    """About ``count`` points along the edges of single boxes, at distance ``ring``."""
+    edges = []
+    for cx, cy, hx, hy, yaw in obstacles.boxes:
+        turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+        for axis, reach in ((0, hx), (1, hy)):
+            for side in (-1.0, 1.0):
+                ends = np.zeros((2, 2))
+                ends[:, axis] = (-reach, reach)
+                ends[:, 1 - axis] = side * ((hy, hx)[axis] + ring)
+                edges.append(ends @ turn.T + (cx, cy))
+    if not edges or count <= 0:
+        return np.empty((0, 2))
+    lengths = np.array([np.hypot(*(b - a)) for a, b in edges])
+    step = lengths.sum() / count
+    return np.concatenate([a + (np.arange(k) + 0.5)[:, None] / k * (b - a) for (a, b), k in zip(
+        edges, np.maximum(lengths / step, 1).astype(np.int64), strict=True)])
+
+
+def _thinned(points: FloatArray, count: int) -> IntArray:
+    """Indices of at most ``count`` points, none close to another while there are more."""
+    gap = 0.0
+    kept = np.arange(len(points))
+    while len(kept) > count:
+        gap = max(gap * 1.25, 0.01)
+        kept = _apart(points, gap)
+    return kept
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _apart(points: FloatArray, gap: float) -> IntArray:
+    """Indices of points of which no two are nearer than ``gap``: each that is far enough from those before it."""
+    low_x, low_y = points[:, 0].min(), points[:, 1].min()
+    columns = math.floor((points[:, 0].max() - low_x) / gap) + 1
+    rows = math.floor((points[:, 1].max() - low_y) / gap) + 1
+    newest = np.full(columns * rows, -1, dtype=np.int64)  # of each square of side ``gap``
+    before = np.full(len(points), -1, dtype=np.int64)  # the one that was kept there before it
+    kept = np.empty(len(points), dtype=np.int64)
+    count = 0
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        column, row = math.floor((x - low_x) / gap), math.floor((y - low_y) / gap)
+        far = True
+        for r in range(max(row - 1, 0), min(row + 2, rows)):
+            for c in range(max(column - 1, 0), min(column + 2, columns)):
+                other = newest[r * columns + c]
+                while other >= 0 and far:
+                    far = math.hypot(points[other, 0] - x, points[other, 1] - y) >= gap
+                    other = before[other]
+        if far:
+            before[k] = newest[row * columns + column]
+            newest[row * columns + column] = k
+            kept[count] = k
+            count += 1
+    return kept[:count]
+
+
+def _free(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> FloatArray:
+    free: FloatArray = points[keeps_clearance(obstacles, points, clearance_m)]
+    return free
