@@ -42,7 +42,9 @@ def about(path: Path) -> Iterator[None]:
         yield
     except UnreachableSite as error:
         document = read_yaml(path)
-        name = error.destination
+        # Where nothing at all is reached, it is the base that stands badly.
+        count = 1 + sum(len(document.data["sites"].get(kind) or {}) for kind in ("stations", "pois"))
+        name = "base" if len(error.destinations) == count - 1 > 1 else error.destinations[0]
         kind = next((kind for kind in ("stations", "pois") if name in (document.data["sites"].get(kind) or {})), None)
         raise document.error(("sites", "base") if kind is None else ("sites", kind, name), str(error)) from None
 

@@ -23,12 +23,17 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.travel.samples import arc_points, roadmap_samples
 from sva_bench.travel.tangents import tangents, taut
+from sva_bench.world.cells import distance_field
 from sva_bench.world.model import Obstacles
 from sva_bench.world.near import clearance_checker, keeps_clear, keeps_clearance
 
 PlannerName = Literal["prmstar", "rrtconnect"]
 
-_GROWTH = ((4000, 6), (16_000, 24))  # milestones, and points on a quarter circle: denser where sites are left apart
+_GROWTH = ((1000, 6), (4000, 12), (16_000, 24))
+"""Milestones, and points on a quarter circle: the roadmap grows until it connects all sites, or to the last of these.
+
+The tangents between arcs make paths short, the milestones make sure of odd places: more of them shorten no path.
+"""
 _CELL_M, _CELLS = 0.02, 200_000  # finest cell, and most cells, of the grid that says which sites no path joins
 _RRT_ITERATIONS = 20_000  # states that RRTConnect may try for one pair before the pair counts as unreachable
 _START_SLACK_M = 1e-9  # a start on the very boundary is free
@@ -118,19 +123,24 @@ class _SampleQueue(ob.ValidStateSampler):  # type: ignore[misc]
 def surely_apart(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> BoolArray:
     """Which points no path can join, however fine the roadmap, shape (n, n).
 
-    Each point of a path lies in a cell of a grid, whose centre is at most half a diagonal away from it. Cells whose
-    centre is nearer to an obstacle than the clearance less that are closed; a path runs through open ones, from
-    neighbour to neighbour. So points in different parts of the open cells are apart.
+    Each point of a path is near a place of a lattice, at most half a diagonal away. Places that are nearer to an
+    obstacle than the clearance less that are closed; a path runs by open ones, from neighbour to neighbour. So points
+    in different parts of the open places are apart.
     """
-    low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
-    cell = max(_CELL_M, math.sqrt(float(np.prod(high - low)) / _CELLS))
-    counts = np.ceil((high - low) / cell).astype(np.int64)
-    x, y = (low[axis] + (np.arange(counts[axis]) + 0.5) * cell for axis in (0, 1))
-    centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    needed = clearance_m - cell * math.sqrt(0.5) - 1e-6
-    open_cells = keeps_clearance(obstacles, centres, needed)
-    parts, _ = label(open_cells.reshape(tuple(counts)), structure=np.ones((3, 3)))
-    at = np.clip(((points - low) / cell).astype(np.int64), 0, counts - 1)
+    if obstacles.cells is not None:
+        field = distance_field(obstacles.cells)
+        open_places = field.distance_m >= clearance_m - obstacles.cells.cell_m / 2 * math.sqrt(0.5) - 1e-5
+        at = field.index_of(points)
+    else:
+        low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
+        cell = max(_CELL_M, math.sqrt(float(np.prod(high - low)) / _CELLS))
+        counts = np.ceil((high - low) / cell).astype(np.int64)
+        x, y = (low[axis] + (np.arange(counts[axis]) + 0.5) * cell for axis in (0, 1))
+        centres = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+        needed = clearance_m - cell * math.sqrt(0.5) - 1e-6
+        open_places = keeps_clearance(obstacles, centres, needed).reshape(tuple(counts))
+        at = np.clip(((points - low) / cell).astype(np.int64), 0, counts - 1)
+    parts, _ = label(open_places, structure=np.ones((3, 3)))
     mine = parts[at[:, 0], at[:, 1]]
     apart: BoolArray = mine[:, None] != mine[None, :]
     return apart

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from sva_bench.robot.twin import drive
 from sva_bench.travel.roadmap import PlannerName, plan_paths
 from sva_bench.world.clearance import clearance
 from sva_bench.world.model import World
+from sva_bench.world.passages import widest_passage
 
 _log = logging.getLogger(__name__)
 
@@ -25,17 +27,24 @@ CLEARANCE_MARGINS_M = (0.12, 0.06, 0.03)
 The follower cuts gentle corners by up to 0.05 m and tracks to 0.01 m: at 0.12 m no robot touches anything.
 """
 
+_NAMED = 10  # sites that a complaint names
+
 
 class UnreachableSite(SvaBenchError):
-    """No collision-free path joins two sites."""
+    """No collision-free path joins some sites to others."""
 
-    def __init__(self, origin: str, destination: str, radius_m: float) -> None:
-        super().__init__(origin, destination, radius_m)  # facts, not text: picklable
-        self.origin, self.destination, self.radius_m = origin, destination, radius_m
+    def __init__(self, origin: str, destinations: Sequence[str], radius_m: float, widest_m: float) -> None:
+        super().__init__(origin, destinations, radius_m, widest_m)  # facts, not text: picklable
+        self.origin, self.destinations = origin, tuple(destinations)
+        self.radius_m, self.widest_m = radius_m, widest_m
 
     def __str__(self) -> str:
-        return (f"no path from {self.origin!r} to {self.destination!r} for a robot of radius {self.radius_m} m: "
-                f"move one of them, or widen the passage between them in the world file")
+        names = ", ".join(map(repr, self.destinations[:_NAMED]))
+        more = f" and {len(self.destinations) - _NAMED} more" if len(self.destinations) > _NAMED else ""
+        fits = (f"the largest robot that gets there has a radius of {self.widest_m:.3f} m" if self.widest_m > 0
+                else "no robot fits through, however small")
+        return (f"no path from {self.origin!r} to {names}{more} for a robot of radius {self.radius_m} m; {fits}: "
+                f"move {'it' if len(self.destinations) == 1 else 'them'}, or widen the passages between them")
 
 
 class NeverArrives(SvaBenchError):
@@ -117,18 +126,25 @@ def plan_travel_times(world: World, model: RobotModel, planner: PlannerName = "p
                 headings_rad=tuple(site.heading_rad for site in world.sites),
                 time_ms=_times_ms(world, model, paths), paths=tuple(map(tuple, paths)))
     assert lost is not None
-    raise UnreachableSite(*lost, model.radius_m)
+    origin, destinations = lost
+    raise UnreachableSite(world.sites[origin].name, [world.sites[j].name for j in destinations], model.radius_m,
+                          _largest_radius(world, points[[origin, *destinations]], room))
 
 
-def _unreachable(world: World, paths: list[list[FloatArray | None]]) -> tuple[str, str] | None:
-    for j, site in enumerate(world.sites[1:], start=1):
-        if paths[0][j] is None or paths[j][0] is None:
-            return world.sites[0].name, site.name
-    for i, origin in enumerate(world.sites):  # only a noisy planner misses one of these
-        for j, site in enumerate(world.sites):
-            if i != j and paths[i][j] is None:
-                return origin.name, site.name
+def _unreachable(world: World, paths: list[list[FloatArray | None]]) -> tuple[int, list[int]] | None:
+    """A site and those that no path joins it to; from the base, where that isn't joined to all."""
+    for i in range(len(world.sites)):
+        lost = [j for j in range(len(world.sites)) if j != i and (paths[i][j] is None or paths[j][i] is None)]
+        if lost:
+            return i, lost
     return None
+
+
+def _largest_radius(world: World, points: FloatArray, room: float) -> float:
+    """The largest robot that gets from place to place, in millimetres rounded down."""
+    widest = widest_passage(world.obstacles, points)
+    radius = min(widest - CLEARANCE_MARGINS_M[-1], room)
+    return max(math.floor(radius * 1000) / 1000, 0.0)
 
 
 def _times_ms(world: World, model: RobotModel, paths: list[list[FloatArray | None]]) -> IntArray:

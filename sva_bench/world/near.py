@@ -138,3 +138,44 @@ def keeps_clearance(obstacles: Obstacles, points: FloatArray, clearance_m: float
     found: BoolArray = clear_points(clearance_checker(obstacles, clearance_m),
                                     np.ascontiguousarray(points, dtype=np.float64))
     return found
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _distances(checker: FloatArray, points: FloatArray) -> FloatArray:
+    """Exact distances from points to what is nearest, looking from bucket to bucket outwards; 0 inside a solid."""
+    x0, y0, x1, y1, _, side = checker[:6]
+    columns, rows, boxes = int(checker[6]), int(checker[7]), int(checker[8])
+    at_cylinders, at_starts, at_items = int(checker[10]), int(checker[11]), int(checker[12])
+    found = np.empty(len(points))
+    for p in range(len(points)):
+        x, y = points[p, 0], points[p, 1]
+        nearest = min(x - x0, y - y0, x1 - x, y1 - y)
+        column = min(max(math.floor((x - x0) / side), 0), columns - 1)
+        row = min(max(math.floor((y - y0) / side), 0), rows - 1)
+        ring = 0
+        while nearest > (ring - 1 - 1e-6) * side and nearest > 0:
+            for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
+                # The ring's whole lowest and highest row, and of those between the two ends.
+                step = 1 if abs(r - row) == ring else max(2 * ring, 1)
+                for c in range(column - ring, column + ring + 1, step):
+                    if c < 0 or c >= columns:
+                        continue
+                    bucket = at_starts + r * columns + c
+                    for at in range(at_items + int(checker[bucket]), at_items + int(checker[bucket + 1])):
+                        k = int(checker[at])
+                        if k < boxes:
+                            b = checker[_HEAD + 6 * k:_HEAD + 6 * k + 6]
+                            gap = segment_box(x, y, x, y, b[0], b[1], b[2], b[3], b[4], b[5], nearest)
+                        else:
+                            d = checker[at_cylinders + 3 * (k - boxes):at_cylinders + 3 * (k - boxes) + 3]
+                            gap = max(math.hypot(d[0] - x, d[1] - y) - d[2], 0.0)
+                        nearest = min(nearest, gap)
+            ring += 1
+        found[p] = nearest
+    return found
+
+
+def clearances(obstacles: Obstacles, points: FloatArray) -> FloatArray:
+    """Distance from each point to the nearest obstacle or outer wall [m], shape (n,); 0 or less inside one."""
+    found: FloatArray = _distances(clearance_checker(obstacles, 0.0), np.ascontiguousarray(points, dtype=np.float64))
+    return found

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,9 +92,14 @@ def test_a_door_too_narrow_leaves_a_site_unreachable_and_the_error_names_it(tmp_
     # A door of 0.3 m is narrower than the robot's 0.354 m.
     with pytest.raises(UnreachableSite) as caught:
         plan_travel_times(room_with_a_door(tmp_path, 0.3), TURTLEBOT)
-    assert (caught.value.origin, caught.value.destination) == ("base", "p2")
+    assert (caught.value.origin, caught.value.destinations) == ("base", ("p2",))
     assert "'p2'" in str(caught.value)
     assert "widen the passage" in str(caught.value)
+    # Half of the door less the least margin: 0.15 - 0.03 m. Among shapes it is found to a step of 0.02 m.
+    assert 0.1 <= caught.value.widest_m <= 0.12
+    assert f"has a radius of {caught.value.widest_m:.3f} m" in str(caught.value)
+    plan_travel_times(room_with_a_door(tmp_path, 0.3), replace(
+        TURTLEBOT, radius_m=caught.value.widest_m, track_m=caught.value.widest_m))
     assert caught.value.exit_code == ExitCode.BAD_INPUT
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
