@@ -21,9 +21,9 @@ from sva_bench.robot.model import BUILT_IN
 from sva_bench.travel.fuel import fuel_costs
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.cells import Cells, bounds_of, boxes_of, connected_region, distance_field
-from sva_bench.world.clearance import open_heading
 from sva_bench.world.maps import read_ros_map
 from sva_bench.world.model import Noise, Obstacles, Site, World
+from sva_bench.world.near import open_heading
 
 CELL_M, ROOM, DOOR = 0.05, 100, 24  # cells: rooms of 5 m with doors of 1.2 m
 SITES, RUNS = 25, 3
@@ -57,10 +57,12 @@ def map_world(cells: Cells, seed: int) -> World:
     """Sites all over the largest part that a TurtleBot2 reaches."""
     obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes_of(cells), cylinders=np.empty((0, 3)), cells=cells)
     field, rng = distance_field(cells), np.random.default_rng(seed)
-    roomy = np.argwhere(field.distance_m >= 0.35)
-    region = connected_region(field, field.places(roomy[len(roomy) // 2][None])[0], 0.35)
-    chosen = np.argwhere(region)
-    places: FloatArray = field.places(chosen[rng.choice(len(chosen), SITES, replace=False)])
+    shape = field.distance_m.shape
+    roomy = np.flatnonzero(field.distance_m >= 0.35)
+    start = field.places(np.array(np.unravel_index(roomy[len(roomy) // 2], shape))[None])[0]
+    reached = np.flatnonzero(connected_region(field, start, 0.35))
+    chosen = np.unravel_index(rng.choice(reached, SITES, replace=False), shape)
+    places: FloatArray = field.places(np.column_stack(chosen))
     sites = [Site(name=f"p{k}" if k else "base", kind="poi" if k else "base", x_m=x, y_m=y,
                   heading_rad=open_heading(obstacles, x, y)) for k, (x, y) in enumerate(places.tolist())]
     return World(name="office", obstacles=obstacles, sites=tuple(sites), robots=(), scenarios=(),

@@ -10,7 +10,7 @@ import typer
 
 # Spelt out, not imported: the modules that own them take a second to load, and --help should not.
 Fidelity = Literal["kinematic", "rollout", "physics"]
-Planner = Literal["prmstar", "rrtconnect"]
+Planner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
 Method = Literal["auto", "expected", "dep", "relaxed", "lshaped"]
 Cuts = Literal["single", "multi", "pareto"]
 RiskKind = Literal["cvar", "excess"]
@@ -31,8 +31,8 @@ def finite(value: float | None) -> float | None:
 WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-PlannerOption = Annotated[Planner, typer.Option(help="OMPL planner: one PRM* roadmap, or RRTConnect pair by pair "
-                                                           "(noisy).")]
+PlannerOption = Annotated[Planner, typer.Option(help="OMPL planner: one PRM* roadmap, or pair by pair RRTConnect "
+                                                     "(noisy), FMT*, BFMT* or Informed RRT* (slow).")]
 MarginOption = Annotated[float | None, typer.Option(
     min=0, max=1, callback=finite, help="Planning costs are twin times x (1 + margin); default: the world's.",
     show_default=False)]

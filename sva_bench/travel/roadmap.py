@@ -1,8 +1,8 @@
 """Collision-free paths between sites, planned by OMPL. The only importer of ompl.
 
 A deterministic PRM* roadmap serves all pairs: half of its samples lie on the boundary of the inflated obstacles,
-where shortest paths bend, half are a Halton sequence. Edges are checked exactly, without a resolution.
-RRTConnect, pair by pair, is the noisy alternative.
+where shortest paths bend, half are a Halton sequence; tangents between the boundary's arcs make it near the optimum.
+Edges are checked exactly, without a resolution. The other planners search pair by pair.
 """
 
 from __future__ import annotations
@@ -27,7 +27,12 @@ from sva_bench.world.cells import distance_field
 from sva_bench.world.model import Obstacles
 from sva_bench.world.near import clearance_checker, keeps_clear, keeps_clearance
 
-PlannerName = Literal["prmstar", "rrtconnect"]
+PlannerName = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
+"""Planners that are sound and give the same paths in every process; ``benchmarks/planners.py`` compares them.
+
+Not among them: BIT* (misses pairs that others join), RRT* (so it does, and is slower than its informed kin), the KPIECE
+family (longest paths, misses pairs), AORRTC (a path of length zero where the straight line is free).
+"""
 
 _GROWTH = ((1000, 6), (4000, 12), (16_000, 24))
 """Milestones, and points on a quarter circle: the roadmap grows until it connects all sites, or to the last of these.
@@ -35,7 +40,7 @@ _GROWTH = ((1000, 6), (4000, 12), (16_000, 24))
 The tangents between arcs make paths short, the milestones make sure of odd places: more of them shorten no path.
 """
 _CELL_M, _CELLS = 0.02, 200_000  # finest cell, and most cells, of the grid that says which sites no path joins
-_RRT_ITERATIONS = 20_000  # states that RRTConnect may try for one pair before the pair counts as unreachable
+_EFFORTS = (1, 4, 16)  # by which a planner's samples and steps for one pair grow, until they join it or to the last
 _START_SLACK_M = 1e-9  # a start on the very boundary is free
 _WINDOW = 40  # vertices of a path that are cut off at a time: more than its arcs have between two tangents
 
@@ -51,15 +56,15 @@ def plan_paths(
         obstacles: What stands in the way.
         points: Where the paths begin and end [m], shape (n, 2); all at least ``clearance_m`` from obstacles.
         clearance_m: Distance that every path keeps from obstacles.
-        planner: ``prmstar``, one roadmap for all; or ``rrtconnect``, each directed pair by itself, noisy.
+        planner: ``prmstar``, one roadmap for all; the others plan each directed pair by itself, ``rrtconnect`` noisily.
         seed: Seed of OMPL's random numbers.
 
     Returns:
         ``paths[i][j]``: vertices [m], shape (k, 2); ``None`` if there is no way, or i = j.
     """
     ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
-    if planner == "rrtconnect":
-        return _rrtconnect(obstacles, points, clearance_m)
+    if planner != "prmstar":
+        return _pair_by_pair(obstacles, points, clearance_m, planner)
     if len(points) < 2:
         return [[None] for _ in points]
     return _shortest(_grown(obstacles, points, clearance_m), points)
@@ -273,28 +278,51 @@ def _read_roadmap(si: Any, planner: Any) -> tuple[FloatArray, csr_array]:
     return vertices, csr_array((length, (heads, tails)), shape=(count, count))
 
 
-def _rrtconnect(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> list[list[FloatArray | None]]:
+def _pair_by_pair(
+    obstacles: Obstacles, points: FloatArray, clearance_m: float, planner: PlannerName
+) -> list[list[FloatArray | None]]:
     si, _ = _space(obstacles, clearance_m)
     n = len(points)
     paths: list[list[FloatArray | None]] = [[None] * n for _ in range(n)]
     simplifier = og.PathSimplifier(si)
+    apart: BoolArray | None = None
     for i in range(n):
         for j in range(n):
             if i == j:
                 continue
-            problem = ob.ProblemDefinition(si)
-            problem.setStartAndGoalStates(_state(si, points[i]), _state(si, points[j]))
-            planner = og.RRTConnect(si)
-            planner.setProblemDefinition(problem)
-            planner.setup()
-            planner.solve(_after(_RRT_ITERATIONS))
-            if problem.hasExactSolution():  # solve() is true for an approximate one too, which ends short
-                path = problem.getSolutionPath()
-                simplifier.simplifyMax(path)
-                vertices = np.array([(s[0], s[1]) for s in path.getStates()])
-                vertices[0], vertices[-1] = points[i], points[j]
-                paths[i][j] = vertices
+            for effort in _EFFORTS:
+                paths[i][j] = _query(si, simplifier, planner, effort, points[i], points[j])
+                if paths[i][j] is not None:
+                    break
+                if apart is None:
+                    apart = surely_apart(obstacles, points, clearance_m)
+                if apart[i, j]:
+                    break
     return paths
+
+
+def _query(
+    si: Any, simplifier: Any, planner: PlannerName, effort: int, start: FloatArray, goal: FloatArray
+) -> FloatArray | None:
+    problem = ob.ProblemDefinition(si)
+    problem.setStartAndGoalStates(_state(si, start), _state(si, goal))
+    if planner == "informedrrtstar":
+        search, calls = og.InformedRRTstar(si), 1500 * effort
+    elif planner == "rrtconnect":
+        search, calls = og.RRTConnect(si), 20_000 * effort
+    else:
+        search, calls = og.FMT(si) if planner == "fmt" else og.BFMT(si), 20_000 * effort
+        search.setNumSamples(1000 * effort)
+    search.setProblemDefinition(problem)
+    search.setup()
+    search.solve(_after(calls))
+    if not problem.hasExactSolution():  # solve() is true for an approximate one too, which ends short
+        return None
+    path = problem.getSolutionPath()
+    simplifier.simplifyMax(path)
+    vertices = np.array([(s[0], s[1]) for s in path.getStates()])
+    vertices[0], vertices[-1] = start, goal
+    return vertices
 
 
 def _after(calls: int) -> Any:

@@ -12,6 +12,12 @@ from scipy.ndimage import label
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray, frozen
 
+MAX_BOXES = 50_000  # a compound body of so many takes physics 1.5 s to build and 200 MB
+
+
+class TooRagged(ValueError):
+    """Occupied cells that few boxes don't cover."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cells:
@@ -91,15 +97,21 @@ def cover(occupied: BoolArray) -> FloatArray:
 
     Returns:
         x0, y0, x1, y1 in cells; shape (k, 4).
+
+    Raises:
+        TooRagged: If there would be more than ``MAX_BOXES``.
     """
-    across, along = _merged_runs(occupied), _merged_runs(np.ascontiguousarray(occupied.T))
+    across, along = _merged_runs(occupied, MAX_BOXES), _merged_runs(np.ascontiguousarray(occupied.T), MAX_BOXES)
+    if min(len(across), len(along)) > MAX_BOXES:
+        raise TooRagged(f"more than {MAX_BOXES} boxes")
     best = across if len(across) <= len(along) else along[:, [1, 0, 3, 2]]
     spans: FloatArray = best.astype(np.float64)
     return spans
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _merged_runs(occupied: BoolArray) -> IntArray:
+def _merged_runs(occupied: BoolArray, most: int) -> IntArray:
+    """The rectangles; it stops when there is one more than ``most``."""
     rows, columns = occupied.shape
     found = np.empty((16, 4), dtype=np.int64)
     count = 0
@@ -116,6 +128,8 @@ def _merged_runs(occupied: BoolArray) -> IntArray:
                     run_end += 1
             if right[x] != run_end:
                 if right[x] >= 0:
+                    if count > most:
+                        return found[:count].copy()
                     if count == len(found):
                         grown = np.empty((2 * count, 4), dtype=np.int64)
                         grown[:count] = found

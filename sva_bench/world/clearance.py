@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray
@@ -96,25 +95,3 @@ def segment_distance(
 def clearance(obstacles: Obstacles, x: float, y: float) -> float:
     """Distance from a point to the nearest obstacle or outer wall [m]; 0 or less inside one."""
     return float(segment_distance(obstacles.bounds_m, obstacles.boxes, obstacles.cylinders, x, y, x, y, -math.inf))
-
-
-def open_heading(obstacles: Obstacles, x: float, y: float) -> float:
-    """The heading with the longest free view from a point [rad], in steps of 5 degrees.
-
-    A robot that stops so leaves without turning away from a wall first. Ties go to the smallest angle.
-    """
-    views = np.deg2rad(np.arange(0.0, 360.0, 5.0))
-    lengths = [_view(obstacles, x, y, float(angle)) for angle in views]
-    return float(views[int(np.argmax(np.round(lengths, 6)))])
-
-
-def _view(obstacles: Obstacles, x: float, y: float, angle: float) -> float:
-    """Length of the free straight line from a point [m], to a millimetre."""
-    x0, y0, x1, y1 = obstacles.bounds_m
-    low, high = 0.0, math.hypot(x1 - x0, y1 - y0)
-    while high - low > 1e-3:
-        middle = 0.5 * (low + high)
-        gap = segment_distance(obstacles.bounds_m, obstacles.boxes, obstacles.cylinders, x, y,
-                               x + middle * math.cos(angle), y + middle * math.sin(angle), 1e-9)
-        low, high = (middle, high) if gap > 0 else (low, middle)
-    return low

@@ -14,10 +14,11 @@ from sva_bench.errors import BadFile, nearest
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.cells import bounds_of, boxes_of
-from sva_bench.world.clearance import clearance, open_heading
+from sva_bench.world.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
+from sva_bench.world.clearance import clearance
 from sva_bench.world.maps import read_movingai_map, read_ros_map
 from sva_bench.world.model import MapSource, Noise, Obstacles, Robot, Scenario, Site, SiteKind, World
+from sva_bench.world.near import open_heading, view_checker
 from sva_bench.world.schema import (
     KIND,
     Box,
@@ -30,8 +31,6 @@ from sva_bench.world.schema import (
     SiteEntry,
     WorldFile,
 )
-
-MAX_BOXES = 50_000  # for a compound body
 
 
 def load_world(path: Path) -> World:
@@ -80,10 +79,11 @@ def _map(document: Document, section: Map) -> tuple[Obstacles, MapSource | None]
         if error.path == entry["file"]:  # said of a name, not of a file: the world's to mend
             raise document.error(("map", kind, "file"), error.problem) from None
         raise
-    boxes = boxes_of(cells)
-    if len(boxes) > MAX_BOXES:
-        raise document.error(("map", kind, "file"), f"its occupied cells take {len(boxes)} boxes to cover, and physics "
-                             f"holds {MAX_BOXES}; clean the map of speckles, or cut it")
+    try:
+        boxes = boxes_of(cells)
+    except TooRagged:
+        raise document.error(("map", kind, "file"), f"its occupied cells take more than the {MAX_BOXES} boxes that "
+                             "physics holds; clean the map of speckles, or cut it") from None
     obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes, cylinders=np.empty((0, 3)), cells=cells)
     return obstacles, MapSource(section={kind: entry}, files=files)
 
@@ -110,6 +110,7 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
     entries += [("station", name, e, ("sites", "stations", name)) for name, e in file.sites.stations.items()]
     entries += [("poi", name, e, ("sites", "pois", name)) for name, e in file.sites.pois.items()]
     sites: list[Site] = []
+    sight = view_checker(obstacles)
     for kind, name, entry, loc in entries:
         if any(site.name == name for site in sites):
             raise document.error(loc, f"there is another site named {name!r}; names must differ")
@@ -119,7 +120,7 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
             where = "inside an obstacle or outside the bounds" if gap <= 0 else f"only {gap:.3f} m from an obstacle"
             raise document.error((*loc, "at_m"), f"{name} is {where}; a robot of radius {widest_m} m doesn't fit "
                                  "there: move the site")
-        heading = (_radians(math.degrees(open_heading(obstacles, x, y))) if entry.heading_deg is None
+        heading = (_radians(math.degrees(open_heading(obstacles, x, y, sight))) if entry.heading_deg is None
                    else _radians(entry.heading_deg))
         sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s))
     for k, site in enumerate(sites):

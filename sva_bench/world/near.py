@@ -179,3 +179,40 @@ def clearances(obstacles: Obstacles, points: FloatArray) -> FloatArray:
     """Distance from each point to the nearest obstacle or outer wall [m], shape (n,); 0 or less inside one."""
     found: FloatArray = _distances(clearance_checker(obstacles, 0.0), np.ascontiguousarray(points, dtype=np.float64))
     return found
+
+
+def open_heading(obstacles: Obstacles, x: float, y: float, checker: FloatArray | None = None) -> float:
+    """The heading with the longest free view from a point [rad], in steps of 5 degrees.
+
+    A robot that stops so leaves without turning away from a wall first. Ties go to the smallest angle.
+
+    Args:
+        obstacles: What blocks the view.
+        x, y: The point [m].
+        checker: As ``view_checker`` makes it, where many points are asked for; ``None`` = made here.
+    """
+    views = np.deg2rad(np.arange(0.0, 360.0, 5.0))
+    x0, y0, x1, y1 = obstacles.bounds_m
+    lengths = _views(view_checker(obstacles) if checker is None else checker, x, y, views, math.hypot(x1 - x0, y1 - y0))
+    return float(views[int(np.argmax(np.round(lengths, 6)))])
+
+
+def view_checker(obstacles: Obstacles) -> FloatArray:
+    """What ``open_heading`` asks: a line of sight keeps any distance at all."""
+    return clearance_checker(obstacles, 1e-300)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _views(checker: FloatArray, x: float, y: float, angles: FloatArray, far: float) -> FloatArray:
+    """Lengths of the free straight lines from a point [m], to a millimetre."""
+    lengths = np.empty(len(angles))
+    for k in range(len(angles)):
+        low, high = 0.0, far
+        while high - low > 1e-3:
+            middle = 0.5 * (low + high)
+            if keeps_clear(checker, x, y, x + middle * math.cos(angles[k]), y + middle * math.sin(angles[k])):
+                low = middle
+            else:
+                high = middle
+        lengths[k] = low
+    return lengths

@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from sva_bench import options
 from sva_bench.arrays import FloatArray
 from sva_bench.travel.roadmap import PlannerName, plan_paths
 from sva_bench.world.model import Obstacles
@@ -18,6 +20,8 @@ from tests.oracles.visibility import shortest_lengths
 from tests.oracles.worlds import free_places, random_obstacles
 
 CLEARANCE_M = 0.297  # radius of a turtlebot2 and the widest margin
+PLANNERS: list[Any] = ["prmstar", "rrtconnect", "bfmt", pytest.param("fmt", marks=pytest.mark.long),
+                       pytest.param("informedrrtstar", marks=pytest.mark.long)]
 MEAN_RATIO, WORST_RATIO = 1.005, 1.10  # of a path's length to the optimum
 
 
@@ -103,7 +107,7 @@ def digest(planner: PlannerName) -> str:
     return hashlib.sha256(b"|".join(parts)).hexdigest()
 
 
-@pytest.mark.parametrize("planner", ["prmstar", "rrtconnect"])
+@pytest.mark.parametrize("planner", PLANNERS)
 def test_planning_twice_gives_the_same_paths_bit_for_bit(planner: PlannerName) -> None:
     first = digest(planner)
     assert digest(planner) == first
@@ -111,20 +115,28 @@ def test_planning_twice_gives_the_same_paths_bit_for_bit(planner: PlannerName) -
         assert fresh.submit(digest, planner).result() == first
 
 
-def test_rrtconnect_paths_are_free_and_end_at_their_sites() -> None:
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_paths_of_every_planner_are_free_and_end_at_their_sites(planner: PlannerName) -> None:
     obstacles = random_obstacles(5)
     points = free_places(obstacles, 5, 6, CLEARANCE_M)
     optimum = shortest_lengths(obstacles, points, CLEARANCE_M)
-    paths = plan_paths(obstacles, points, CLEARANCE_M, planner="rrtconnect")
+    paths = plan_paths(obstacles, points, CLEARANCE_M, planner=planner)
     for i in range(6):
         assert paths[i][i] is None
         for j in range(6):
             path = paths[i][j]
-            if i == j or path is None:
+            if i == j:
+                continue
+            assert (path is None) == (not np.isfinite(optimum[i, j]))
+            if path is None:
                 continue
             assert_array_equal(path[[0, -1]], points[[i, j]])
             assert path_clearance(obstacles, path) >= CLEARANCE_M - 1e-6
             assert length_of(path) >= optimum[i, j] * (1 - 1e-9)
+
+
+def test_the_command_line_offers_exactly_the_planners_that_there_are() -> None:
+    assert get_args(options.Planner) == get_args(PlannerName)
 
 
 def test_in_an_empty_world_paths_are_straight() -> None:
@@ -137,7 +149,7 @@ def test_in_an_empty_world_paths_are_straight() -> None:
         assert length_of(path) == pytest.approx(np.hypot(*(points[i] - points[j])), rel=1e-9)
 
 
-@pytest.mark.parametrize("planner", ["prmstar", "rrtconnect"])
+@pytest.mark.parametrize("planner", PLANNERS)
 def test_a_closed_wall_leaves_no_path(planner: PlannerName) -> None:
     closed = Obstacles(bounds_m=np.array([0.0, 0, 3, 2]), boxes=np.array([[1.5, 1, 0.05, 1.0, 0]]),
                        cylinders=np.empty((0, 3)))

@@ -19,6 +19,7 @@ from sva_bench.execution.simulator import obstacles_urdf
 from sva_bench.recording.story import story_of
 from sva_bench.world.cells import (
     Cells,
+    TooRagged,
     bounds_of,
     boxes_of,
     connected_region,
@@ -66,6 +67,7 @@ def test_runs_of_rows_become_few_boxes() -> None:
     assert cover(np.zeros((2, 2), dtype=np.bool_)).shape == (0, 4)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(grids)
 def test_the_cover_is_exact_and_no_cell_is_covered_twice(occupied: BoolArray) -> None:
     times = np.zeros(occupied.shape, dtype=int)
@@ -74,6 +76,12 @@ def test_the_cover_is_exact_and_no_cell_is_covered_twice(occupied: BoolArray) ->
     assert_array_equal(times, occupied)
 
 
+def test_a_checkerboard_is_refused_before_it_fills_the_memory() -> None:
+    with pytest.raises(TooRagged):
+        cover(np.indices((2000, 2000)).sum(axis=0) % 2 == 0)
+
+
+@settings(deadline=None)  # the first call compiles
 @given(grids)
 def test_the_distance_field_is_exact_on_every_half_cell(occupied: BoolArray) -> None:
     field = distance_field(cells_of(occupied))
@@ -83,6 +91,7 @@ def test_the_distance_field_is_exact_on_every_half_cell(occupied: BoolArray) -> 
     assert_allclose(field.distance_m.ravel(), expected, atol=1e-6)  # single precision
 
 
+@settings(deadline=None)  # the first call compiles
 @given(grids)
 def test_corners_stick_out_where_one_cell_of_four_is_occupied(occupied: BoolArray) -> None:
     solid = np.pad(occupied, 1, constant_values=True)
@@ -103,6 +112,7 @@ def test_boxes_and_grid_agree_on_what_is_near_whatever_the_yaw(occupied: BoolArr
                        (expected >= 0.3)[abs(expected - 0.3) > 1e-9])
 
 
+@settings(deadline=None)
 @given(grids, st.floats(-4, 4))
 def test_places_go_to_the_grid_and_back(occupied: BoolArray, yaw: float) -> None:
     cells = cells_of(occupied, 0.05, (100.0, -20.0, yaw))

@@ -4,12 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
-from sva_bench.world.clearance import clearance, open_heading, segment_distance
+from sva_bench.world.clearance import clearance, segment_distance
 from sva_bench.world.model import Obstacles
+from sva_bench.world.near import clearance_checker, clearances, keeps_clear, keeps_clearance, open_heading
 from tests.oracles.distances import points_clearance, segment_clearance
+from tests.oracles.worlds import random_obstacles
 
 FAR = [-100.0, -100.0, 100.0, 100.0]
 
@@ -147,3 +150,24 @@ def test_obstacles_are_read_only_copies_of_the_right_shape() -> None:
         Obstacles(bounds_m=np.zeros(3), boxes=boxes, cylinders=np.empty((0, 3)))
     with pytest.raises(ValueError, match="NaN"):
         Obstacles(bounds_m=np.array([0, 0, 1, np.nan]), boxes=boxes, cylinders=np.empty((0, 3)))
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.05, 1.5))
+def test_buckets_know_what_a_look_at_every_obstacle_tells(seed: int, needed: float) -> None:
+    o = random_obstacles(seed)
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(-1, 15, (40, 4))
+    ends[::4, 2:] = ends[::4, :2] + rng.normal(0, 1e-4, (10, 2))  # short ones, steep ones, and points
+    ends[1::4, 2] = ends[1::4, 0] + rng.choice([0.0, 1e-9, 1e-3], 10)
+    ends[2::8, 2:] = ends[2::8, :2]
+    checker = clearance_checker(o, needed)
+    for ax, ay, bx, by in ends.tolist():
+        gap = distance(o, ax, ay, bx, by)
+        if abs(gap - needed) > 1e-9:
+            assert keeps_clear(checker, ax, ay, bx, by) == (gap >= needed)
+    points = np.ascontiguousarray(ends[:, :2])
+    exact = np.array([clearance(o, x, y) for x, y in points])
+    assert_allclose(np.maximum(clearances(o, points), 0), np.maximum(exact, 0), atol=1e-9)
+    sure = abs(exact - needed) > 1e-9
+    assert_array_equal(keeps_clearance(o, points, needed)[sure], (exact >= needed)[sure])
