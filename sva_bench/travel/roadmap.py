@@ -34,7 +34,7 @@ Not among them: BIT* (misses pairs that others join), RRT* (so it does, and is s
 family (longest paths, misses pairs), AORRTC (a path of length zero where the straight line is free).
 """
 
-_GROWTH = ((1000, 6), (4000, 12), (16_000, 24))
+_GROWTH = ((1000, 6), (3000, 12), (6000, 24))
 """Milestones, and points on a quarter circle: the roadmap grows until it connects all sites, or to the last of these.
 
 The tangents between arcs make paths short, the milestones make sure of odd places: more of them shorten no path.

@@ -27,6 +27,7 @@ CLEARANCE_MARGINS_M = (0.12, 0.06, 0.03)
 The follower cuts gentle corners by up to 0.05 m and tracks to 0.01 m: at 0.12 m no robot touches anything.
 """
 
+_ROUNDING = 1e-3  # polygons go about the arcs in the roadmap: a passage just as wide as the clearance is too narrow
 _NAMED = 10  # sites that a complaint names
 
 
@@ -142,7 +143,7 @@ def _unreachable(world: World, paths: list[list[FloatArray | None]]) -> tuple[in
 
 def _largest_radius(world: World, points: FloatArray, room: float) -> float:
     """The largest robot that gets from place to place, in millimetres rounded down."""
-    widest = widest_passage(world.obstacles, points)
+    widest = widest_passage(world.obstacles, points) * (1 - _ROUNDING) - 2e-4
     radius = min(widest - CLEARANCE_MARGINS_M[-1], room)
     return max(math.floor(radius * 1000) / 1000, 0.0)
 
