@@ -10,10 +10,12 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from sva_bench import options
 from sva_bench.arrays import FloatArray
-from sva_bench.travel.roadmap import PlannerName, plan_paths
+from sva_bench.travel.roadmap import PlannerName, plan_paths, roadmap_edges
 from sva_bench.world.model import Obstacles
 from tests.oracles.distances import path_clearance
 from tests.oracles.visibility import shortest_lengths
@@ -64,6 +66,25 @@ def test_paths_are_near_the_optimum_on_many_random_worlds() -> None:
     print(f"ratio to optimum over {len(found)} pairs: mean {found.mean():.5f}, worst {found.max():.4f}")  # noqa: T201
     assert found.mean() <= MEAN_RATIO
     assert found.max() <= WORST_RATIO
+
+
+def test_the_edges_shown_are_those_of_the_roadmap_that_paths_are_planned_on() -> None:
+    obstacles = random_obstacles(2)
+    points = free_places(obstacles, 2, 6, CLEARANCE_M)
+    ends = roadmap_edges(obstacles, points, CLEARANCE_M)
+    places, number = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    one, other = number.reshape(-1, 2).T
+    graph = csr_array((np.hypot(*(places[one] - places[other]).T), (one, other)), shape=(len(places), len(places)))
+    known = {tuple(place): k for k, place in enumerate(places.tolist())}
+    paths = plan_paths(obstacles, points, CLEARANCE_M)
+    shortest = dijkstra(graph, directed=False, indices=[known[tuple(point)] for point in points.tolist()])
+    for i, row in enumerate(paths):
+        for j, path in enumerate(row):
+            if path is not None:
+                assert set(map(tuple, path.tolist())) <= set(known)
+                # Pulled taut, a path is a little shorter than its edges.
+                on_edges = shortest[i, known[tuple(points[j].tolist())]]
+                assert 0.98 * on_edges < length_of(path) <= on_edges + 1e-9
 
 
 def test_the_oracle_finds_the_way_round_a_box_by_hand() -> None:
