@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -9,8 +10,8 @@ import typer
 
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.options import Family, PlannerOption, Verbose, WorldArgument, WorldFamily, finite
-from sva_bench.terminal import print_json, progress_bars, results, set_up_logging, write_result
+from sva_bench.options import Family, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
+from sva_bench.terminal import print_json, progress_bars, results, set_up_logging, write_beside, write_result
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
@@ -72,6 +73,50 @@ def make_random_world(
     with progress_bars() as progress:
         text = random_world(family, size_m=size, density=density, pois=pois, stations=stations, robots=robots,
                             seed=seed, progress=progress)
+    write_result(output, text)
+
+
+@world_app.command("from-map")
+def make_world_from_map(
+    source: Annotated[Path, typer.Argument(metavar="MAP.yaml|MAP.map", help="YAML file of a ROS map, or a MovingAI "
+                                           "map.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="WORLD.yaml", help="World file to write; the map's "
+                                         "files are copied beside it, to WORLD-map/.", show_default=False)],
+    pois: Annotated[int, typer.Option(min=4, max=100, help="Points of interest, at least two for each robot.")] = 20,
+    stations: Annotated[int, typer.Option(min=0, max=30, help="Refuelling stations.")] = 5,
+    robots: Annotated[int, typer.Option(min=2, max=10, help="Robots; half of them, rounded down, are uncertain.")] = 2,
+    base: Annotated[tuple[float, float] | None, typer.Option(
+        metavar="X Y", help="Where the base is, in metres of the map; what it can't reach gets no sites.",
+        show_default="the middle of the largest region that walls enclose")] = None,
+    min_spacing: Annotated[float | None, typer.Option(
+        metavar="METRES", min=0.05, max=1000, callback=finite, help="From one point of interest to the next and to all "
+        "other sites, at least.", show_default="as wide as it easily goes")] = None,
+    cell_m: Annotated[float | None, typer.Option(
+        metavar="METRES", min=1e-3, max=100, callback=finite, help="Side of a cell of a MovingAI map.",
+        show_default="1.0")] = None,
+    unknown: Annotated[Unknown | None, typer.Option(help="What unknown cells of a ROS map count as.",
+                                                    show_default="occupied")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of points of interest and incentives.")] = 0,
+    verbose: Verbose = False,
+) -> None:
+    """Make a world of a map, with sites on free ground, a mission that suits it and the paper's scenarios S1 to S4."""
+    with holding_back_ctrl_c():
+        from sva_bench.worlds import world_from_map
+
+    set_up_logging(verbose)
+    octile = source.suffix.lower() == ".map"
+    if octile and unknown is not None:
+        raise BadInput("--unknown belongs to ROS maps; a MovingAI map has no unknown cells")
+    if not octile and cell_m is not None:
+        raise BadInput("--cell-m belongs to MovingAI maps; a ROS map says its resolution")
+    if base is not None and not all(map(math.isfinite, base)):
+        raise BadInput("--base: expected two finite numbers")
+    with progress_bars() as progress:
+        text, files = world_from_map(
+            source, output, base=base, pois=pois, stations=stations, robots=robots, seed=seed, spacing_m=min_spacing,
+            cell_m=1.0 if cell_m is None else cell_m, unknown=unknown or "occupied", progress=progress)
+    for file in files:  # before the world that names them
+        write_beside(output, file.name, file.content)
     write_result(output, text)
 
 

@@ -28,7 +28,10 @@ MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
 MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 100 MB
 MAX_DEPTH = 32
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
+"""Pattern of names of worlds, sites, robots and scenarios."""
+
+Name = Annotated[str, StringConstraints(pattern=NAME)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]

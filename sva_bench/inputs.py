@@ -43,10 +43,12 @@ def about(path: Path) -> Iterator[None]:
     except UnreachableSite as error:
         document = read_yaml(path)
         # Where nothing at all is reached, it is the base that stands badly.
-        count = 1 + sum(len(document.data["sites"].get(kind) or {}) for kind in ("stations", "pois"))
-        name = "base" if len(error.destinations) == count - 1 > 1 else error.destinations[0]
-        kind = next((kind for kind in ("stations", "pois") if name in (document.data["sites"].get(kind) or {})), None)
-        raise document.error(("sites", "base") if kind is None else ("sites", kind, name), str(error)) from None
+        sites = load_world(path).sites
+        name = "base" if len(error.destinations) == len(sites) - 1 > 1 else error.destinations[0]
+        where = {"base": ("sites", "base"), "station": ("sites", "stations", name), "poi": ("sites", "pois", name)}
+        # Of a site that the file doesn't name but leaves to us, the line of its section is said.
+        kind = next(site.kind for site in sites if site.name == name)
+        raise document.error(where[kind], str(error)) from None
 
 
 def instance_of_world(

@@ -18,6 +18,7 @@ FailureProcess = Literal["mission", "per_leg"]
 Family = Literal["A", "B", "C"]
 WorldFamily = Literal["rooms", "field", "aisles", "maze"]
 Objective = Literal["stochastic", "deterministic"]
+Unknown = Literal["occupied", "free"]
 
 
 

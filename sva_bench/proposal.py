@@ -18,6 +18,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadInput
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import Plan
+from sva_bench.robot.model import USUAL_MODEL
 from sva_bench.seeds import Stream, rng_for
 from sva_bench.solver.heuristic import Orders, search
 from sva_bench.solver.refuelling import quickest, road_of
@@ -29,7 +30,6 @@ SCENARIOS = {"S1": 1.0, "S2": 0.75, "S3": 0.25, "S4": 0.0}
 """Availability of the uncertain robots in each scenario (section 5.1 of the paper)."""
 
 AVAILABILITY = 0.75  # of the uncertain robots where no scenario says otherwise
-MODEL = "turtlebot2"
 MOST_INCENTIVE = {True: 150, False: 170}
 """What a certain and an uncertain robot earns at most at a POI (section 5.1 of the paper)."""
 
@@ -62,7 +62,7 @@ class Proposal:
         uncertain = self.robots[self.certain:]
         return {
             "robots": {name: {
-                "model": MODEL, "fuel_capacity_s": _plain(self.fuel_capacity_s),
+                "model": USUAL_MODEL, "fuel_capacity_s": _plain(self.fuel_capacity_s),
                 "mission_limit_s": _plain(self.mission_limit_s),
                 "availability": AVAILABILITY if name in uncertain else 1.0, "incentives": dict(earned)}
                 for name, earned in zip(self.robots, self.incentives, strict=True)},

@@ -18,6 +18,7 @@ class Stream(IntEnum):
     JOINT_FAILURE = 4
     RANDOM_WORLD = 7
     PROPOSED_MISSION = 8
+    DRAWN_PLACES = 9
 
 
 def seed_for(root: int, stream: Stream, *index: int) -> np.random.SeedSequence:

@@ -53,6 +53,16 @@ def write_result(path: Path | None, content: str | bytes) -> None:
         raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another place with -o") from None
 
 
+def write_beside(path: Path, name: str, content: bytes) -> None:
+    """Write a file that belongs to another, by its name relative to the other's folder."""
+    target = path.parent / name
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"{target.parent}: cannot be made ({error.strerror}); choose another place with -o") from None
+    write_result(target, content)
+
+
 def set_up_logging(verbose: bool) -> None:
     """Send warnings to standard error, and everything of ours where the user wants to know more."""
     logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,

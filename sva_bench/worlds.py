@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import re
+import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from sva_bench.documents import Loc, parse_yaml, pretty_yaml
+from sva_bench.documents import NAME, Loc, parse_yaml, pretty_yaml
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.world.generate import DENSITY, Family, Point, random_places, random_terrain
+from sva_bench.robot.model import BUILT_IN, USUAL_MODEL
+from sva_bench.world.cells import MAX_BOXES, TooRagged, cover, distance_field
+from sva_bench.world.generate import DENSITY, Family, random_places, random_terrain
 from sva_bench.world.load import world_of
+from sva_bench.world.maps import MapFile, Unknown, read_movingai_map, read_ros_map
+from sva_bench.world.places import NoRoom, Point, find_places
 from sva_bench.world.schema import KIND
 
 STATION_STOP_S = 10
@@ -64,6 +71,82 @@ def random_world(
     return with_mission(name, data, remarks, robots=robots, seed=seed, path=Path(f"{name}.yaml"), progress=progress)
 
 
+def world_from_map(
+    source: Path, target: Path, *, base: Point | None, pois: int, stations: int, robots: int, cell_m: float,
+    unknown: Unknown, spacing_m: float | None, seed: int, progress: Progress,
+) -> tuple[str, tuple[MapFile, ...]]:
+    """The text of a world file for a map, and the copies of the map's files that belong beside it.
+
+    Args:
+        source: A map's YAML file (ROS), or an octile map (MovingAI).
+        target: Where the world file will be; the world is named after it.
+        base: Where the base is; ``None`` = near the middle of the largest enclosed region.
+        pois, stations, robots: How many of each.
+        cell_m: Side of a cell of an octile map.
+        unknown: What unknown cells of a ROS map count as.
+        spacing_m: Least distance between POIs; ``None`` = as wide as it easily goes.
+        seed: Seed of POIs and mission.
+        progress: Told how far it is.
+
+    Raises:
+        BadFile: If the map can't be read.
+        BadInput: If sites or mission don't fit.
+    """
+    name = target.stem
+    if source.suffix.lower() not in (".yaml", ".yml", ".map"):
+        raise BadInput(f"{source}: a map is the YAML file of a ROS map, or a MovingAI map whose name ends in .map")
+    if source.resolve() == target.resolve():
+        raise BadInput(f"{target}: this is the map itself; choose another name with -o")
+    if not target.parent.is_dir():
+        raise BadInput(f"{target}: there is no such folder; choose another place with -o")
+    if not re.fullmatch(NAME, name):
+        raise BadInput(f"{target}: the world is named after its file, and {name!r} is no valid name; use up to 64 "
+                       "letters, digits, '_', '.', '-', the first a letter or digit")
+    section: dict[str, Any]
+    if source.suffix.lower() == ".map":
+        cells, read = read_movingai_map(source.parent, source.name, cell_m)
+        section = {"movingai": {"file": f"{name}-map/{read[0].name}", "cell_m": _plain(cell_m)}}
+    else:
+        cells, read = read_ros_map(source.parent, source.name, unknown)
+        section = {"ros": {"file": f"{name}-map/{read[0].name}"} | ({"unknown": unknown} if unknown == "free" else {})}
+    try:
+        cover(cells.occupied)
+    except TooRagged:
+        raise BadInput(f"{source}: its occupied cells take more than the {MAX_BOXES} boxes that physics holds; clean "
+                       "the map of speckles, or cut it") from None
+    radius = BUILT_IN[USUAL_MODEL].radius_m
+    progress("placing the sites", 0, 1)
+    try:
+        places, spacing = find_places(distance_field(cells), base=base, radius_m=radius, stations=stations, pois=pois,
+                                      spacing_m=spacing_m, seed=seed)
+    except NoRoom as error:
+        where = "at the base" if error.kind == "base" and base else "on this map"
+        said = f"there is no room {where}" if error.kind == "base" else str(error)
+        raise BadInput(f"{source}: for a robot of radius {radius} m, {said}; choose fewer sites, another base, or "
+                       "another map") from None
+    progress("placing the sites", 1, 1)
+    asked = "" if base is None else f" --base {base[0]:g} {base[1]:g}"
+    asked += "" if "ros" in section else f" --cell-m {cell_m:g}"
+    asked += " --unknown free" if unknown == "free" else ""
+    asked += "" if spacing_m is None else f" --min-spacing {spacing_m:g}"
+    remarks: dict[Loc, str] = {
+        (): f"A mission on a map: sva-bench world from-map {source.name}\n"
+            f"--pois {pois} --stations {stations} --robots {robots} --seed {seed}{asked}",
+        ("sites", "base"): "in the middle of the largest region that walls enclose" if base is None else "as asked for",
+        ("sites", "stations"): "each as far as can be from base and stations before it, by the way there",
+        ("sites", "pois"): f"drawn from what is reached from the base, {spacing:g} m from each other at least"}
+    data = {"map": section, "sites": sites_section(places.base, places.stations, places.pois)}
+    files = tuple(replace(file, name=f"{name}-map/{file.name}") for file in read)
+    with tempfile.TemporaryDirectory() as folder:  # a world is read with the files that it names
+        for file in files:
+            path = Path(folder, file.name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(file.content)
+        text = with_mission(name, data, remarks, robots=robots, seed=seed, path=Path(folder, target.name),
+                            progress=progress)
+    return text, files
+
+
 def sites_section(base: Point, stations: tuple[Point, ...], pois: tuple[Point, ...]) -> dict[str, Any]:
     """The section ``sites`` of a world file, with names as in the shipped worlds."""
     return {
@@ -94,10 +177,11 @@ def with_mission(
     """
     with holding_back_ctrl_c():  # after terrain and sites: what does not fit is said at once
         from sva_bench.bench import plan_costs
-        from sva_bench.proposal import MODEL, propose_mission
+        from sva_bench.proposal import propose_mission
 
     head = {"format": KIND, "name": name, **data}
-    bare = world_of(parse_yaml(pretty_yaml({**head, "robots": {"uv1": {"model": MODEL, "incentives": {}}}}, {}), path))
+    robot = {"model": USUAL_MODEL, "incentives": {}}
+    bare = world_of(parse_yaml(pretty_yaml({**head, "robots": {"uv1": robot}}, {}), path))
     (costs,) = plan_costs(bare, "prmstar", progress).values()
     progress("choosing a mission", 0, 1)
     proposal = propose_mission(bare.sites, costs.cost_s, robots=robots, seed=seed)

@@ -70,3 +70,6 @@ BUILT_IN = {
         name="turtlebot3_waffle", radius_m=0.22, wheel_radius_m=0.033, track_m=0.287, mass_kg=1.8, max_speed_m_s=0.26,
         max_turn_rad_s=1.82, acceleration_m_s2=0.8, turn_acceleration_rad_s2=3.0),
 }
+
+USUAL_MODEL = "turtlebot2"
+"""The built-in robot of missions that are proposed."""

@@ -18,14 +18,9 @@ from sva_bench.travel.roadmap import PlannerName, plan_paths
 from sva_bench.world.clearance import clearance
 from sva_bench.world.model import World
 from sva_bench.world.passages import widest_passage
+from sva_bench.world.places import CLEARANCE_MARGINS_M as CLEARANCE_MARGINS_M
 
 _log = logging.getLogger(__name__)
-
-CLEARANCE_MARGINS_M = (0.12, 0.06, 0.03)
-"""Distance to obstacles that paths keep beyond the robot's radius; the first that connects all sites.
-
-The follower cuts gentle corners by up to 0.05 m and tracks to 0.01 m: at 0.12 m no robot touches anything.
-"""
 
 _ROUNDING = 1e-3  # polygons go about the arcs in the roadmap: a passage just as wide as the clearance is too narrow
 _NAMED = 10  # sites that a complaint names

@@ -20,13 +20,13 @@ from sva_bench.world.clearance import clearance, segment_distance
 from sva_bench.world.load import obstacles_of
 from sva_bench.world.mazes import maze_walls
 from sva_bench.world.model import Obstacles
+from sva_bench.world.places import Places, Point
 from sva_bench.world.rooms import room_walls
 from sva_bench.world.schema import Shapes
 
 Family = Literal["rooms", "field", "aisles", "maze"]
 Shape = Mapping[str, Any]
 """An obstacle as it stands in a world file."""
-Point = tuple[float, float]
 
 DENSITY: dict[Family, float] = {"rooms": 0.06, "field": 0.1, "aisles": 0.2, "maze": 0.8}
 """Density unless another is asked for. Of a maze, the share of the walls of one without loops; else of the area."""
@@ -67,15 +67,6 @@ class Terrain:
     def obstacles(self) -> Obstacles:
         """The same as arrays."""
         return _obstacles(self.bounds_m, self.shapes)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Places:
-    """Where the sites are [m]."""
-
-    base: Point
-    stations: tuple[Point, ...]
-    pois: tuple[Point, ...]
 
 
 def random_terrain(family: Family, *, size_m: float, density: float, seed: int) -> Terrain:

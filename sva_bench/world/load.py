@@ -19,6 +19,7 @@ from sva_bench.world.clearance import clearance
 from sva_bench.world.maps import read_movingai_map, read_ros_map
 from sva_bench.world.model import MapSource, Noise, Obstacles, Robot, Scenario, Site, SiteKind, World
 from sva_bench.world.near import open_heading, view_checker
+from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
 from sva_bench.world.schema import (
     KIND,
     Box,
@@ -26,11 +27,16 @@ from sva_bench.world.schema import (
     Drawn,
     Joint,
     Map,
+    RandomPois,
     RobotEntry,
     Shapes,
     SiteEntry,
+    Sites,
+    SpreadStations,
     WorldFile,
 )
+
+_Entry = tuple[SiteKind, str, SiteEntry, tuple[str, ...]]  # a site, and where the file speaks of it
 
 
 def load_world(path: Path) -> World:
@@ -50,7 +56,9 @@ def world_of(document: Document) -> World:
     """
     file = validate(document, WorldFile, KIND)
     obstacles, source = _map(document, file.map)
-    robots = tuple(_robot(document, name, entry, list(file.sites.pois)) for name, entry in file.robots.items())
+    pois = [f"p{k + 1}" for k in range(file.sites.pois.random)] if isinstance(file.sites.pois, RandomPois) else list(
+        file.sites.pois)
+    robots = tuple(_robot(document, name, entry, pois) for name, entry in file.robots.items())
     widest = max(robot.model.radius_m for robot in robots)
     sites = _sites(document, file, obstacles, widest)
     plan, execute = (
@@ -105,10 +113,10 @@ def obstacles_of(shapes: Shapes) -> Obstacles:
 
 
 def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: float) -> tuple[Site, ...]:
-    entries: list[tuple[SiteKind, str, SiteEntry, tuple[str, ...]]] = [
-        ("base", "base", file.sites.base, ("sites", "base"))]
-    entries += [("station", name, e, ("sites", "stations", name)) for name, e in file.sites.stations.items()]
-    entries += [("poi", name, e, ("sites", "pois", name)) for name, e in file.sites.pois.items()]
+    base: _Entry = ("base", "base", file.sites.base, ("sites", "base"))
+    entries = [base]
+    if clearance(obstacles, *file.sites.base.at_m) >= widest_m:  # else that is what to mend first
+        entries += _stations_and_pois(document, file.sites, obstacles, widest_m)
     sites: list[Site] = []
     sight = view_checker(obstacles)
     for kind, name, entry, loc in entries:
@@ -128,6 +136,39 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
             if math.hypot(site.x_m - other.x_m, site.y_m - other.y_m) < 0.01:
                 raise document.error(entries[k][3], f"{site.name} and {other.name} are in one place; move one of them")
     return tuple(sites)
+
+
+def _stations_and_pois(document: Document, sites: Sites, obstacles: Obstacles, widest_m: float) -> list[_Entry]:
+    """Those that the file names, and those that it leaves to us."""
+    spread = sites.stations if isinstance(sites.stations, SpreadStations) else None
+    drawn = sites.pois if isinstance(sites.pois, RandomPois) else None
+    stations: list[_Entry] = [] if isinstance(sites.stations, SpreadStations) else [
+        ("station", name, entry, ("sites", "stations", name)) for name, entry in sites.stations.items()]
+    pois: list[_Entry] = [] if isinstance(sites.pois, RandomPois) else [
+        ("poi", name, entry, ("sites", "pois", name)) for name, entry in sites.pois.items()]
+    if spread is None and drawn is None:
+        return stations + pois
+    x, y = sites.base.at_m
+    try:
+        places, _ = find_places(
+            field_of(obstacles), base=(x, y), radius_m=widest_m, stations=0 if spread is None else spread.spread,
+            pois=0 if drawn is None else drawn.random, seed=0 if drawn is None else drawn.seed,
+            spacing_m=APART_M if drawn is None else drawn.min_spacing_m,
+            others=[(entry.at_m[0], entry.at_m[1]) for _, _, entry, _ in stations + pois])
+    except NoRoom as error:
+        if error.kind == "base":
+            raise document.error(("sites", "base", "at_m"), "there is too little room about the base to place sites "
+                                 "that are reached from it: move it to where there is more") from None
+        raise document.error(("sites", error.kind), f"{error}; choose fewer, or "
+                             f"{'a smaller min_spacing_m' if drawn else 'a base with more free ground about it'}"
+                             ) from None
+    if spread is not None:
+        stations = [("station", f"r{k}", SiteEntry(at_m=list(at), stop_s=spread.stop_s), ("sites", "stations"))
+                    for k, at in enumerate(places.stations, start=1)]
+    if drawn is not None:
+        pois = [("poi", f"p{k}", SiteEntry(at_m=list(at), stop_s=drawn.stop_s), ("sites", "pois"))
+                for k, at in enumerate(places.pois, start=1)]
+    return stations + pois
 
 
 def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) -> Robot:

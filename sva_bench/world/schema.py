@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from sva_bench.documents import Bounded, Name, Number, Positive, Probability, Section, WholeNumber
 from sva_bench.mission.failures import FailureProcess
+from sva_bench.world.places import APART_M
 
 KIND = "sva-bench/world@1"
 Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
@@ -101,10 +102,37 @@ class SiteEntry(Section):
     stop_s: Bounded = 0.0
 
 
+class SpreadStations(Section):
+    """Stations placed as far apart as can be."""
+
+    spread: Annotated[WholeNumber, Field(ge=1, le=100)]
+    stop_s: Bounded = 0.0
+
+
+class RandomPois(Section):
+    """POIs drawn from what is free and connected to the base."""
+
+    random: Annotated[WholeNumber, Field(ge=1, le=1000)]
+    seed: WholeNumber
+    min_spacing_m: Annotated[Positive, Field(ge=0.01, le=1000)] = APART_M
+    stop_s: Bounded = 0.0
+
+
+def _how_placed(data: object) -> str:
+    """Whether sites are named or to be placed: a site may be called ``random`` too, but it is no number."""
+    placed = isinstance(data, dict) and any(
+        key in data and not isinstance(data[key], dict) for key in ("random", "spread"))
+    return "[placed]" if placed else "[named]"
+
+
 class Sites(Section):
     base: SiteEntry
-    stations: Annotated[dict[Name, SiteEntry], _EMPTY_IS_NONE] = Field(default_factory=dict)
-    pois: dict[Name, SiteEntry]
+    stations: Annotated[
+        Annotated[dict[Name, SiteEntry], Tag("[named]")] | Annotated[SpreadStations, Tag("[placed]")],
+        Discriminator(_how_placed), _EMPTY_IS_NONE] = Field(default_factory=dict)
+    pois: Annotated[
+        Annotated[dict[Name, SiteEntry], Tag("[named]")] | Annotated[RandomPois, Tag("[placed]")],
+        Discriminator(_how_placed)]
 
 
 class Figures(Section):
