@@ -10,7 +10,7 @@ import io
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -27,16 +27,19 @@ from matplotlib.ticker import MultipleLocator
 
 from sva_bench.analysis.labels import place_labels
 from sva_bench.arrays import FloatArray
+from sva_bench.world.cells import TooRagged, bounds_of, boxes_of
 from sva_bench.world.model import SiteKind, World
 
 Kind = Literal["png", "svg"]
 
 OBSTACLE_RGB = (150, 150, 150)
 """Colour of obstacles and outer walls; what is free stays white."""
+UNKNOWN_RGB = (214, 214, 214)
+"""Colour of what counts as occupied since nothing is known of it."""
 DPI = 200
 """Resolution of pictures in pixels."""
 
-_GREY = "#969696"
+_GREY, _LIGHT_GREY = "#969696", "#d6d6d6"
 _MARKERS: dict[SiteKind, tuple[str, str, float]] = {  # shape, colour, size [pt]
     "base": ("s", "#000000", 10.0), "station": ("^", "#0072B2", 9.5), "poi": ("o", "#E69F00", 7.5)}
 _KINDS: dict[SiteKind, str] = {"base": "base", "station": "refuelling station", "poi": "point of interest"}
@@ -83,7 +86,8 @@ class Frame:
         width_in, height_in: Size of the picture.
         left_in, bottom_in: Lower left corner of the map.
         in_per_m: Scale.
-        x0_m, y0_m, x1_m, y1_m: What the map shows: the bounds and the wall about them.
+        x0_m, y0_m, x1_m, y1_m: What the map shows: the bounds and the wall about them, or of an occupancy grid as
+            much about what is free.
     """
 
     width_in: float
@@ -105,7 +109,7 @@ class Frame:
 
 def frame_of(world: World) -> Frame:
     """The frame of a world's picture: larger where there are many sites."""
-    x0, y0, x1, y1 = world.obstacles.bounds_m.tolist()
+    x0, y0, x1, y1 = _shown(world).tolist()
     longest = max(x1 - x0, y1 - y0)
     wall = 0.012 * longest
     in_per_m = min(max(1.55 * math.sqrt(len(world.sites)), 6.0), 16.0) / longest
@@ -113,6 +117,17 @@ def frame_of(world: World) -> Frame:
     return Frame(width_in=round(width + 3.0, 2), height_in=round(max(height + 1.05, 4.0), 2), left_in=0.6,
                  bottom_in=round(max(height + 1.05, 4.0), 2) - 0.45 - height, in_per_m=in_per_m, x0_m=x0 - wall,
                  y0_m=y0 - wall, x1_m=x1 + wall, y1_m=y1 + wall)
+
+
+def _shown(world: World) -> FloatArray:
+    """x_min, y_min, x_max, y_max [m] of what there is to see: maps of ROS often have wide margins of nothing."""
+    cells = world.obstacles.cells
+    if cells is None or cells.occupied.all():
+        return world.obstacles.bounds_m
+    rows, columns = (np.flatnonzero(~cells.occupied.all(axis=axis)) for axis in (1, 0))
+    free = replace(cells, occupied=np.zeros((np.ptp(rows) + 1, np.ptp(columns) + 1), dtype=np.bool_), unknown=None)
+    corner = cells.to_world(np.array([[columns[0], rows[0]]]) * cells.cell_m)[0]
+    return bounds_of(replace(free, origin=np.array([*corner, cells.origin[2]])))
 
 
 def draw_world(world: World, kind: Kind, overlays: Overlays) -> bytes:
@@ -155,14 +170,32 @@ def _map(figure: Figure, frame: Frame, world: World) -> Axes:
     axes.add_patch(Rectangle((frame.x0_m, frame.y0_m), frame.x1_m - frame.x0_m, frame.y1_m - frame.y0_m,
                              facecolor=_GREY, edgecolor="none", zorder=0))
     axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="white", edgecolor="none", zorder=0))
-    if len(world.obstacles.boxes):
+    for boxes, colour, order in _layers(world):
         # The hairline keeps boxes that touch from showing a seam.
         axes.add_collection(PolyCollection(
-            list(_corners(world.obstacles.boxes)), facecolors=_GREY, edgecolors=_GREY, linewidths=0.2, zorder=1,
-            rasterized=len(world.obstacles.boxes) > _MANY), autolim=False)
+            list(_corners(boxes)), facecolors=colour, edgecolors=colour, linewidths=0.2, zorder=order,
+            rasterized=len(boxes) > _MANY), autolim=False)
     for x, y, radius in world.obstacles.cylinders.tolist():
         axes.add_patch(Circle((x, y), radius, facecolor=_GREY, edgecolor="none", zorder=1))
     return axes
+
+
+def _layers(world: World) -> list[tuple[FloatArray, str, float]]:
+    """Boxes with their colours, from below: what is known to be occupied lies over what only counts as such."""
+    boxes, cells = world.obstacles.boxes, world.obstacles.cells
+    if not _has_unknown(world) or cells is None or cells.unknown is None:
+        return [(boxes, _GREY, 1.0)] if len(boxes) else []
+    try:
+        known = boxes_of(replace(cells, occupied=cells.occupied & ~cells.unknown, unknown=None))
+    except TooRagged:
+        return [(boxes, _LIGHT_GREY, 0.5)]
+    # Where a grid stands askew, the first four fill what is outside it.
+    return [(boxes, _LIGHT_GREY, 0.5), (known[4 if cells.origin[2] else 0:], _GREY, 1.0)]
+
+
+def _has_unknown(world: World) -> bool:
+    cells = world.obstacles.cells
+    return cells is not None and cells.unknown is not None and bool(cells.unknown.any())
 
 
 def _tick_step(length_m: float) -> float:
@@ -229,7 +262,7 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
     drawn = [_every(to_pixels(leg.path)) for legs in overlays.routes.values() for leg in legs]
     if len(overlays.paths) <= _MOST_MINDED:
         drawn += [_every(to_pixels(path), 16.0) for path in overlays.paths]
-    x0, y0, x1, y1 = world.obstacles.bounds_m.tolist()
+    x0, y0, x1, y1 = _shown(world).tolist()
     centres = place_labels(
         at, np.array([[max(box.width for box in group), sum(box.height for box in group)] for group in boxes]),
         radii=np.array([_MARKERS[site.kind][2] for site in world.sites]) * DPI / 72 / 2,
@@ -250,10 +283,12 @@ def _earned(world: World, poi: str) -> list[str]:
 
 
 def _within(world: World) -> FloatArray:
-    """Points in obstacles, about 0.2 m apart: where a label is harder to read."""
+    """Points in obstacles, about a hundred across the picture: where a label is harder to read."""
     points = []
+    x0, y0, x1, y1 = _shown(world).tolist()
+    step = max(x1 - x0, y1 - y0) / 100
     for x, y, hx, hy, yaw in world.obstacles.boxes[:_MANY].tolist():
-        a, b = (np.linspace(-h, h, min(int(2 * h / 0.2) + 2, 60)) for h in (hx, hy))
+        a, b = (np.linspace(-h, h, min(int(2 * h / step) + 2, 100)) for h in (hx, hy))
         grid = np.stack(np.meshgrid(a, b), axis=-1).reshape(-1, 2)
         points.append(grid @ np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]) + (x, y))
     for x, y, radius in world.obstacles.cylinders.tolist():
@@ -278,6 +313,8 @@ def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> N
             handles.append(Line2D([], [], linestyle="none", marker=marker, color=colour, markersize=size,
                                   markeredgecolor="black", markeredgewidth=0.8, label=_KINDS[kind]))
     handles.append(Patch(facecolor=_GREY, label="obstacle"))
+    if _has_unknown(world):
+        handles.append(Patch(facecolor=_LIGHT_GREY, label="unknown, counts as an obstacle"))
     if overlays.roadmap is not None:
         handles.append(Line2D([], [], color="#56B4E9", linewidth=0.8, label="roadmap"))
     if overlays.paths:

@@ -27,11 +27,14 @@ class Cells:
         occupied: Shape (rows, columns); row 0 is the lowest, column 0 the leftmost in the grid's own frame.
         cell_m: Side of a cell.
         origin: x, y [m] of the grid's lower left corner, and the yaw [rad] of its own frame; shape (3,).
+        unknown: Which of the occupied cells only count as such, since nothing is known of them; for looking at.
+            ``None`` where the map tells no difference.
     """
 
     occupied: BoolArray
     cell_m: float
     origin: FloatArray
+    unknown: BoolArray | None = None
 
     def __post_init__(self) -> None:
         occupied = np.array(self.occupied, dtype=np.bool_)
@@ -41,6 +44,12 @@ class Cells:
             raise ValueError(f"expected cells with a size, got {self.cell_m}")
         occupied.setflags(write=False)
         object.__setattr__(self, "occupied", occupied)
+        if self.unknown is not None:
+            unknown = np.array(self.unknown, dtype=np.bool_)
+            if unknown.shape != occupied.shape or (unknown & ~occupied).any():
+                raise ValueError("expected unknown cells among the occupied ones")
+            unknown.setflags(write=False)
+            object.__setattr__(self, "unknown", unknown)
         object.__setattr__(self, "origin", frozen(self.origin, (3,)))
 
     @property

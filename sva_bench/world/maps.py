@@ -95,7 +95,8 @@ def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[
     if max(rows, columns) * cell_m > WIDEST_M:
         raise document.error(("resolution",), f"{columns} x {rows} cells of {cell_m} m; a world may be at most "
                              f"{WIDEST_M:g} m wide")
-    cells = Cells(occupied=solid[::-1], cell_m=cell_m, origin=np.array(origin))
+    cells = Cells(occupied=solid[::-1], cell_m=cell_m, origin=np.array(origin),
+                  unknown=(solid & (value < 100 * occupied))[::-1])
     return cells, (MapFile(name=_normal(name), content=_content(path)), MapFile(name=image_name, content=content))
 
 

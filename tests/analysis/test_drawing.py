@@ -9,16 +9,23 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+import pybullet
 import pytest
 from matplotlib.image import imread
+from numpy.testing import assert_array_equal
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.analysis.drawing import _ROUTES, OBSTACLE_RGB, Kind, Leg, Overlays, draw_world, frame_of
+from sva_bench.analysis.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world, frame_of
 from sva_bench.analysis.labels import place_labels
 from sva_bench.arrays import FloatArray
+from sva_bench.execution.simulator import obstacles_urdf
+from sva_bench.world.cells import bounds_of, boxes_of
 from sva_bench.world.generate import Family, random_places, random_terrain
-from sva_bench.world.model import World
+from sva_bench.world.maps import read_ros_map
+from sva_bench.world.model import Obstacles, World
+from sva_bench.world.near import clearances
 from tests.oracles.distances import points_clearance
+from tests.world.maps_for_tests import write_ros_map
 from tests.worlds_for_tests import SMALL, world_of
 
 ROUTE = Leg(destination="p1", path=np.array([[0.8, 0.8], [2.2, 0.8]]))
@@ -59,6 +66,51 @@ def test_what_is_drawn_as_an_obstacle_is_one_and_what_is_white_is_free(family: s
         boxes=world.obstacles.boxes - np.array([0, 0, 2, 2, 0]) * pixel_m,
         cylinders=world.obstacles.cylinders - np.array([0, 0, 2]) * pixel_m)
     assert (points_clearance(smaller, places[white]) > 0).all()
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4])
+def test_picture_physics_and_planner_agree_on_what_is_free_on_a_map(yaw: float, small: World, tmp_path: Path) -> None:
+    write_ros_map(tmp_path, "???????????\n?????????##\n?##########\n##....#...#\n#..##.....#\n#.....##?.#\n###########",
+                  origin=f"[-1, 2, {yaw}]")
+    cells, _ = read_ros_map(tmp_path, "map.yaml")
+    obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes_of(cells), cylinders=np.empty((0, 3)), cells=cells)
+    x, y = cells.to_world(np.array([[1.0, 1.25]]))[0]
+    world = replace(small, obstacles=obstacles, sites=(replace(small.sites[0], x_m=float(x), y_m=float(y)),))
+    frame, image = frame_of(world), pixels(world, Overlays())
+    # The margin of nothing at the top is left out: only the rows with free cells and the frame's wall are seen.
+    assert (frame.y1_m - frame.y0_m) < 0.8 * (obstacles.bounds_m[3] - obstacles.bounds_m[1])
+
+    places = np.random.default_rng(0).uniform(
+        np.maximum([frame.x0_m, frame.y0_m], obstacles.bounds_m[:2]),
+        np.minimum([frame.x1_m, frame.y1_m], obstacles.bounds_m[2:]), (3000, 2))
+    gap = clearances(obstacles, places)
+    column, row = np.floor(cells.from_world(places) / cells.cell_m).astype(int).T
+    inside = (row >= 0) & (row < cells.occupied.shape[0]) & (column >= 0) & (column < cells.occupied.shape[1])
+    at = np.clip(row, 0, cells.occupied.shape[0] - 1), np.clip(column, 0, cells.occupied.shape[1] - 1)
+    free = inside & ~cells.occupied[at]
+    assert_array_equal(gap > 0, free)  # what the planner asks
+
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        (tmp_path / "obstacles.urdf").write_text(obstacles_urdf(obstacles))
+        pybullet.loadURDF(str(tmp_path / "obstacles.urdf"), useFixedBase=True, physicsClientId=client)
+        hits = [pybullet.rayTest([px, py, 2], [px, py, 0.01], physicsClientId=client)[0][0] for px, py in places]
+    finally:
+        pybullet.disconnect(physicsClientId=client)
+    assert_array_equal(np.array(hits) < 0, free)
+
+    # Pictures are exact to two pixels; and which cells are unknown is seen on them.
+    pixel_m = 1 / (frame.in_per_m * 200)
+    colours = np.array([image[frame.pixel(px, py)] for px, py in places])
+    known, unknown, white = ((colours == rgb).all(axis=1) for rgb in (OBSTACLE_RGB, UNKNOWN_RGB, 255))
+    assert (known | unknown | white).mean() > 0.9
+    assert (gap[known | unknown] < 2 * pixel_m).all()
+    local = cells.from_world(places) / cells.cell_m % 1.0
+    well_inside = (np.abs(local - 0.5) < 0.5 - 3 * pixel_m / cells.cell_m).all(axis=1) & (known | unknown | white)
+    assert free[well_inside & white].all()
+    assert cells.unknown is not None
+    assert_array_equal(unknown[well_inside & inside & ~free], cells.unknown[at][well_inside & inside & ~free])
+    assert unknown.sum() > 20
 
 
 def test_the_same_world_gives_the_same_bytes_whatever_the_user_has_set_up(small: World) -> None:
