@@ -14,7 +14,7 @@ from sva_bench.world.model import Obstacles
 from sva_bench.world.near import keeps_clearance
 
 _GRAZE_M = 1e-4  # boundary samples keep this far outside, so that edges along the boundary are free
-_MOST_ARC_POINTS = 8000  # all pairs of them are looked at for tangents
+_MOST_ARC_POINTS = 40_000  # of a map of 2000 x 2000 cells full of corners
 
 
 def arc_points(obstacles: Obstacles, clearance_m: float, per_corner: int) -> FloatArray:
@@ -121,7 +121,7 @@ def _thinned(points: FloatArray, count: int) -> IntArray:
     gap = 0.0
     kept = np.arange(len(points))
     while len(kept) > count:
-        gap = max(gap * 1.25, 0.01)
+        gap = max(gap * 1.3, 0.01)
         kept = _apart(points, gap)
     return kept
 
@@ -130,15 +130,16 @@ def _thinned(points: FloatArray, count: int) -> IntArray:
 def _apart(points: FloatArray, gap: float) -> IntArray:
     """Indices of points of which no two are nearer than ``gap``: each that is far enough from those before it."""
     low_x, low_y = points[:, 0].min(), points[:, 1].min()
-    columns = math.floor((points[:, 0].max() - low_x) / gap) + 1
-    rows = math.floor((points[:, 1].max() - low_y) / gap) + 1
-    newest = np.full(columns * rows, -1, dtype=np.int64)  # of each square of side ``gap``
+    wide, high = points[:, 0].max() - low_x, points[:, 1].max() - low_y
+    side = max(gap, max(wide, high) / 1000)  # so many squares along each side at most
+    columns, rows = math.floor(wide / side) + 1, math.floor(high / side) + 1
+    newest = np.full(columns * rows, -1, dtype=np.int64)  # of each square
     before = np.full(len(points), -1, dtype=np.int64)  # the one that was kept there before it
     kept = np.empty(len(points), dtype=np.int64)
     count = 0
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
-        column, row = math.floor((x - low_x) / gap), math.floor((y - low_y) / gap)
+        column, row = math.floor((x - low_x) / side), math.floor((y - low_y) / side)
         far = True
         for r in range(max(row - 1, 0), min(row + 2, rows)):
             for c in range(max(column - 1, 0), min(column + 2, columns)):

@@ -17,41 +17,73 @@ from numba import njit
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.world.near import keeps_clear
 
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _touches(arc: FloatArray, dx: float, dy: float, length: float) -> bool:
-    """Whether a line from a point on an arc leaves the arc's circle on one side; it does from a point of its own."""
-    if math.isnan(arc[2]):
-        return True
-    rx, ry = arc[0] - arc[2], arc[1] - arc[3]
-    return bool(abs(rx * dx + ry * dy) <= arc[4] * math.hypot(rx, ry) * length)
+_MOST_PAIRS = 50_000_000  # of points that are looked at: a second or two
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
 def tangents(checker: FloatArray, arcs: FloatArray) -> IntArray:
-    """All free tangents.
+    """All free tangents; of very many points on arcs, those to points that are not too far away.
 
     Args:
         checker: As ``clearance_checker`` makes it.
-        arcs: Points on arcs, as ``arc_points`` gives them; points of their own have centre NaN.
+        arcs: Points on arcs, as ``arc_points`` gives them; points of their own have centre NaN, and their tangents any
+            length.
 
     Returns:
         Indices of their ends, shape (k, 2).
     """
+    order = np.argsort(arcs[:, 0], kind="stable")
+    x0, y0, x1, y1 = checker[:4]
+    # Of points spread evenly, so many partners lie within the circle that there are _MOST_PAIRS.
+    longest = math.sqrt((x1 - x0) * (y1 - y0) * 2 * _MOST_PAIRS / math.pi) / max(len(arcs), 1)
+    out = arcs[order, :2] - arcs[order, 2:4]
+    out /= np.hypot(out[:, 0], out[:, 1])[:, None]
+    alone = np.isnan(out[:, 0])
+    out[alone] = 0.0  # at right angles to every line: tangent to all
+    ends = np.column_stack([arcs[order, :2], out, arcs[order, 4] ** 2])
+    found: IntArray = order[_tangents(checker, ends, np.flatnonzero(alone), longest)]
+    return found
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _tangents(checker: FloatArray, ends: FloatArray, own: IntArray, longest: float) -> IntArray:
+    """The same.
+
+    Args:
+        checker: As ``clearance_checker`` makes it.
+        ends: x, y, the direction from the arc's centre, and the squared tolerance; in order of x, shape (n, 5).
+        own: Indices of points of their own.
+        longest: Length of tangents between arcs [m].
+    """
     found = np.empty((1024, 2), dtype=np.int64)
     count = 0
-    for i in range(len(arcs)):
-        for j in range(i):
-            dx, dy = arcs[j, 0] - arcs[i, 0], arcs[j, 1] - arcs[i, 1]
-            length = math.hypot(dx, dy)
-            if (_touches(arcs[i], dx, dy, length) and _touches(arcs[j], dx, dy, length)
-                    and keeps_clear(checker, arcs[i, 0], arcs[i, 1], arcs[j, 0], arcs[j, 1])):
+    for i in range(len(ends)):
+        x, y, nx, ny, slack = ends[i]
+        alone = nx == 0.0 and ny == 0.0
+        j = i - 1
+        before = len(own) - 1  # once the others are too far away, only points of their own are left
+        while True:
+            if j >= 0 and x - ends[j, 0] > longest and not alone:
+                while before >= 0 and own[before] > j:
+                    before -= 1
+                if before < 0:
+                    break
+                j = own[before]
+            if j < 0:
+                break
+            dx, dy = ends[j, 0] - x, ends[j, 1] - y
+            squared = dx * dx + dy * dy
+            mx, my = ends[j, 2], ends[j, 3]
+            # Within so much of a right angle to the radius a line touches the arc.
+            if ((nx * dx + ny * dy) ** 2 <= slack * squared and (mx * dx + my * dy) ** 2 <= ends[j, 4] * squared
+                    and (squared <= longest * longest or alone or (mx == 0.0 and my == 0.0))
+                    and keeps_clear(checker, x, y, ends[j, 0], ends[j, 1])):
                 if count == len(found):
                     grown = np.empty((2 * count, 2), dtype=np.int64)
                     grown[:count] = found
                     found = grown
                 found[count, 0], found[count, 1] = i, j
                 count += 1
+            j -= 1
     return found[:count].copy()
 
 
