@@ -91,8 +91,9 @@ def boxes_of(cells: Cells) -> FloatArray:
     yaw = float(cells.origin[2])
     spans = cover(cells.occupied) * cells.cell_m  # x0, y0, x1, y1
     if yaw != 0:
-        (w, h), around = cells.size_m, bounds_of(cells)
-        t = math.hypot(around[2] - around[0], around[3] - around[1])
+        (w, h), (left, low, right, top) = cells.size_m, bounds_of(cells)
+        own = cells.from_world(np.array([[left, low], [right, low], [right, top], [left, top]]))
+        t = float(max(-own.min(), (own - (w, h)).max())) + cells.cell_m  # beyond the farthest corner of the rectangle
         spans = np.concatenate([[(-t, -t, 0, h + t), (w, -t, w + t, h + t), (0, -t, w, 0), (0, h, w, h + t)], spans])
     centres = cells.to_world((spans[:, :2] + spans[:, 2:]) / 2)
     halves = (spans[:, 2:] - spans[:, :2]) / 2
