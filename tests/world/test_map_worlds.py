@@ -13,6 +13,7 @@ from sva_bench.batch import settings_of
 from sva_bench.bench import Options, run
 from sva_bench.documents import pretty_json
 from sva_bench.errors import BadFile
+from sva_bench.inputs import about
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.travel.times import UnreachableSite, plan_travel_times
 from sva_bench.world.load import load_world, world_as_dict
@@ -114,3 +115,12 @@ def test_the_complaint_of_a_door_too_narrow_says_which_robot_would_fit(tmp_path:
         plan_travel_times(world, wide)
     assert caught.value.destinations == ("r1", "p2")
     plan_travel_times(world, replace(wide, radius_m=caught.value.widest_m))
+
+
+def test_where_nothing_is_reached_the_base_is_told_to_move(tmp_path: Path) -> None:
+    world = two_rooms(tmp_path, WORLD.replace("[1, 2.5]", "[4, 1.8]"))  # all sites but the base are beyond the door
+    wide = replace(world.robots[0].model, radius_m=0.49)
+    with pytest.raises(BadFile, match="no path from 'base' to 'r1', 'p1', 'p2'") as caught, about(
+            tmp_path / "world.yaml"):
+        plan_travel_times(world, wide)
+    assert caught.value.key == "sites.base"
