@@ -97,7 +97,8 @@ def test_picture_physics_and_planner_agree_on_what_is_free_on_a_map(yaw: float, 
         hits = [pybullet.rayTest([px, py, 2], [px, py, 0.01], physicsClientId=client)[0][0] for px, py in places]
     finally:
         pybullet.disconnect(physicsClientId=client)
-    assert_array_equal(np.array(hits) < 0, free)
+    sure = ~free | (gap > 1e-3)  # a ray that grazes a box turned askew may hit it
+    assert_array_equal((np.array(hits) < 0)[sure], free[sure])
 
     # Pictures are exact to two pixels; and which cells are unknown is seen on them.
     pixel_m = 1 / (frame.in_per_m * 200)
