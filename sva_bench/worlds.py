@@ -9,15 +9,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sva_bench.documents import NAME, Loc, parse_yaml, pretty_yaml
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.robot.model import BUILT_IN, USUAL_MODEL
-from sva_bench.world.cells import MAX_BOXES, TooRagged, cover, distance_field
+from sva_bench.world.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
+from sva_bench.world.clearance import clearance
 from sva_bench.world.generate import DENSITY, Family, random_places, random_terrain
 from sva_bench.world.load import world_of
 from sva_bench.world.maps import MapFile, Unknown, read_movingai_map, read_ros_map
-from sva_bench.world.places import NoRoom, Point, find_places
+from sva_bench.world.model import Obstacles
+from sva_bench.world.places import NoRoom, Point, field_of, find_places
 from sva_bench.world.schema import KIND
 
 STATION_STOP_S = 10
@@ -110,14 +114,16 @@ def world_from_map(
         cells, read = read_ros_map(source.parent, source.name, unknown)
         section = {"ros": {"file": f"{name}-map/{read[0].name}"} | ({"unknown": unknown} if unknown == "free" else {})}
     try:
-        cover(cells.occupied)
+        obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes_of(cells), cylinders=np.empty((0, 3)), cells=cells)
     except TooRagged:
         raise BadInput(f"{source}: its occupied cells take more than the {MAX_BOXES} boxes that physics holds; clean "
                        "the map of speckles, or cut it") from None
     radius = BUILT_IN[USUAL_MODEL].radius_m
     progress("placing the sites", 0, 1)
     try:
-        places, spacing = find_places(distance_field(cells), base=base, radius_m=radius, stations=stations, pois=pois,
+        if base is not None and clearance(obstacles, *base) < radius:
+            raise NoRoom("base", 0, 0.0)
+        places, spacing = find_places(field_of(obstacles), base=base, radius_m=radius, stations=stations, pois=pois,
                                       spacing_m=spacing_m, seed=seed)
     except NoRoom as error:
         where = "at the base" if error.kind == "base" and base else "on this map"

@@ -112,6 +112,8 @@ def find_places(
         if here is None:
             continue
         region = _region_about(field, here, needed)
+        if not region.any():
+            continue
         area = float(region.sum()) * (field.cells.cell_m / 2) ** 2
         widest = _LOOSE * math.sqrt(area / (1 + stations + pois + len(others)))
         try:
