@@ -101,14 +101,21 @@ class Planned:
         instance: What they were made for.
         stochastic, deterministic: The plans.
         vss_range: Least and greatest modelled VSS over all deterministic plans that tie, under ``mission``.
-        evpi: Expected value of perfect information under ``mission``; ``None`` if it wasn't worked out.
+        worst: The deterministic plan that ties and has that greatest VSS; ``None`` where no tie makes a difference.
+        ws: Expected value of knowing beforehand who is available, under ``mission``; ``None`` if it wasn't worked out.
+        evpi: What that is worth beyond the stochastic plan.
+        value_of_process: Greatest value under failures along the route less that of the plan for ``mission``; ``None``
+            where such failures are neither planned for nor executed.
     """
 
     instance: Instance
     stochastic: Plan
     deterministic: Plan
     vss_range: tuple[float, float]
+    worst: Plan | None
+    ws: float | None
     evpi: float | None
+    value_of_process: float | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -141,11 +148,23 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
     settings = _settings(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios for name, plan in (
         ("stochastic", planned[scenario.name].stochastic), ("deterministic", planned[scenario.name].deterministic))]
+    if _model_is_executed(world):  # what the VSS would be against the least fortunate of the tied plans
+        cases += [Case(scenario=scenario, planner=_WORST, plan=worst) for scenario in world.scenarios
+                  if (worst := planned[scenario.name].worst) is not None]
     with clock.phase("execution"):
         executed = execute(world, costs, cases, settings, executor,
                            lambda done, of: progress("driving routes", done, of))
-    return Measured(costs=costs, planned=planned, executed=executed, clock=clock,
+    return Measured(costs=costs, planned=planned, clock=clock,
+                    executed=[run for run in executed if run.case.planner != _WORST],
                     summary=summarise(world, options, settings, costs, planned, executed))
+
+
+_WORST = "deterministic, worst of its ties"
+
+
+def _model_is_executed(world: World) -> bool:
+    """Whether failures are planned for and executed as in the two-stage model."""
+    return world.plan_failure == world.execute_failure == "mission"
 
 
 def execute_plans(
@@ -327,13 +346,18 @@ def plan_scenarios(
         pair = plan_deterministic(instance, stochastic, options.limits, nominal=nominal, known=known)
         rp = expected_value(instance, pair.stochastic)
         foresight = wait_and_see(instance, options.limits, known, force=options.evpi)
-        if world.plan_failure == "per_leg":
+        process = None
+        if "per_leg" in (world.plan_failure, world.execute_failure):
             along = replace(instance, failure="per_leg")
-            pair = replace(pair, stochastic=plan_stochastic(along, options.limits, pair.stochastic, known))
+            best = plan_stochastic(along, options.limits, pair.stochastic, known)
+            process = max(expected_value(along, best) - expected_value(along, pair.stochastic), 0.0)
+            if world.plan_failure == "per_leg":
+                pair = replace(pair, stochastic=best)
         planned[scenario.name] = Planned(
             instance=instance, stochastic=pair.stochastic, deterministic=pair.plan,
-            vss_range=(rp - pair.most, rp - pair.least),
-            evpi=None if foresight is None else max(foresight - rp, 0.0))
+            vss_range=(rp - pair.most, rp - pair.least), worst=pair.worst,
+            ws=None if foresight is None else max(foresight, rp),
+            evpi=None if foresight is None else max(foresight - rp, 0.0), value_of_process=process)
         progress("solving", number + 1, len(world.scenarios))
     return planned
 
@@ -352,7 +376,7 @@ def summarise(
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     runs = _by_stem(executed)
-    mission = world.plan_failure == world.execute_failure == "mission"
+    mission = _model_is_executed(world)
     robots = [robot.name for robot in world.robots]
     scenarios = []
     for scenario in world.scenarios:
@@ -364,7 +388,9 @@ def summarise(
             stochastic=judged["stochastic"], deterministic=judged["deterministic"],
             modelled_range=plans.vss_range if mission else None,
             # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
-            vss_mean_value=0.0 if mission else None, evpi=plans.evpi if mission else None,
+            vss_mean_value=0.0 if mission else None, worst=runs.get(f"{scenario.name}-{_WORST}"),
+            ws=plans.ws if mission else None, evpi=plans.evpi if mission else None,
+            value_of_process=plans.value_of_process,
         ), robots, noisy=not world.noise.silent))
     proved = all(plan.status == "optimal" for p in planned.values() for plan in (p.stochastic, p.deterministic))
     return _head(world, options, settings, costs) | {"reproducible": proved, "scenarios": scenarios}

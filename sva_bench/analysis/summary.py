@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.statistics import Estimate, estimate
+from sva_bench.analysis.statistics import Estimate, controlled, distribution, estimate, share
+from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.execution.execute import Executed
 from sva_bench.execution.outcome import ENDS
 
@@ -34,24 +35,33 @@ class ScenarioResult:
     Attributes:
         stochastic, deterministic: The two plans.
         modelled_range: Smallest and greatest modelled VSS over all deterministic plans that tie.
+        worst: The deterministic plan that ties and is worth least; ``None`` where none is worth less.
         vss_mean_value: Birge's VSS, of the plan for the mean scenario; ``None`` under ``per_leg``.
+        ws: Value of knowing beforehand who is available (wait and see); ``None`` if not computed.
         evpi: Expected value of perfect information; ``None`` if not computed.
+        value_of_process: What planning for failures along the route is worth under them; ``None`` under ``mission``.
     """
 
     stochastic: Judged
     deterministic: Judged
     modelled_range: tuple[float, float] | None
+    worst: Executed | None = None
     vss_mean_value: float | None
+    ws: float | None
     evpi: float | None
+    value_of_process: float | None
 
 
 def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
     """One entry of ``scenarios`` in ``summary.json``."""
     s, d = result.stochastic, result.deterministic
-    scenario = s.executed.case.scenario
-    difference = estimate(_totals(s.executed) - _totals(d.executed), s.executed.rollout, noisy=noisy)
+    scenario, rollout = s.executed.case.scenario, s.executed.rollout
+    earned = totals(s.executed)
+    difference = estimate(earned - totals(d.executed), rollout, noisy=noisy)
     modelled = s.expected - d.expected
-    executed_mean = float(np.mean(_totals(s.executed)))
+    sharper = controlled(earned - totals(d.executed), _drawn(s.executed) - _drawn(d.executed), modelled, rollout,
+                         noisy=noisy)
+    ends = [difference.mean, *([float(np.mean(earned - totals(result.worst)))] if result.worst else [])]
     return {
         "name": scenario.name,
         "availability": {name: scenario.availability[name] for name in robots},
@@ -61,12 +71,28 @@ def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bo
             "modelled_pct": _percent(modelled, s.expected),
             "modelled_range": None if result.modelled_range is None else [x + 0.0 for x in result.modelled_range],
             "executed": difference.as_dict(),
-            "executed_pct": _percent(difference.mean, executed_mean),
+            "executed_pct": _percent(difference.mean, float(np.mean(earned))),
+            "executed_range": None if result.modelled_range is None else [min(ends) + 0.0, max(ends) + 0.0],
+            "executed_controlled": sharper.as_dict(),
             "distinguishable": difference.distinguishable,
+            "verdict": verdict_of(difference, "stochastic", "deterministic"),
         },
         "vss_mean_value": result.vss_mean_value,
+        # The plan for the mean is the stochastic plan itself, drive for drive.
+        "vss_mean_value_executed": result.vss_mean_value,
+        "ws": result.ws,
         "evpi": result.evpi,
+        "value_of_process": result.value_of_process,
     }
+
+
+def verdict_of(difference: Estimate, a: str, b: str) -> str:
+    """Which of two plans is worth more, in words, if that can be told."""
+    if difference.interval is None:
+        return "no interval"
+    if not difference.distinguishable:
+        return "not distinguishable from zero"
+    return f"{a if difference.mean > 0 else b} is worth more"
 
 
 def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
@@ -74,7 +100,7 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
     scenario = plans[0].executed.case.scenario
     comparisons = []
     for a, b in combinations(plans, 2):
-        difference = estimate(_totals(a.executed) - _totals(b.executed), a.executed.rollout, noisy=noisy)
+        difference = estimate(totals(a.executed) - totals(b.executed), a.executed.rollout, noisy=noisy)
         comparisons.append({"a": a.executed.case.planner, "b": b.executed.case.planner, **difference.as_dict(),
                             "distinguishable": difference.distinguishable})
     return {
@@ -88,7 +114,8 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
 def plan_summary(judged: Judged, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
     """What one plan promised and what came of it."""
     run, plan = judged.executed, judged.executed.case.plan
-    executed: Estimate = estimate(_totals(run), run.rollout, noisy=noisy)
+    earned = totals(run)
+    executed = estimate(earned, run.rollout, noisy=noisy)
     counts = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
     return {
         "promised": judged.expected if plan.value is None else plan.value,
@@ -96,8 +123,12 @@ def plan_summary(judged: Judged, robots: Sequence[str], *, noisy: bool) -> dict[
         "status": plan.status,
         "expected": judged.expected + 0.0,
         "executed": executed.as_dict(),
+        "executed_controlled": controlled(earned, _drawn(run), judged.expected, run.rollout, noisy=noisy).as_dict(),
+        "distribution": distribution(earned),
         "by_robot": {name: float(run.incentive[:, k].mean()) for k, name in enumerate(robots)},
         "ends": {end: count for end, count in counts.items() if count},
+        "end_shares": {name: {end: _share(run.end[:, k] == ENDS.index(end), run, noisy=noisy) for end in ENDS
+                              if (run.end[:, k] == ENDS.index(end)).any()} for k, name in enumerate(robots)},
         "ledger": ledger(judged, executed.mean),
     }
 
@@ -118,9 +149,20 @@ def ledger(judged: Judged, executed: float) -> dict[str, float]:
     return {"promised": promised, "assumption": assumption + 0.0, "draws": draws + 0.0, **charged, "executed": executed}
 
 
-def _totals(run: Executed) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    totals: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = run.incentive.sum(axis=1)
-    return totals
+def totals(run: Executed) -> FloatArray:
+    """What the robots collected together, shape (trials,)."""
+    collected: FloatArray = run.incentive.sum(axis=1)
+    return collected
+
+
+def _drawn(run: Executed) -> FloatArray:
+    drawn: FloatArray = run.drawn_incentive.sum(axis=1)
+    return drawn
+
+
+def _share(happened: BoolArray, run: Executed, *, noisy: bool) -> dict[str, Any]:
+    found = share(happened.astype(np.float64), run.rollout, noisy=noisy).as_dict()
+    return {"share": found["mean"], "ci95": found["ci95"]}
 
 
 def _percent(part: float, whole: float) -> float | None:

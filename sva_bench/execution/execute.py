@@ -82,6 +82,7 @@ class Executed:
         end: Index into ``ENDS``.
         end_time_s, fuel_used_s: When it ended, and on how much.
         planned_incentive: What each robot's route holds, shape (robots,).
+        drawn_incentive: What the failures drawn would have left of that, had nothing else gone wrong.
         legs: Every leg that was driven.
         traces: Trial 0 over time, a trace for each robot.
     """
@@ -96,6 +97,7 @@ class Executed:
     end_time_s: FloatArray
     fuel_used_s: FloatArray
     planned_incentive: FloatArray
+    drawn_incentive: FloatArray
     legs: tuple[LegTime, ...]
     traces: tuple[Trace, ...]
 
@@ -307,7 +309,16 @@ def _settle_all(
         case=case, rollout=rollout, available=fails == NEVER, incentive=incentive, pois_reached=pois,
         stops_reached=stops, end=end, end_time_s=end_time, fuel_used_s=fuel,
         planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
+        drawn_incentive=np.column_stack([_left_by_draws(o, fails[:, k]) for k, o in enumerate(orders)]),
         legs=tuple(_leg_times(world, costs, mine)), traces=tuple(traces))
+
+
+def _left_by_draws(orders: Assignment, fails: IntArray) -> FloatArray:
+    """What each trial's draw leaves of a route: the POIs before the failure, shape (trials,)."""
+    earned = [orders.incentives.get(site, 0.0) for site in orders.route if orders.is_poi(site)]
+    collected = np.concatenate([[0.0], np.cumsum(earned)])
+    left: FloatArray = collected[np.where(fails == NEVER, len(earned), np.maximum(fails - 1, 0))]
+    return left
 
 
 _NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))

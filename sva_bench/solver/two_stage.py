@@ -57,12 +57,14 @@ class DeterministicPlans:
         stochastic: The stochastic plan; the same routes where the two are worth the same.
         least: Least expected value of a plan with that sum of incentives.
         most: Greatest expected value of one.
+        worst: A plan of that least expected value; ``None`` where none is worth less than ``plan``.
     """
 
     plan: Plan
     stochastic: Plan
     least: float
     most: float
+    worst: Plan | None
 
 
 def plan_stochastic(
@@ -171,8 +173,14 @@ def plan_deterministic(
         stochastic = _certified(instance, replace(
             stochastic, routes=plan.routes, fuel_s=plan.fuel_s, value=expected,
             bound=None if stochastic.bound is None else max(stochastic.bound, expected)))
-    return DeterministicPlans(plan=plan, stochastic=stochastic, most=expected,
-                              least=min(expected, ties.expected(least.orders) if least else expected))
+    lowest = min(expected, ties.expected(least.orders) if least else expected)
+    worst = None
+    if least and lowest < expected - TIE * max(1.0, abs(expected)):
+        total = _sum(_incentives(instance), least.orders)
+        worst = _finish(instance, "deterministic", least.orders, known, value=total,
+                        bound=max(plan.bound or total, total), status=plan.status or "feasible", solutions=[least],
+                        runtime_s=clock.used_s())
+    return DeterministicPlans(plan=plan, stochastic=stochastic, most=expected, least=lowest, worst=worst)
 
 
 def wait_and_see(

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import t as student_t
 
-from sva_bench.analysis.statistics import Estimate, estimate
+from sva_bench.analysis.statistics import Estimate, controlled, distribution, estimate, share, tail_mean
 from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.mission.failures import NEVER, FailureProcess, draw_failures, route_value
 
 
 def interval_of(found: Estimate) -> tuple[float, float]:
@@ -107,3 +108,110 @@ def test_without_noise_trials_are_independent_samples() -> None:
 def test_clusters_taken_for_independent_trials_would_be_wrong() -> None:
     # The reason for clustering: shared noise as strong as the trials' own leaves half of the intervals wrong.
     assert coverage(80, 8, shared_sd=1.0, noisy=False, seed=3, rounds=1000) < 0.75
+
+
+def test_intervals_that_are_to_hold_together_are_wider_by_hand() -> None:
+    # As above for four independent trials; three comparisons at 95 % together ask for t at 1 - 0.05 / 6 of 3 degrees.
+    found = estimate(np.array([1.0, 2, 3, 6]), np.array([0, 1, 0, 1]), noisy=False, comparisons=3)
+    assert interval_of(found)[1] - 3 == pytest.approx(student_t.ppf(1 - 0.05 / 6, 3) * math.sqrt(14 / 12))
+
+
+def test_three_comparisons_hold_together_in_95_per_cent_and_would_not_unadjusted() -> None:
+    rng, rollout = np.random.default_rng(4), np.arange(40)
+    plans = rng.normal(size=(1500, 3, 40))
+    pairs = [(0, 1), (0, 2), (1, 2)]
+
+    def all_hold(comparisons: int) -> float:
+        return float(np.mean([all(not estimate(trials[a] - trials[b], rollout, noisy=False, comparisons=comparisons)
+                                  .distinguishable for a, b in pairs) for trials in plans]))
+
+    assert all_hold(3) >= 0.94  # Bonferroni's errs on the safe side
+    assert all_hold(1) < 0.92
+
+
+def test_wilsons_interval_by_hand() -> None:
+    # 3 of 10: (0.3 + z2 / 20 -+ sqrt(z2 (0.21 + z2 / 40) / 10)) / (1 + z2 / 10), z = t(0.975, 9) = 2.26216.
+    happened = np.array([1.0, 1, 1, 0, 0, 0, 0, 0, 0, 0])
+    found = share(happened, np.zeros(10, dtype=np.int64), noisy=False)
+    # Their variance, 0.21 x 10 / 9 / 10, makes them worth nine trials: 0.21 / 0.02333 = 9.
+    z2, n = 2.2621571627409915**2, 9.0
+    half = math.sqrt(z2 * (0.21 + z2 / (4 * n)) / n) / (1 + z2 / n)
+    middle = (0.3 + z2 / (2 * n)) / (1 + z2 / n)
+    assert found.mean == pytest.approx(0.3)
+    assert interval_of(found) == pytest.approx((middle - half, middle + half))
+
+
+def test_what_never_happened_in_eight_noise_draws_may_still_happen() -> None:
+    # 8 / (8 + t2) of t(0.975, 7) = 2.36462: not one in 8 draws leaves up to 41 %, in however many trials.
+    found = share(np.zeros(8000), np.arange(8000) % 8, noisy=True)
+    assert interval_of(found) == pytest.approx((0.0, 1 - 8 / (8 + 2.364624251592785**2)))
+    assert share(np.zeros(1), np.zeros(1, dtype=np.int64), noisy=False).interval is None
+
+
+@pytest.mark.parametrize(("p", "shared"), [(0.5, 0.0), (0.1, 0.0), (0.3, 0.5)])
+def test_wilsons_interval_covers_too(p: float, shared: float) -> None:
+    # Trials of a rollout fail together with the chance ``shared``, each by itself otherwise.
+    rng, rollout = np.random.default_rng(5), np.arange(320) % 16
+    held = 0
+    for _ in range(1500):
+        together = rng.random(16) < shared
+        one, own = rng.random(16) < p, rng.random(320) < p
+        low, high = interval_of(share(np.where(together[rollout], one[rollout], own).astype(float), rollout,
+                                      noisy=True))
+        held += low <= p <= high
+    assert 0.92 <= held / 1500 <= 0.985  # four standard deviations of 1500 rounds: 0.023
+
+
+def test_the_worst_tenth_by_hand() -> None:
+    # 15 trials 1 .. 15: the worst tenth is one and a half of them: (1 + 0.5 x 2) / 1.5.
+    assert tail_mean(np.arange(15.0, 0, -1), 0.1) == pytest.approx(2 / 1.5)
+    assert tail_mean(np.array([7.0]), 0.1) == 7.0
+    found = distribution(np.arange(1.0, 101))
+    assert found == {"least": 1.0, "q05": 5.0, "q25": 25.0, "q50": 50.0, "q75": 75.0, "q95": 95.0, "greatest": 100.0,
+                     "cvar10": pytest.approx(5.5)}
+
+
+@pytest.mark.parametrize("process", ["mission", "per_leg"])
+def test_draws_come_to_the_closed_form_of_their_process(process: FailureProcess) -> None:
+    # POIs of 10, 20 and 30 at 0.8: 48 under mission; 8 + 12.8 + 15.36 = 36.16 per leg.
+    incentives, left = [10.0, 20.0, 30.0], np.array([0.0, 10.0, 30.0, 60.0])
+    expected = route_value(incentives, 0.8, process)
+    assert expected == pytest.approx({"mission": 48.0, "per_leg": 36.16}[process])
+    fails = draw_failures(0, ["uv1"], {"uv1": 0.8}, process, trials=100_000, pois=3)[:, 0]
+    drawn = left[np.where(fails == NEVER, 3, np.maximum(fails - 1, 0))]
+    low, high = interval_of(estimate(drawn, np.arange(100_000), noisy=False))
+    assert low <= expected <= high
+    assert high - low < 0.4
+
+
+@pytest.mark.parametrize("process", ["mission", "per_leg"])
+def test_a_control_from_the_closed_form_shrinks_the_interval_and_keeps_its_coverage(process: FailureProcess) -> None:
+    # What is driven: a rollout in four loses a tenth of what the draws leave, and a bit of noise on top.
+    incentives, left = [10.0, 20.0, 30.0], np.array([0.0, 10.0, 30.0, 60.0])
+    expected = route_value(incentives, 0.8, process)
+    truth, rollout, rng = expected * (1 - 0.1 * 0.25), np.arange(160) % 16, np.random.default_rng(6)
+    held, widths = 0, []
+    for seed in range(600):
+        fails = draw_failures(seed, ["uv1"], {"uv1": 0.8}, process, trials=160, pois=3)[:, 0]
+        drawn = left[np.where(fails == NEVER, 3, np.maximum(fails - 1, 0))]
+        driven = drawn * (1 - 0.1 * (rng.random(16) < 0.25)[rollout])
+        plain = estimate(driven, rollout, noisy=True)
+        found = controlled(driven, drawn, expected, rollout, noisy=True)
+        low, high = interval_of(found)
+        held += low <= truth <= high
+        widths.append((found.half_width or 0.0) / (plain.half_width or 1.0))
+    assert 0.92 <= held / 600 <= 0.985
+    assert np.mean(widths) < 0.5
+
+
+def test_where_all_went_as_drawn_the_control_leaves_the_closed_form() -> None:
+    drawn = np.array([0.0, 60.0, 60.0, 60.0, 0.0, 60.0])
+    found = controlled(drawn, drawn, 48.0, np.arange(6), noisy=False)
+    assert found.mean == pytest.approx(48.0)
+    assert found.half_width == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_control_that_never_varies_takes_nothing_out() -> None:
+    values, constant = np.array([1.0, 2, 3, 6]), np.full(4, 8.0)
+    assert controlled(values, constant, 8.0, np.arange(4), noisy=False) == estimate(values, np.arange(4), noisy=False)
+    assert controlled(values[:1], constant[:1], 8.0, np.zeros(1, dtype=np.int64), noisy=False).interval is None

@@ -30,6 +30,7 @@ def executed(incentive: list[list[float]], ends: list[list[End]], planned: list[
         case=Case(scenario=SCENARIO, planner=planner, plan=plan), rollout=np.arange(len(earned)) % rollouts,
         available=end != ENDS.index("failed"), incentive=earned, pois_reached=zeros, stops_reached=zeros, end=end,
         end_time_s=np.zeros(earned.shape), fuel_used_s=np.zeros(earned.shape), planned_incentive=np.array(planned),
+        drawn_incentive=np.where(end == ENDS.index("failed"), 0.0, np.array(planned)),
         legs=(), traces=())
 
 
@@ -97,7 +98,8 @@ def test_the_value_of_the_stochastic_solution_is_the_difference_of_paired_trials
                      planner="deterministic")
     result = ScenarioResult(
         stochastic=Judged(expected=130.0, executed=MIXED), deterministic=Judged(expected=120.0, executed=other),
-        modelled_range=(10.0, 25.0), vss_mean_value=0.0, evpi=None)
+        modelled_range=(10.0, 25.0), vss_mean_value=0.0, ws=None, evpi=None,
+        value_of_process=None)
     summary = scenario_summary(result, ROBOTS, noisy=True)
     # Each trial is 10 better, whatever the failures: the difference has no spread.
     assert summary["vss"]["executed"] == {"mean": 10.0, "ci95": [10.0, 10.0]}
@@ -116,8 +118,41 @@ def test_equal_plans_are_not_distinguishable_and_per_cent_of_nothing_is_none() -
     twin = replace(nothing, case=replace(nothing.case, planner="deterministic"))
     summary = scenario_summary(ScenarioResult(
         stochastic=Judged(expected=0.0, executed=nothing), deterministic=Judged(expected=0.0, executed=twin),
-        modelled_range=None, vss_mean_value=None, evpi=0.0), ROBOTS, noisy=True)
+        modelled_range=None, vss_mean_value=None, ws=0.0, evpi=0.0,
+        value_of_process=None), ROBOTS, noisy=True)
     assert not summary["vss"]["distinguishable"]
     assert summary["vss"]["modelled_pct"] is None
     assert summary["vss"]["executed_pct"] is None
     assert summary["vss"]["modelled_range"] is None
+
+
+def test_the_executed_range_goes_to_the_least_fortunate_of_the_tied_plans() -> None:
+    other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], [["home", "home"]] * 4, [90, 60], promised=150.0,
+                     planner="deterministic")
+    worst = replace(other, incentive=other.incentive - [5.0, 0.0])
+    summary = scenario_summary(ScenarioResult(
+        stochastic=Judged(expected=130.0, executed=MIXED), deterministic=Judged(expected=120.0, executed=other),
+        worst=worst, modelled_range=(10.0, 15.0), vss_mean_value=0.0, ws=140.0, evpi=10.0, value_of_process=None),
+        ROBOTS, noisy=True)
+    assert summary["vss"]["executed_range"] == pytest.approx([10.0, 15.0])
+    assert summary["vss"]["verdict"] == "stochastic is worth more"
+    assert (summary["ws"], summary["evpi"], summary["value_of_process"]) == (140.0, 10.0, None)
+
+
+def test_ends_are_counted_by_robot_with_their_intervals() -> None:
+    summary = plan_summary(Judged(expected=130.0, executed=MIXED), ROBOTS, noisy=True)
+    assert {end: found["share"] for end, found in summary["end_shares"]["uv1"].items()} == {
+        "home": 0.5, "late": 0.25, "stuck": 0.25}
+    low, high = summary["end_shares"]["uv1"]["late"]["ci95"]
+    assert 0 < low < 0.25 < high < 1
+    assert summary["distribution"]["least"] == 90.0
+    assert summary["distribution"]["cvar10"] == 90.0
+
+
+def test_one_trial_has_figures_and_no_intervals() -> None:
+    one = executed([[100, 60]], [["home", "home"]], [100.0, 60.0], promised=140.0, rollouts=1)
+    summary = plan_summary(Judged(expected=130.0, executed=one), ROBOTS, noisy=True)
+    assert summary["executed"] == {"mean": 160.0, "ci95": None}
+    assert summary["executed_controlled"] == {"mean": 130.0, "ci95": None}
+    assert summary["end_shares"]["uv2"] == {"home": {"share": 1.0, "ci95": None}}
+    assert summary["distribution"]["q50"] == 160.0
