@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.report import write_report
+from sva_bench.analysis.report import Content, write_report
 from sva_bench.analysis.summary import Judged, ScenarioResult, comparison_summary, scenario_summary
 from sva_bench.errors import ExitCode, SvaBenchError
 from sva_bench.execution.execute import Case, Executed, Fidelity, Settings, execute
@@ -23,6 +23,7 @@ from sva_bench.mission.instance import Instance, Vehicle, write_instance
 from sva_bench.mission.plan import Plan, read_plan, write_plan
 from sva_bench.recording.rerun import record
 from sva_bench.runs import (
+    leg_columns,
     manifest,
     run_folder,
     run_name,
@@ -285,12 +286,15 @@ def _publish(
                 write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
                 record(folder / "recordings" / f"{stem}.rrd", world, done.traces, title=f"{world.name} {stem}")
                 progress("recording", number + 1, len(executed))
-        write_legs(folder / "legs.parquet", executed)
+        legs = leg_columns(executed)
+        write_legs(folder / "legs.parquet", legs)
         write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots], options.fidelity)
         write_json(folder / "summary.json", summary)
-        write_report(folder / "report.html", summary, {k: v.case.plan for k, v in _by_stem(executed).items()}, world)
-        write_json(folder / "manifest.json", manifest(
-            resolved, options.seed, options.as_dict(), clock.started, clock.seconds))
+        told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
+        write_json(folder / "manifest.json", told)
+        write_report(folder / "report.html", Content(
+            summary=summary, routes={k: v.case.plan.routes for k, v in _by_stem(executed).items()}, legs=legs,
+            world=world, manifest=told))
     return Run(folder=out / name, summary=summary)
 
 

@@ -340,6 +340,19 @@ def view(
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
 
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)],
+    verbose: Verbose = False,
+) -> None:
+    """Write the report of a finished run again, from its tables."""
+    with holding_back_ctrl_c():
+        from sva_bench.stored import report_again
+
+    set_up_logging(verbose)
+    messages.print(f"written to [bold]{escape(str(report_again(folder)))}[/bold]", highlight=False)
+
+
 @app.callback(invoke_without_command=True)
 def _main(version: Annotated[bool, typer.Option("--version", help="Print the version.", is_eager=True)] = False
           ) -> None:

@@ -67,6 +67,23 @@ def run_folder(out: Path, name: str) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
+@contextlib.contextmanager
+def draft_of(path: Path) -> Iterator[Path]:
+    """A file that takes the place of another only when it is whole.
+
+    Raises:
+        BadInput: If it can't be written.
+    """
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        yield draft
+        draft.replace(path)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written ({error.strerror})") from None
+    finally:
+        draft.unlink(missing_ok=True)
+
+
 def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
              seconds: Mapping[str, float]) -> dict[str, Any]:
     """What was run, with what, where and how long: the only place for wall-clock times."""
@@ -111,16 +128,23 @@ def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
     _write(path, rows, {"raw_s": "s", "repaired_s": "s"})
 
 
-def write_legs(path: Path, executed: Sequence[Executed]) -> None:
-    """Write ``legs.parquet``: a row per leg that was driven."""
-    rows: dict[str, list[Any]] = {key: [] for key in (
-        "scenario", "planner", "rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s")}
+LEG_COLUMNS = ("scenario", "planner", "rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s")
+
+
+def leg_columns(executed: Sequence[Executed]) -> dict[str, list[Any]]:
+    """A row per leg that was driven."""
+    rows: dict[str, list[Any]] = {key: [] for key in LEG_COLUMNS}
     for run in executed:
         for leg in run.legs:
             rows["scenario"].append(run.case.scenario.name)
             rows["planner"].append(run.case.planner)
-            for key in ("rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s"):
+            for key in LEG_COLUMNS[2:]:
                 rows[key].append(getattr(leg, key))
+    return rows
+
+
+def write_legs(path: Path, rows: Mapping[str, Sequence[Any]]) -> None:
+    """Write ``legs.parquet``."""
     types = {key: pa.string() for key in ("scenario", "planner", "robot", "origin", "destination")}
     types |= {"rollout": pa.int64(), "leg": pa.int64(), "planned_s": pa.float64(), "driven_s": pa.float64()}
     _write(path, {key: pa.array(values, types[key]) for key, values in rows.items()},

@@ -97,7 +97,7 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 def print_summary(summary: Any) -> None:
     """Print a summary as a table, and what it comes to."""
-    from sva_bench.analysis.report import answer, verdict, with_interval
+    from sva_bench.analysis.wording import answer, vss_verdict, with_interval
 
     console = results()
     scenarios, travel = summary["scenarios"], summary["travel"]
@@ -114,8 +114,7 @@ def print_summary(summary: Any) -> None:
             worth = ["", "", ""] if compared else []
             if compared and number == 0:
                 vss, evpi = scenario["vss"], scenario["evpi"]
-                worth = [verdict(vss["executed"] | {"distinguishable": vss["distinguishable"]}),
-                         f"{vss['modelled']:.1f}", "" if evpi is None else f"{evpi:.1f}"]
+                worth = [vss_verdict(scenario), f"{vss['modelled']:.1f}", "" if evpi is None else f"{evpi:.1f}"]
             table.add_row(
                 "" if number else scenario["name"], name + proof, f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
                 with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()), *worth,
@@ -144,7 +143,7 @@ def print_summary(summary: Any) -> None:
 
 def print_batch(summary: Any) -> None:
     """Print a batch: a row per world, seed and scenario, then the VSS over maps."""
-    from sva_bench.analysis.report import verdict, with_interval
+    from sva_bench.analysis.wording import vss_verdict, with_interval
 
     console = results()
     worlds, seeds = len(summary["worlds"]), len(summary["seeds"])
@@ -159,7 +158,7 @@ def print_batch(summary: Any) -> None:
             table.add_row(
                 "" if number else unit["world"], "" if number else str(unit["seed"]), scenario["name"],
                 with_interval(plans["stochastic"]["executed"]), with_interval(plans["deterministic"]["executed"]),
-                verdict(vss["executed"] | {"distinguishable": vss["distinguishable"]}),
+                vss_verdict(scenario),
                 "" if vss["executed_pct"] is None else f"{vss['executed_pct']:.1f}",
                 end_section=number == len(unit["scenarios"]) - 1)
     console.print(table)

@@ -1,4 +1,6 @@
-"""Worlds as pictures, to scale, for print and for colour-blind readers. The only importer of matplotlib.
+"""Worlds as pictures, to scale, and the canvas of charts, for print and for colour-blind readers.
+
+The only importer of matplotlib.
 
 Colours are those of Okabe and Ito, and nothing is told apart by colour alone: kinds of sites differ in shape, robots in
 the style of their line. Same world, same picture, byte by byte.
@@ -6,16 +8,18 @@ the style of their line. Same world, same picture, byte by byte.
 
 from __future__ import annotations
 
+import html
 import io
 import math
+import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.axes import Axes as Axes  # charts draw on them
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
@@ -340,3 +344,35 @@ def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> N
 def _limits(fuel_s: float, mission_s: float) -> str:
     fuel = f"{fuel_s:g} s of fuel" if math.isfinite(fuel_s) else "fuel without end"
     return f"{fuel}, home in {mission_s:g} s" if math.isfinite(mission_s) else f"{fuel}, no time limit"
+
+
+def chart(name: str, title: str, size_in: tuple[float, float], draw: Callable[[Axes], None]) -> str:
+    """A chart as SVG that can stand in a page.
+
+    Args:
+        name: Unique in the page; its ids begin with it.
+        title: What it shows, for those who can't see it.
+        size_in: Width and height.
+        draw: Draws it.
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        # Words stay words: smaller, to be found and read aloud.
+        mpl.rcParams.update(_SETTINGS | {"svg.fonttype": "none", "font.size": 10.0, "axes.spines.top": False,
+                                         "axes.spines.right": False, "axes.axisbelow": True})
+        figure = Figure(figsize=size_in, facecolor="white", layout="constrained")
+        FigureCanvasAgg(figure)
+        draw(figure.add_subplot())
+        stream = io.StringIO()
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    return for_page(stream.getvalue(), name, title)
+
+
+def for_page(svg: str, name: str, title: str) -> str:
+    """An SVG file's picture, its ids its own and its title said."""
+    picture = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg"):], flags=re.DOTALL)
+    picture = re.sub(r'\bid="', f'id="{name}-', picture)
+    picture = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", picture)
+    said = html.escape(title)
+    return picture.replace("<svg ", f'<svg role="img" aria-label="{said}" ', 1).replace(
+        ">", f"><title>{said}</title>", 1).strip()

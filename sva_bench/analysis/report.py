@@ -1,97 +1,229 @@
-"""The report of a run: one self-contained page."""
+"""The report of a run, and that of a batch: the answer first, then what it rests on."""
 
 from __future__ import annotations
 
-import html
-import math
+import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sva_bench.mission.plan import Plan
+import numpy as np
+
+from sva_bench.analysis.page import figure, heading, note, table, text, write_page
+from sva_bench.analysis.wording import (
+    answer,
+    finding,
+    number,
+    optional,
+    per_cent,
+    verdict,
+    vss_verdict,
+    with_interval,
+)
 from sva_bench.world.model import World
 
-_STYLE = """
-body{font:16px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#1b1b1b}
-h1{font-size:1.6rem}h2{font-size:1.2rem;margin-top:2rem}
-.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
-th,td{padding:.3rem .7rem;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}
-th:first-child,td:first-child,.text{text-align:left}td.text{white-space:normal}svg{max-width:100%;height:auto}
-.note{color:#555}code{background:#f3f3f3;padding:.1rem .3rem}
-"""
-_COLOURS = {"base": "#000000", "station": "#0072B2", "poi": "#D55E00"}  # Okabe-Ito: told apart by all eyes
+_ENDS = ("home", "failed", "out_of_fuel", "late", "stuck")
+_WORST_LEGS = 10
+
+Scenarios = Sequence[Mapping[str, Any]]
 
 
-def write_report(path: Path, summary: Mapping[str, Any], plans: Mapping[str, Plan], world: World) -> None:
-    """Write ``report.html``.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Content:
+    """What a report is made of: all of it stands in the run folder.
 
-    Args:
-        path: Where to.
+    Attributes:
         summary: Content of ``summary.json``.
-        plans: The plans by ``<scenario>-<planner>``.
+        routes: Route of each robot, by ``<scenario>-<planner>``.
+        legs: Columns of ``legs.parquet``.
         world: The world, for its picture.
+        manifest: Content of ``manifest.json``.
     """
-    scenarios = summary["scenarios"]
+
+    summary: Mapping[str, Any]
+    routes: Mapping[str, Mapping[str, Sequence[str]]]
+    legs: Mapping[str, Sequence[Any]]
+    world: World
+    manifest: Mapping[str, Any]
+
+
+def write_report(path: Path, content: Content) -> None:
+    """Write ``report.html``."""
+    summary = content.summary
+    scenarios: Scenarios = summary["scenarios"]
+    compared = all("vss" in scenario for scenario in scenarios)
+    question = "Is the stochastic plan worth it" if compared else "What are the plans worth"
     parts = [
-        f"<h1>{_text(summary['world'])}: what the plans are worth when robots fail</h1>",
-        f"<p>{_text(answer(summary))}</p>",
-        f"<p class=note>{summary['trials']} trials of each plan in each scenario, {summary['rollouts']} noise draws, "
-        f"fidelity <code>{summary['fidelity']}</code>, seed {summary['seed']}; planned under "
-        f"<code>{summary['failure']['plan']}</code>, executed under <code>{summary['failure']['execute']}</code> "
-        "failures. Incentive in the units of the world file; 95 % intervals in brackets.</p>",
-        *_comparison(scenarios),
-        "<h2>Incentive by robot</h2>",
-        _table(["scenario", "plan", *world_robots(world)],
-               [[s["name"], name, *(f"{plan['by_robot'][r]:.1f}" for r in world_robots(world))]
-                for s in scenarios for name, plan in s["plans"].items()]),
-        "<h2>From promise to execution</h2>",
-        _table(["scenario", "plan", "promised", "assumption", "draws", "out of fuel", "late", "stuck", "executed"],
-               [[s["name"], name, *(f"{x:+.1f}" if 0 < k < 6 else f"{x:.1f}"
-                                    for k, x in enumerate(plan["ledger"].values()))]
-                for s in scenarios for name, plan in s["plans"].items()]),
-        "<h2>How the robots ended</h2>",
-        _table(["scenario", "plan", "home", "failed", "out of fuel", "late", "stuck"],
-               [[s["name"], name, *(str(plan["ends"].get(end, 0)) for end in
-                                    ("home", "failed", "out_of_fuel", "late", "stuck"))]
-                for s in scenarios for name, plan in s["plans"].items()]),
-        "<h2>Routes</h2>",
-        _table(["plan", "robot", "route"],
-               [[stem, robot, " → ".join(route) or "stays home"]
-                for stem, plan in plans.items() for robot, route in plan.routes.items()], text_last=True),
-        "<h2>The world</h2>", picture(world),
-        "<p class=note>Black: base. Blue: refuelling stations. Orange: points of interest.</p>",
+        f"<h1>{text(summary['world'])}: {question}, and how sure is that?</h1>",
+        *_answer(summary),
+        *(_comparison(scenarios) if compared else _ranking(scenarios)),
+        note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, "
+             f"{number(summary['rollouts'], 'noise draw')}, fidelity {summary['fidelity']}, seed {summary['seed']}; "
+             f"planned under {summary['failure']['plan']}, executed under {summary['failure']['execute']} failures. "
+             "Incentive in the units of the world file; 95 % intervals in brackets, by noise draw."),
+        *_charts(scenarios, compared=compared),
+        *_world(content.world),
+        *_over_trials(scenarios),
+        *_from_promise(scenarios),
+        *_ends(scenarios),
+        *_legs(content.legs),
+        *_routes(content.routes),
+        *_recordings(scenarios),
+        *_again(summary, content.manifest),
     ]
-    _write_page(path, summary["world"], parts)
+    write_page(path, str(summary["world"]), parts)
 
 
-def _write_page(path: Path, title: str, parts: Sequence[str]) -> None:
-    body = "\n".join(parts)
-    path.write_text(
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{_text(title)} · sva-bench</title><style>{_STYLE}</style></head>\n"
-        f"<body>\n{body}\n</body></html>\n", encoding="utf-8")
+def _answer(summary: Mapping[str, Any]) -> list[str]:
+    lines = []
+    for scenario in summary["scenarios"]:
+        if "vss" in scenario:
+            doubtful = ", ".join(f"{robot} {per_cent(100 * p)}" for robot, p in scenario["availability"].items()
+                                 if p < 1)
+            lines.append(f"<li><b>{text(scenario['name'])}</b> ({text(doubtful or 'all available')}): "
+                         f"{text(finding(scenario))}</li>")
+    unproved = "" if summary["reproducible"] else note(
+        "A solve met its limit: these plans may differ on another machine.")
+    return [f"<div class=answer><p>{text(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
+            unproved, "</div>"]
 
 
-def _comparison(scenarios: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The tables that say which plan is worth more."""
-    if all("vss" in scenario for scenario in scenarios):
-        head = ["scenario", "stochastic, executed", "deterministic, executed", "VSS, executed", "VSS, modelled", "EVPI"]
-        return ["<h2>Value of the stochastic solution</h2>", _table(head, [_vss_row(s) for s in scenarios])]
-    rows = [[s["name"], name, f"{plan['expected']:.1f}", with_interval(plan["executed"])]
+def _comparison(scenarios: Scenarios) -> list[str]:
+    head = ["scenario", "stochastic, executed", "deterministic, executed", "VSS, executed", "VSS [%]", "VSS, modelled",
+            "EVPI"]
+    rows = [[s["name"], *(with_interval(s["plans"][name]["executed"]) for name in ("stochastic", "deterministic")),
+             vss_verdict(s), per_cent(s["vss"]["executed_pct"]), f"{s['vss']['modelled']:.1f}", optional(s["evpi"])]
+            for s in scenarios]
+    return [table(head, rows, caption="Value of the stochastic solution (VSS): what the stochastic plan collects "
+                                      "beyond the deterministic one, in the same trials")]
+
+
+def _ranking(scenarios: Scenarios) -> list[str]:
+    rows = [[s["name"], name, optional(plan["expected"]), with_interval(plan["executed"])]
             for s in scenarios for name, plan in s["plans"].items()]
-    parts = ["<h2>What the plans are worth</h2>", _table(["scenario", "plan", "expected", "executed"], rows)]
+    parts = [table(["scenario", "plan", "expected", "executed"], rows, words=(0, 1),
+                   caption="What the plans are worth")]
     pairs = [[s["name"], f"{c['a']} − {c['b']}", verdict(c)] for s in scenarios for c in s["comparisons"]]
     if pairs:
-        parts += ["<h2>Differences, trial by trial</h2>", _table(["scenario", "plans", "difference"], pairs)]
+        parts.append(table(["scenario", "plans", "difference"], pairs, words=(0, 1), caption="Differences, trial by "
+                           "trial"))
     return parts
 
 
-def verdict(difference: Mapping[str, Any]) -> str:
-    """A difference with its interval, or that there is none to speak of."""
-    if difference["ci95"] is None:
-        return f"{difference['mean']:.1f}, no interval"
-    return with_interval(difference) if difference["distinguishable"] else "not distinguishable from zero"
+def _charts(scenarios: Scenarios, *, compared: bool) -> list[str]:
+    from sva_bench.analysis import charts  # matplotlib takes its time to load, and only a page needs it
+
+    plans = list(scenarios[0]["plans"])
+    shown = ["stochastic", "deterministic"] if compared else plans[:4]
+    parts = [heading("The plans side by side"), "<div class=pair>",
+             figure(charts.plans_compared(scenarios), "Mean over all trials, with its 95 % interval.")]
+    if compared:
+        rows = [(s["name"], s["vss"]["executed"]) for s in scenarios]
+        parts.append(figure(charts.differences(rows, "VSS, executed", "incentive"), "Stochastic less deterministic in "
+                            "the same trials: right of zero, planning for failures pays."))
+    robots = [figure(charts.incentive_by_robot(scenarios, plan), f"What each robot collects by the {plan} plan.")
+              for plan in shown]
+    parts += ["</div>", heading("Incentive by robot and scenario"), "<div class=pair>", *robots, "</div>"]
+    names = list(scenarios[0]["availability"])
+    return [*parts, table(["scenario", "plan", *names], [
+        [s["name"], name, *(f"{plan['by_robot'][r]:.1f}" for r in names)] for s in scenarios
+        for name, plan in s["plans"].items()], words=(0, 1))]
+
+
+def _over_trials(scenarios: Scenarios) -> list[str]:
+    from sva_bench.analysis import charts
+
+    keys = ("least", "cvar10", "q05", "q25", "q50", "q75", "q95", "greatest")
+    rows = [[s["name"], name, *(f"{plan['distribution'][key]:.1f}" for key in keys)]
+            for s in scenarios for name, plan in s["plans"].items()]
+    return [heading("Over trials"),
+            figure(charts.distributions(scenarios), "Box: the middle half of the trials; whiskers: 5 to 95 %; "
+                   "triangle: mean of the worst tenth (CVaR)."),
+            table(["scenario", "plan", "least", "worst tenth", "5 %", "25 %", "50 %", "75 %", "95 %", "greatest"], rows,
+                  words=(0, 1))]
+
+
+def _from_promise(scenarios: Scenarios) -> list[str]:
+    rows = [[s["name"], name,
+             *(f"{x:+.1f}" if 0 < k < 6 else f"{x:.1f}" for k, x in enumerate(plan["ledger"].values())),
+             with_interval(plan["executed_controlled"])] for s in scenarios for name, plan in s["plans"].items()]
+    return [heading("From promise to execution"), table(
+        ["scenario", "plan", "promised", "assumption", "draws", "out of fuel", "late", "stuck", "executed",
+         "executed, luck of the draw taken out"], rows, words=(0, 1)),
+        note("Assumption: the plan's value under the failures executed, against what its maker believed. Draws: "
+             "failures as drawn, against their expectation. Then what each unhappy end cost.")]
+
+
+def _ends(scenarios: Scenarios) -> list[str]:
+    rows = []
+    for s in scenarios:
+        for name, plan in s["plans"].items():
+            for robot, shares in plan["end_shares"].items():
+                cells = [{"mean": 100 * shares[end]["share"], "ci95": shares[end]["ci95"] and
+                          [100 * x for x in shares[end]["ci95"]]} if end in shares else None for end in _ENDS]
+                rows.append([s["name"], name, robot, *("" if c is None else with_interval(c) for c in cells)])
+    return [heading("How the robots ended"), table(
+        ["scenario", "plan", "robot", *(f"{end.replace('_', ' ')} [%]" for end in _ENDS)], rows, words=(0, 1, 2)),
+        note("Failed: by draw. Out of fuel, late (home past its limit) and stuck: by what physics made of the plan. "
+             "Where all trials ended alike, the interval says how often another end could still come up.")]
+
+
+def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
+    from sva_bench.analysis import charts
+
+    planned, driven = (np.asarray(legs[key], dtype=np.float64) for key in ("planned_s", "driven_s"))
+    parts = [heading("Time and fuel, planned against driven")]
+    if not (planned > 0).any():
+        return [*parts, note("No leg was driven.")]
+    names = [str(robot) for robot in legs["robot"]]
+    rows = []
+    for robot in dict.fromkeys(names):
+        mine = np.array([name == robot for name in names]) & (planned > 0)
+        if mine.any():
+            off = 100 * (driven[mine] / planned[mine] - 1)
+            rows.append([robot, str(int(mine.sum())), f"{planned[mine].sum():.1f}", f"{driven[mine].sum():.1f}",
+                         f"{100 * (driven[mine].sum() / planned[mine].sum() - 1):+.2f}", f"{off.min():+.2f}",
+                         f"{off.max():+.2f}"])
+    late = np.argsort(-(driven - planned), kind="stable")[:_WORST_LEGS]
+    worst = [[*(str(legs[key][k]) for key in ("scenario", "planner", "robot", "rollout", "origin", "destination")),
+              f"{planned[k]:.2f}", f"{driven[k]:.2f}", f"{driven[k] - planned[k]:+.2f}"] for k in late.tolist()]
+    return [*parts, "<div class=pair>",
+            figure(charts.legs_driven(planned, driven, names), "Each point is a leg under one noise draw. Fuel is "
+                   "measured in seconds of driving, so a leg's time is its fuel."),
+            table(["robot", "legs", "planned [s]", "driven [s]", "off [%]", "least [%]", "most [%]"], rows), "</div>",
+            table(["scenario", "plan", "robot", "noise draw", "from", "to", "planned [s]", "driven [s]", "off [s]"],
+                  worst, words=(0, 1, 2, 4, 5), caption="The legs that took longest beyond their plan")]
+
+
+def _world(world: World) -> list[str]:
+    from sva_bench.analysis.drawing import Overlays, draw_world, for_page
+
+    picture = for_page(draw_world(world, "svg", Overlays()).decode(), "world", f"The world {world.name} from above")
+    return [heading("The world"), figure(picture, f"{world.name}: {len(world.stations)} stations, {len(world.pois)} "
+                                         "points of interest with what each robot earns there.")]
+
+
+def _routes(routes: Mapping[str, Mapping[str, Sequence[str]]]) -> list[str]:
+    rows = [[stem, robot, " → ".join(route) or "stays home"]
+            for stem, robots in routes.items() for robot, route in robots.items()]
+    return [heading("Routes"), table(["plan", "robot", "route"], rows, words=(0, 1, 2))]
+
+
+def _recordings(scenarios: Scenarios) -> list[str]:
+    links = [f'<a href="recordings/{stem}.rrd">{stem}</a>' for s in scenarios for name in s["plans"]
+             if (stem := text(f"{s['name']}-{name}"))]
+    return [heading("Recordings"), f"<p>Trial 0 of each plan, for the Rerun viewer: {', '.join(links)}. Open them all "
+            "with <code>sva-bench view</code> and this folder.</p>"]
+
+
+def _again(summary: Mapping[str, Any], manifest: Mapping[str, Any]) -> list[str]:
+    packages = ", ".join(f"{name} {version}" for name, version in manifest["packages"].items())
+    return [heading("How to get the same again"),
+            f"<pre><code>{text(shlex.join(manifest['command']))}</code></pre>",
+            note(f"sva-bench {manifest['version']}, seed {summary['seed']}, Python {manifest['machine']['python']}; "
+                 f"{packages}. The resolved world and all options stand in manifest.json, the figures in summary.json, "
+                 "every trial in outcomes.parquet.")]
 
 
 def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
@@ -101,91 +233,35 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
         path: Where to.
         summary: Content of the batch's ``summary.json``.
     """
+    from sva_bench.analysis import charts
+
+    rows = summary["aggregate"]
     over = [[row["scenario"], str(row["maps"]), with_interval(row["vss"]),
-             "" if row["vss_pct"]["mean"] is None else with_interval(row["vss_pct"])] for row in summary["aggregate"]]
+             "" if row["vss_pct"]["mean"] is None else with_interval(row["vss_pct"])] for row in rows]
+    sure = [row for row in rows if row["vss"]["ci95"] is not None and row["vss"]["ci95"][0] > 0]
+    said = "Over these maps planning for failures pays in " + ", ".join(
+        f"{row['scenario']} ({with_interval(row['vss_pct'])} %)" if row["vss_pct"]["mean"] is not None
+        else row["scenario"] for row in sure) + "." if sure else \
+        "Over these maps no scenario shows a value of planning for failures beyond doubt."
+    by_scenario: dict[str, list[float]] = {}
+    for unit in summary["units"]:
+        for s in unit["scenarios"]:
+            if s["vss"]["executed_pct"] is not None:
+                by_scenario.setdefault(s["name"], []).append(s["vss"]["executed_pct"])
+    pictures = [figure(charts.boxes_of(by_scenario, "VSS over maps", "VSS [% of the stochastic plan]"),
+                       "Each point is a map and seed.")] if by_scenario else []
     parts = [
-        f"<h1>Value of the stochastic solution over {_number(len(summary['worlds']), 'map')}</h1>",
-        f"<p class=note>{summary['trials']} trials of each plan in each scenario, fidelity "
-        f"<code>{summary['fidelity']}</code>; 95 % intervals in brackets. Over maps, the maps are the sample.</p>",
-        _table(["scenario", "maps", "VSS", "VSS [%]"], over),
-        "<h2>Map by map</h2>",
-        _table(["map", "seed", "scenario", "stochastic", "deterministic", "VSS", "VSS, modelled", "EVPI"],
-               [[unit["world"], str(unit["seed"]), *_vss_row(s)] for unit in summary["units"]
-                for s in unit["scenarios"]]),
+        f"<h1>Value of the stochastic solution over {number(len(summary['worlds']), 'map')}</h1>",
+        f"<div class=answer><p>{text(said)}</p></div>",
+        table(["scenario", "maps", "VSS", "VSS [%]"], over),
+        note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, fidelity {summary['fidelity']}; 95 "
+             "% intervals in brackets. Over maps, the maps are the sample."),
+        *pictures,
+        heading("Map by map"),
+        table(["map", "seed", "scenario", "stochastic", "deterministic", "VSS", "VSS [%]", "VSS, modelled", "EVPI"],
+              [[unit["world"], str(unit["seed"]), s["name"],
+                *(with_interval(s["plans"][name]["executed"]) for name in ("stochastic", "deterministic")),
+                vss_verdict(s), per_cent(s["vss"]["executed_pct"]), f"{s['vss']['modelled']:.1f}", optional(s["evpi"])]
+               for unit in summary["units"] for s in unit["scenarios"]], words=(0, 2)),
     ]
-    _write_page(path, "batch", parts)
-
-
-def answer(summary: Mapping[str, Any]) -> str:
-    """In one sentence: which plan is worth more, and by how much."""
-    if not all("vss" in scenario for scenario in summary["scenarios"]):
-        if len(summary["scenarios"][0]["plans"]) == 1:
-            return "One plan: there is nothing to compare it with."
-        clear = [f"{c['a']} against {c['b']} in {s['name']} ({c['mean']:+.1f})" for s in summary["scenarios"]
-                 for c in s["comparisons"] if c["distinguishable"]]
-        return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
-            "No difference between plans stands out of the noise."
-    pays = [s for s in summary["scenarios"] if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] > 0]
-    if not pays:
-        return "In no scenario can the executed incentives of the two plans be told apart."
-    named = ", ".join(f"{s['name']} ({s['vss']['executed_pct']:.0f} %)" for s in pays)
-    return f"Planning for failures pays in {named}: share of the stochastic plan's executed incentive that the " \
-           "deterministic plan misses."
-
-
-def world_robots(world: World) -> list[str]:
-    """Names of the robots."""
-    return [robot.name for robot in world.robots]
-
-
-def _vss_row(scenario: Mapping[str, Any]) -> list[str]:
-    vss = scenario["vss"]
-    shown = [with_interval(scenario["plans"][name]["executed"]) for name in ("stochastic", "deterministic")]
-    return [scenario["name"], *shown, verdict(vss["executed"] | {"distinguishable": vss["distinguishable"]}),
-            f"{vss['modelled']:.1f}", "" if scenario["evpi"] is None else f"{scenario['evpi']:.1f}"]
-
-
-def with_interval(estimate: Mapping[str, Any]) -> str:
-    """``39.0 [36.1, 41.9]``."""
-    interval = estimate["ci95"]
-    return f"{estimate['mean']:.1f}" + ("" if interval is None else f" [{interval[0]:.1f}, {interval[1]:.1f}]")
-
-
-def picture(world: World) -> str:
-    """The world from above, to scale, as SVG."""
-    x0, y0, x1, y1 = world.obstacles.bounds_m.tolist()
-    shapes = [f'<rect x="{x0}" y="{-y1}" width="{x1 - x0}" height="{y1 - y0}" fill="#fff" stroke="#444" '
-              'stroke-width="0.1"/>']
-    for x, y, hx, hy, yaw in world.obstacles.boxes.tolist():
-        shapes.append(f'<rect x="{-hx:g}" y="{-hy:g}" width="{2 * hx:g}" height="{2 * hy:g}" fill="#999" '
-                      f'transform="translate({x:g} {-y:g}) rotate({-math.degrees(yaw):g})"/>')
-    shapes += [f'<circle cx="{x:g}" cy="{-y:g}" r="{r:g}" fill="#999"/>'
-               for x, y, r in world.obstacles.cylinders.tolist()]
-    size = max(x1 - x0, y1 - y0) / 45
-    for site in world.sites:
-        shapes.append(f'<circle cx="{site.x_m:g}" cy="{-site.y_m:g}" r="{size / 2:g}" fill="{_COLOURS[site.kind]}"/>'
-                      f'<text x="{site.x_m + 0.7 * size:g}" y="{-site.y_m - 0.4 * size:g}" font-size="{1.2 * size:g}" '
-                      f'font-family="sans-serif">{_text(site.name)}</text>')
-    edge = 0.2
-    return (f'<svg role="img" aria-label="the world from above" width="640" '
-            f'viewBox="{x0 - edge:g} {-y1 - edge:g} {x1 - x0 + 2 * edge:g} {y1 - y0 + 2 * edge:g}">'
-            + "".join(shapes) + "</svg>")
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], *, text_last: bool = False) -> str:
-    def row(cells: Sequence[str], tag: str) -> str:
-        last = len(cells) - 1
-        return "<tr>" + "".join(
-            f"<{tag}{' class=text' if text_last and k in (1, last) else ''}>{_text(cell)}</{tag}>"
-            for k, cell in enumerate(cells)) + "</tr>"
-
-    body = "".join(row(cells, "td") for cells in rows)
-    return f"<div class=wide><table><thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table></div>"
-
-
-def _number(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
-def _text(value: object) -> str:
-    return html.escape(str(value))
+    write_page(path, "batch", parts)

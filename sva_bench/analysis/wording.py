@@ -1,0 +1,92 @@
+"""A summary in words: the same for terminal and page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def answer(summary: Mapping[str, Any]) -> str:
+    """In one sentence: which plan is worth more, and by how much."""
+    scenarios = summary["scenarios"]
+    if not scenarios:
+        return "No scenario was executed."
+    if not all("vss" in scenario for scenario in scenarios):
+        if len(scenarios[0]["plans"]) == 1:
+            return "One plan: there is nothing to compare it with."
+        clear = [f"{c['a']} against {c['b']} in {s['name']} ({c['mean']:+.1f})" for s in scenarios
+                 for c in s["comparisons"] if c["distinguishable"]]
+        return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
+            "No difference between plans stands out of the noise."
+    if all(s["vss"]["executed"]["ci95"] is None for s in scenarios):
+        return "Too few trials or noise draws for an interval: whether planning for failures pays can't be said."
+    pays = [s for s in scenarios if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] > 0]
+    costs = [s["name"] for s in scenarios if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] < 0]
+    loses = f" In {listed(costs)} it collects less." if costs else ""
+    if not pays:
+        return f"Planning for failures pays in no scenario, as far as these trials can tell.{loses}"
+    named = listed([f"{s['name']} ({per_cent(s['vss']['executed_pct'])})" for s in pays])
+    rest = [s["name"] for s in scenarios if not s["vss"]["distinguishable"]]
+    other = f" In {listed(rest)} the two can't be told apart." if rest else ""
+    return f"Planning for failures pays in {named}: share of the stochastic plan's executed incentive that the " \
+           f"deterministic plan misses.{other}{loses}"
+
+
+def finding(scenario: Mapping[str, Any]) -> str:
+    """What a scenario comes to: how much more, how sure."""
+    vss = scenario["vss"]
+    executed, interval = vss["executed"], vss["executed"]["ci95"]
+    if interval is None:
+        return f"{executed['mean']:+.1f} collected by planning for failures; no interval: more trials or noise draws " \
+               "would tell how sure that is"
+    if not vss["distinguishable"]:
+        same = interval[0] == interval[1] == 0
+        return "no difference in any trial" if same else \
+            f"not distinguishable from zero: {executed['mean']:+.1f}, 95 % sure of {interval[0]:.1f} to " \
+            f"{interval[1]:.1f}"
+    share = "" if vss["executed_pct"] is None else f" ({per_cent(vss['executed_pct'])})"
+    better = "stochastic" if executed["mean"] > 0 else "deterministic"
+    if interval[0] == interval[1]:
+        return f"the {better} plan collects {abs(executed['mean']):.1f} more{share}, in every trial"
+    return f"the {better} plan collects {abs(executed['mean']):.1f} more{share}, 95 % sure of " \
+           f"{min(map(abs, interval)):.1f} to {max(map(abs, interval)):.1f}"
+
+
+def verdict(difference: Mapping[str, Any]) -> str:
+    """A difference with its interval, or that there is none to speak of."""
+    if difference["ci95"] is None:
+        return f"{difference['mean']:.1f}, no interval"
+    return with_interval(difference) if difference["distinguishable"] else "not distinguishable from zero"
+
+
+def vss_verdict(scenario: Mapping[str, Any]) -> str:
+    """The executed VSS of a scenario with its interval, or that there is none to speak of."""
+    vss = scenario["vss"]
+    return verdict(vss["executed"] | {"distinguishable": vss["distinguishable"]})
+
+
+def with_interval(estimate: Mapping[str, Any], digits: int = 1) -> str:
+    """``39.0 [36.1, 41.9]``."""
+    interval = estimate["ci95"]
+    return f"{estimate['mean']:.{digits}f}" + (
+        "" if interval is None else f" [{interval[0]:.{digits}f}, {interval[1]:.{digits}f}]")
+
+
+def per_cent(figure: float | None) -> str:
+    """``18 %``, and a digit more where that says more."""
+    return "" if figure is None else f"{figure:.0f} %" if abs(figure) >= 9.95 or figure == 0 else f"{figure:.1f} %"
+
+
+def optional(figure: float | None) -> str:
+    """A figure, or nothing where there is none."""
+    return "–" if figure is None else f"{figure:.1f}"
+
+
+def number(count: int, noun: str) -> str:
+    """``1 map``, ``2 maps``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """``a, b and c``."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,168 @@
+"""The page of a run: in a real browser where there is one, and from its tables again."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from sva_bench.analysis.report import write_batch_report
+from sva_bench.analysis.wording import answer, finding, with_interval
+from sva_bench.batch import aggregate
+from sva_bench.bench import Options, Run, run
+from sva_bench.errors import BadFile, BadInput
+from sva_bench.stored import report_again
+from tests.worlds_for_tests import world_of
+
+BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
+               None)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    folder = tmp_path_factory.mktemp("finished")
+    options = Options(trials=40, rollouts=4, fidelity="kinematic")
+    return run(world_of(folder), options, folder / "runs", None, lambda *_: None)
+
+
+@pytest.fixture
+def folder(finished: Run, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(finished.folder, tmp_path / "run"))
+
+
+class Page(HTMLParser):
+    """Ids, references and tags of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.tags: list[str] = []
+        self.links: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for key, value in attrs:
+            if key == "id":
+                self.ids.append(value or "")
+            elif key in ("href", "xlink:href", "src"):
+                self.links.append(value or "")
+
+
+def test_a_page_loads_nothing_and_every_reference_in_it_is_met(finished: Run) -> None:
+    text = (finished.folder / "report.html").read_text()
+    page = Page(text)
+    assert "script" not in page.tags
+    assert len(page.ids) == len(set(page.ids))
+    inner = {link[1:] for link in page.links if link.startswith("#")} | set(re.findall(r"url\(#([^)]+)\)", text))
+    assert inner <= set(page.ids)
+    outer = [link for link in page.links if not link.startswith(("#", "data:"))]
+    assert outer
+    assert all((finished.folder / link).is_file() for link in outer)
+    assert "@import" not in text
+
+
+def test_page_terminal_and_summary_say_the_same(finished: Run) -> None:
+    text = html.unescape((finished.folder / "report.html").read_text())
+    assert answer(finished.summary) in text
+    for scenario in finished.summary["scenarios"]:
+        assert finding(scenario) in text
+        for plan in scenario["plans"].values():
+            assert with_interval(plan["executed"]) in text
+
+
+_PROBE = """<script>window.onerror=m=>{document.title='error '+m};window.onload=()=>{
+const r=[...document.querySelectorAll('svg')].map(s=>s.getBoundingClientRect());
+document.title=JSON.stringify({wide:document.documentElement.scrollWidth,
+window:innerWidth,pictures:r.length,empty:r.filter(b=>b.width<100||b.height<60).length,
+answer:document.querySelector('.answer').getBoundingClientRect().bottom})}</script></body>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser here")
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (500, 900)])  # none narrower opens without a screen
+def test_a_browser_shows_every_picture_and_the_answer_in_the_first_screenful(
+        finished: Run, width: int, height: int, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text((finished.folder / "report.html").read_text().replace("</body>", _PROBE))
+    done = subprocess.run(
+        [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--window-size={width},{height}",
+         f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", page.as_uri()],
+        capture_output=True, text=True, timeout=120)
+    found = re.search(r"<title>(.*?)</title>", done.stdout)
+    assert found, done.stderr
+    seen: dict[str, Any] = json.loads(html.unescape(found[1]))
+    assert seen["pictures"] >= 7
+    assert seen["empty"] == 0
+    assert seen["wide"] <= seen["window"]  # the page itself never scrolls sideways
+    assert seen["answer"] <= height
+
+
+def test_the_report_again_is_the_same_byte_by_byte(finished: Run, folder: Path) -> None:
+    before = (folder / "report.html").read_bytes()
+    (folder / "report.html").unlink()
+    report_again(folder)
+    assert (folder / "report.html").read_bytes() == before
+    assert before == (finished.folder / "report.html").read_bytes()
+
+
+def spoil(folder: Path, what: str) -> None:
+    if what == "cut off":
+        path = folder / "outcomes.parquet"
+        path.write_bytes(path.read_bytes()[:2000])
+    elif what == "nan":
+        table = pq.read_table(folder / "legs.parquet")
+        worse = pa.array([float("nan")] * table.num_rows)
+        pq.write_table(table.set_column(table.column_names.index("driven_s"), "driven_s", worse),
+                       folder / "legs.parquet")
+    elif what == "foreign":
+        table = pq.read_table(folder / "outcomes.parquet")
+        pq.write_table(table.set_column(table.column_names.index("incentive"), "incentive",
+                                        pa.array([1.0] * table.num_rows)), folder / "outcomes.parquet")
+    elif what == "missing":
+        (folder / "legs.parquet").unlink()
+    elif what == "older":
+        summary = json.loads((folder / "summary.json").read_text())
+        for scenario in summary["scenarios"]:
+            del scenario["vss"]["executed"]
+        (folder / "summary.json").write_text(json.dumps(summary))
+
+
+@pytest.mark.parametrize(("what", "said"), [
+    ("cut off", r"outcomes\.parquet: no table of ours, or cut off"),
+    ("nan", r"legs\.parquet: driven_s: holds what is no number"),
+    ("foreign", r"outcomes\.parquet: incentive: these aren't the trials of summary\.json: half, stochastic"),
+    ("missing", r"legs\.parquet: no table of ours"),
+    ("older", r"summary\.json: no summary as this version writes it \('executed'\)"),
+])
+def test_a_spoilt_run_folder_is_told_and_its_report_left_as_it_was(folder: Path, what: str, said: str) -> None:
+    spoil(folder, what)
+    before = sorted((path.name, path.stat().st_size) for path in folder.iterdir())
+    with pytest.raises(BadFile, match=said):
+        report_again(folder)
+    assert sorted((path.name, path.stat().st_size) for path in folder.iterdir()) == before
+
+
+def test_what_is_no_run_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="no such folder"):
+        report_again(tmp_path / "nothing")
+    with pytest.raises(BadInput, match=r"summary\.json is missing"):
+        report_again(tmp_path)
+
+
+def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> None:
+    units = [finished.summary]
+    write_batch_report(tmp_path / "report.html", {
+        "trials": 40, "fidelity": "kinematic", "worlds": ["small"], "seeds": [0], "units": units,
+        "aggregate": aggregate(units)})
+    text = (tmp_path / "report.html").read_text()
+    assert "over 1 map<" in text
+    assert "<svg" in text
