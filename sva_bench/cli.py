@@ -15,6 +15,7 @@ from sva_bench.cli_inputs import instance_app, world_app
 from sva_bench.errors import BadInput, ExitCode
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import (
+    AsCsv,
     AsJson,
     Cuts,
     ExecuteFailure,
@@ -81,6 +82,7 @@ def run(
                                                       "takes.")] = False,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
+    csv: AsCsv = False,
     as_json: AsJson = False,
     verbose: Verbose = False,
 ) -> None:
@@ -103,7 +105,7 @@ def run(
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi)
     with about(world), progress_bars() as progress, local_workers(workers) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    _show(result.summary, result.folder, as_json)
+    _show(result.summary, result.folder, as_json, csv=csv)
 
 
 @app.command()
@@ -241,6 +243,7 @@ def execute(
     execute_failure: ExecuteFailure = None,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
+    csv: AsCsv = False,
     as_json: AsJson = False,
     verbose: Verbose = False,
 ) -> None:
@@ -266,7 +269,7 @@ def execute(
         read = read_plans(loaded, costs, plans, allow_infeasible=allow_infeasible)
         with local_workers(workers) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, as_json)
+    _show(result.summary, result.folder, as_json, csv=csv)
 
 
 @app.command()
@@ -343,13 +346,16 @@ def view(
 @app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)],
+    csv: AsCsv = False,
     verbose: Verbose = False,
 ) -> None:
     """Write the report of a finished run again, from its tables."""
     with holding_back_ctrl_c():
-        from sva_bench.stored import report_again
+        from sva_bench.stored import report_again, write_csv
 
     set_up_logging(verbose)
+    if csv:
+        write_csv(folder)
     messages.print(f"written to [bold]{escape(str(report_again(folder)))}[/bold]", highlight=False)
 
 
@@ -361,7 +367,11 @@ def _main(version: Annotated[bool, typer.Option("--version", help="Print the ver
         raise typer.Exit
 
 
-def _show(summary: Any, folder: Path, as_json: bool) -> None:
+def _show(summary: Any, folder: Path, as_json: bool, *, csv: bool = False) -> None:
+    if csv:
+        from sva_bench.stored import write_csv
+
+        write_csv(folder)
     if as_json:
         print_json(summary)
     else:

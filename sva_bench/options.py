@@ -50,5 +50,6 @@ ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Onl
 ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that is executed.",
                                                               show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
+AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
 WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]
 Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]

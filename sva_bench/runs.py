@@ -131,6 +131,11 @@ def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
 LEG_COLUMNS = ("scenario", "planner", "rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s")
 
 
+_LEG_UNITS = {"leg": "1", "rollout": "1", "planned_s": "s", "driven_s": "s"}
+_OUTCOME_UNITS = {"trial": "1", "rollout": "1", "incentive": "incentive of the world file", "pois_reached": "1",
+                  "stops_reached": "1", "end_time_s": "s", "fuel_used_s": "s of driving"}
+
+
 def leg_columns(executed: Sequence[Executed]) -> dict[str, list[Any]]:
     """A row per leg that was driven."""
     rows: dict[str, list[Any]] = {key: [] for key in LEG_COLUMNS}
@@ -148,7 +153,7 @@ def write_legs(path: Path, rows: Mapping[str, Sequence[Any]]) -> None:
     types = {key: pa.string() for key in ("scenario", "planner", "robot", "origin", "destination")}
     types |= {"rollout": pa.int64(), "leg": pa.int64(), "planned_s": pa.float64(), "driven_s": pa.float64()}
     _write(path, {key: pa.array(values, types[key]) for key, values in rows.items()},
-           {"planned_s": "s", "driven_s": "s"})
+           _LEG_UNITS)
 
 
 def outcome_columns(run: Executed, robots: Sequence[str], fidelity: str) -> dict[str, Any]:
@@ -170,7 +175,7 @@ def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[st
     """Write ``outcomes.parquet``: a row per scenario, plan, trial and robot."""
     parts = [outcome_columns(run, robots, fidelity) for run in executed]
     columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    _write(path, columns, {"end_time_s": "s", "fuel_used_s": "s"})
+    _write(path, columns, _OUTCOME_UNITS)
 
 
 def write_shard(path: Path, executed: Sequence[Executed], world: World, seed: int, fidelity: str,
@@ -181,7 +186,7 @@ def write_shard(path: Path, executed: Sequence[Executed], world: World, seed: in
     rows = len(columns["trial"])
     columns |= {"world": np.full(rows, world.name), "seed": np.full(rows, seed)}
     draft = path.with_name(f"{path.name}.tmp")
-    _write(draft, columns, {"end_time_s": "s", "fuel_used_s": "s"}, {_SUMMARY: json.dumps(summary)})
+    _write(draft, columns, _OUTCOME_UNITS, {_SUMMARY: json.dumps(summary)})
     draft.replace(path)
 
 
@@ -204,7 +209,7 @@ _SUMMARY = "sva-bench/summary"
 
 def _write(path: Path, columns: Mapping[str, Any], units: Mapping[str, str],
            metadata: Mapping[str, str] | None = None) -> None:
-    """Write a Parquet table, units in the metadata of its columns."""
+    """Write a Parquet table, units in the metadata of its columns; ``1`` is a count or a number in order."""
     table = pa.table(dict(columns))
     fields = [field.with_metadata({"unit": units[field.name]}) if field.name in units else field
               for field in table.schema]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.csv as pcsv
 import pyarrow.parquet as pq
 
 from sva_bench.analysis.report import Content, write_report
@@ -43,6 +44,23 @@ def report_again(folder: Path) -> Path:
     return path
 
 
+def write_csv(folder: Path) -> list[Path]:
+    """Write each table of a run folder as CSV too, for spreadsheets.
+
+    Raises:
+        BadFile: If one can't be read.
+        BadInput: If one can't be written.
+    """
+    written = []
+    for table in sorted(folder.glob("*.parquet")):
+        rows = read_table(table)
+        path = table.with_suffix(".csv")
+        with draft_of(path) as draft:
+            pcsv.write_csv(rows, draft)
+        written.append(path)
+    return written
+
+
 def read_content(folder: Path) -> Content:
     """What the report of a run folder is made of.
 
@@ -72,18 +90,18 @@ def read_content(folder: Path) -> Content:
     return Content(summary=summary, routes=routes, legs=columns, world=world, manifest=manifest)
 
 
-def read_table(path: Path, columns: Sequence[str]) -> pa.Table:
-    """Some columns of a table of ours.
+def read_table(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
+    """Some columns of a table of ours, or all.
 
     Raises:
         BadFile: If it can't be read, lacks a column, or holds NaN.
     """
     try:
-        table = pq.read_table(path, columns=list(columns))
+        table = pq.read_table(path, columns=None if columns is None else list(columns))
     except (OSError, ValueError, pa.ArrowException) as error:
         raise BadFile(path, None, "", f"no table of ours, or cut off ({str(error).splitlines()[0][:120]}); run the "
                       "command in manifest.json again") from None
-    for name in columns:
+    for name in table.column_names if columns is None else columns:
         if name not in table.column_names:
             raise BadFile(path, None, name, "this column is missing; run the command in manifest.json again")
         column = table.column(name)

@@ -97,7 +97,7 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 def print_summary(summary: Any) -> None:
     """Print a summary as a table, and what it comes to."""
-    from sva_bench.analysis.wording import answer, vss_verdict, with_interval
+    from sva_bench.analysis.wording import answer, ranked, vss_verdict, with_interval
 
     console = results()
     scenarios, travel = summary["scenarios"], summary["travel"]
@@ -136,6 +136,9 @@ def print_summary(summary: Any) -> None:
     if unhappy:
         console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
                       highlight=False)
+    for scenario in scenarios:
+        if scenario.get("comparisons"):
+            console.print(f"{scenario['name']}: {ranked(scenario)}", highlight=False, markup=False)
     console.print(answer(summary), highlight=False)
     if not summary["reproducible"]:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

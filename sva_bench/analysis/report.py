@@ -12,12 +12,13 @@ import numpy as np
 
 from sva_bench.analysis.page import figure, heading, note, table, text, write_page
 from sva_bench.analysis.wording import (
+    adjusted,
     answer,
     finding,
     number,
     optional,
     per_cent,
-    verdict,
+    ranked,
     vss_verdict,
     with_interval,
 )
@@ -83,6 +84,8 @@ def _answer(summary: Mapping[str, Any]) -> list[str]:
                                  if p < 1)
             lines.append(f"<li><b>{text(scenario['name'])}</b> ({text(doubtful or 'all available')}): "
                          f"{text(finding(scenario))}</li>")
+        elif scenario["comparisons"]:
+            lines.append(f"<li><b>{text(scenario['name'])}</b>: {text(ranked(scenario))}</li>")
     unproved = "" if summary["reproducible"] else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{text(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
@@ -104,10 +107,11 @@ def _ranking(scenarios: Scenarios) -> list[str]:
             for s in scenarios for name, plan in s["plans"].items()]
     parts = [table(["scenario", "plan", "expected", "executed"], rows, words=(0, 1),
                    caption="What the plans are worth")]
-    pairs = [[s["name"], f"{c['a']} − {c['b']}", verdict(c)] for s in scenarios for c in s["comparisons"]]
+    pairs = [[s["name"], f"{c['a']} − {c['b']}", with_interval(c), adjusted(c)] for s in scenarios
+             for c in s["comparisons"]]
     if pairs:
-        parts.append(table(["scenario", "plans", "difference"], pairs, words=(0, 1), caption="Differences, trial by "
-                           "trial"))
+        parts.append(table(["scenario", "plans", "difference", "adjusted for the number of pairs"], pairs, words=(0, 1),
+                           caption="Differences, trial by trial"))
     return parts
 
 

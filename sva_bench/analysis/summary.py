@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -96,19 +96,38 @@ def verdict_of(difference: Estimate, a: str, b: str) -> str:
 
 
 def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
-    """One entry of ``scenarios`` where plans from anywhere were executed: every pair compared, trial by trial."""
+    """One entry of ``scenarios`` where plans from anywhere were executed: every pair compared, trial by trial.
+
+    A pair is distinguishable where the interval that is adjusted for the number of pairs leaves zero out.
+    """
     scenario = plans[0].executed.case.scenario
     comparisons = []
-    for a, b in combinations(plans, 2):
-        difference = estimate(totals(a.executed) - totals(b.executed), a.executed.rollout, noisy=noisy)
-        comparisons.append({"a": a.executed.case.planner, "b": b.executed.case.planner, **difference.as_dict(),
-                            "distinguishable": difference.distinguishable})
+    pairs = list(combinations(plans, 2))
+    for a, b in pairs:
+        trials = totals(a.executed) - totals(b.executed)
+        difference = estimate(trials, a.executed.rollout, noisy=noisy)
+        together = estimate(trials, a.executed.rollout, noisy=noisy, comparisons=len(pairs))
+        names = a.executed.case.planner, b.executed.case.planner
+        comparisons.append({"a": names[0], "b": names[1], **difference.as_dict(),
+                            "ci95_adjusted": together.as_dict()["ci95"], "distinguishable": together.distinguishable,
+                            "verdict": verdict_of(together, *names)})
     return {
         "name": scenario.name,
         "availability": {name: scenario.availability[name] for name in robots},
         "plans": {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy) for judged in plans},
         "comparisons": comparisons,
+        "ranking": ranking({p.executed.case.planner: float(np.mean(totals(p.executed))) for p in plans}, comparisons),
     }
+
+
+def ranking(means: Mapping[str, float], comparisons: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Plans from best to worst; a plan's rank is one more than the number of plans that are distinguishably better."""
+    better = dict.fromkeys(means, 0)
+    for pair in comparisons:
+        if pair["distinguishable"]:
+            better[pair["b"] if pair["mean"] > 0 else pair["a"]] += 1
+    return [{"rank": better[name] + 1, "plan": name, "mean": mean + 0.0}
+            for name, mean in sorted(means.items(), key=lambda item: (better[item[0]], -item[1]))]
 
 
 def plan_summary(judged: Judged, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:

@@ -16,6 +16,8 @@ def answer(summary: Mapping[str, Any]) -> str:
             return "One plan: there is nothing to compare it with."
         clear = [f"{c['a']} against {c['b']} in {s['name']} ({c['mean']:+.1f})" for s in scenarios
                  for c in s["comparisons"] if c["distinguishable"]]
+        if len(clear) > _MOST_NAMED:
+            clear[_MOST_NAMED:] = [f"{len(clear) - _MOST_NAMED} more"]
         return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
             "No difference between plans stands out of the noise."
     if all(s["vss"]["executed"]["ci95"] is None for s in scenarios):
@@ -30,6 +32,20 @@ def answer(summary: Mapping[str, Any]) -> str:
     other = f" In {listed(rest)} the two can't be told apart." if rest else ""
     return f"Planning for failures pays in {named}: share of the stochastic plan's executed incentive that the " \
            f"deterministic plan misses.{other}{loses}"
+
+
+_MOST_NAMED = 6
+
+
+def ranked(scenario: Mapping[str, Any]) -> str:
+    """The plans of a scenario from best to worst; those of one rank can't be told apart from what is above them."""
+    return "; ".join(f"{row['rank']}. {row['plan']} {row['mean']:.1f}" for row in scenario["ranking"])
+
+
+def adjusted(comparison: Mapping[str, Any]) -> str:
+    """A difference with the interval that is adjusted for the number of pairs."""
+    return verdict({"mean": comparison["mean"], "ci95": comparison["ci95_adjusted"],
+                    "distinguishable": comparison["distinguishable"]})
 
 
 def finding(scenario: Mapping[str, Any]) -> str:

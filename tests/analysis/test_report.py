@@ -20,7 +20,7 @@ from sva_bench.analysis.wording import answer, finding, with_interval
 from sva_bench.batch import aggregate
 from sva_bench.bench import Options, Run, run
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.stored import report_again
+from sva_bench.stored import report_again, write_csv
 from tests.worlds_for_tests import world_of
 
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
@@ -156,6 +156,19 @@ def test_what_is_no_run_folder_is_refused(tmp_path: Path) -> None:
         report_again(tmp_path / "nothing")
     with pytest.raises(BadInput, match=r"summary\.json is missing"):
         report_again(tmp_path)
+
+
+def test_tables_say_their_units_and_open_as_csv(folder: Path) -> None:
+    schema = pq.read_schema(folder / "outcomes.parquet")
+    units = {field.name: (field.metadata or {}).get(b"unit") for field in schema}
+    assert units["end_time_s"] == b"s"
+    assert units["fuel_used_s"] == b"s of driving"
+    assert units["incentive"] == b"incentive of the world file"
+    assert units["scenario"] is None
+    assert [path.name for path in write_csv(folder)] == ["legs.csv", "outcomes.csv", "travel_times.csv"]
+    lines = (folder / "outcomes.csv").read_text().splitlines()
+    assert lines[0].split(",")[:3] == ['"scenario"', '"planner"', '"trial"']
+    assert len(lines) == 1 + 2 * 2 * 40 * 2  # scenarios, plans, trials, robots
 
 
 def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> None:

@@ -10,7 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sva_bench.analysis.summary import Judged, ScenarioResult, ledger, plan_summary, scenario_summary
+from sva_bench.analysis.summary import (
+    Judged,
+    ScenarioResult,
+    comparison_summary,
+    ledger,
+    plan_summary,
+    ranking,
+    scenario_summary,
+)
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.execution.outcome import ENDS, End
 from sva_bench.mission.plan import Plan
@@ -156,3 +164,26 @@ def test_one_trial_has_figures_and_no_intervals() -> None:
     assert summary["executed_controlled"] == {"mean": 130.0, "ci95": None}
     assert summary["end_shares"]["uv2"] == {"home": {"share": 1.0, "ci95": None}}
     assert summary["distribution"]["q50"] == 160.0
+
+
+def test_pairs_are_told_apart_by_intervals_adjusted_for_their_number() -> None:
+    def plan(name: str, figures: list[float]) -> Judged:
+        trials = executed([[x, 0] for x in figures], [["home", "home"]] * 4, [100, 0], promised=100.0, planner=name)
+        return Judged(expected=100.0, executed=trials)
+
+    # Differences a - b: 3, 3, 5, 5 over trials without noise: mean 4, half-width t(0.975, 3) x sqrt(4 / 3 / 4) = 1.84,
+    # for three pairs t(1 - 0.05 / 6, 3) = 4.857 makes 2.80. c is a twin of b.
+    a, b, c = plan("a", [13, 23, 15, 25]), plan("b", [10, 20, 10, 20]), plan("c", [10, 20, 10, 20])
+    summary = comparison_summary([b, a, c], ROBOTS, noisy=False)
+    first = summary["comparisons"][0]
+    assert (first["a"], first["b"], first["mean"]) == ("b", "a", -4.0)
+    assert first["ci95"] == pytest.approx([-4 - 1.8374, -4 + 1.8374], abs=1e-3)
+    assert first["ci95_adjusted"] == pytest.approx([-4 - 2.8042, -4 + 2.8042], abs=1e-3)
+    assert [pair["verdict"] for pair in summary["comparisons"]] == [
+        "a is worth more", "not distinguishable from zero", "a is worth more"]
+    assert summary["ranking"] == [{"rank": 1, "plan": "a", "mean": 19.0}, {"rank": 2, "plan": "b", "mean": 15.0},
+                                  {"rank": 2, "plan": "c", "mean": 15.0}]
+
+
+def test_one_plan_alone_has_a_rank_and_nothing_to_be_compared_with() -> None:
+    assert ranking({"mine": 3.0}, []) == [{"rank": 1, "plan": "mine", "mean": 3.0}]
