@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 
 from sva_bench.analysis.report import Content, write_report
-from sva_bench.analysis.summary import Judged, ScenarioResult, comparison_summary, scenario_summary
-from sva_bench.errors import ExitCode, SvaBenchError
-from sva_bench.execution.execute import Case, Executed, Fidelity, Settings, execute
+from sva_bench.analysis.summary import Judged, comparison_summary
+from sva_bench.errors import BadInput, ExitCode, SvaBenchError
+from sva_bench.execution.execute import Case, Drives, Executed, Fidelity, Settings, execute
+from sva_bench.informed import InformedPlans, cases_of, is_part, plan_informed, put_together
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance, Vehicle, write_instance
 from sva_bench.mission.plan import Plan, read_plan, write_plan
+from sva_bench.precision import Precision
 from sva_bench.recording.rerun import record
 from sva_bench.runs import (
     leg_columns,
@@ -43,6 +45,8 @@ from sva_bench.solver.two_stage import (
     plan_stochastic,
     wait_and_see,
 )
+from sva_bench.tally import WORST, by_stem, head, model_is_executed, summarise
+from sva_bench.tally import expected_value as expected_value
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.travel.roadmap import PlannerName
 from sva_bench.travel.times import plan_travel_times
@@ -70,6 +74,8 @@ class Options:
         planner: How paths are planned.
         limits: When a solve may stop.
         evpi: Work out the value of perfect information however many outcomes there are.
+        informed: Execute what somebody would plan who knew beforehand who is available, too.
+        precision: Go on with more trials and noise draws until the executed VSS is so sure.
     """
 
     seed: int = 0
@@ -79,10 +85,15 @@ class Options:
     planner: PlannerName = "prmstar"
     limits: SolveLimits = field(default_factory=SolveLimits)
     evpi: bool = False
+    informed: bool = False
+    precision: Precision | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Everything that changes results."""
-        return {"trials": self.trials, "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
+        asked = {} if self.precision is None else {"precision_pct": self.precision.pct,
+                                                   "max_trials": self.precision.max_trials}
+        return {**asked, "informed": self.informed, "trials": self.trials,
+                "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
                 "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
 
 
@@ -107,6 +118,7 @@ class Planned:
         evpi: What that is worth beyond the stochastic plan.
         value_of_process: Greatest value under failures along the route less that of the plan for ``mission``; ``None``
             where such failures are neither planned for nor executed.
+        informed: What somebody would plan who knew beforehand who is available, on request.
     """
 
     instance: Instance
@@ -117,6 +129,11 @@ class Planned:
     ws: float | None
     evpi: float | None
     value_of_process: float | None
+    informed: InformedPlans | None
+
+    def all_plans(self) -> list[Plan]:
+        """Every plan that is executed for its own sake."""
+        return [self.stochastic, self.deterministic, *(self.informed.plans.values() if self.informed else ())]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -144,28 +161,41 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
         costs = plan_costs(world, options.planner, progress)
     with clock.phase("planning"):
         planned = plan_scenarios(world, costs, options, progress)
-    if any(plan.status == "interrupted" for p in planned.values() for plan in (p.stochastic, p.deterministic)):
+    if any(plan.status == "interrupted" for p in planned.values() for plan in p.all_plans()):
         raise KeyboardInterrupt
-    settings = _settings(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios for name, plan in (
         ("stochastic", planned[scenario.name].stochastic), ("deterministic", planned[scenario.name].deterministic))]
-    if _model_is_executed(world):  # what the VSS would be against the least fortunate of the tied plans
-        cases += [Case(scenario=scenario, planner=_WORST, plan=worst) for scenario in world.scenarios
+    if model_is_executed(world):  # what the VSS would be against the least fortunate of the tied plans
+        cases += [Case(scenario=scenario, planner=WORST, plan=worst) for scenario in world.scenarios
                   if (worst := planned[scenario.name].worst) is not None]
-    with clock.phase("execution"):
-        executed = execute(world, costs, cases, settings, executor,
-                           lambda done, of: progress("driving routes", done, of))
-    return Measured(costs=costs, planned=planned, clock=clock,
-                    executed=[run for run in executed if run.case.planner != _WORST],
-                    summary=summarise(world, options, settings, costs, planned, executed))
+    cases += [case for scenario in world.scenarios if (known := planned[scenario.name].informed) is not None
+              for case in cases_of(scenario, known)]
+    drives: Drives = {}
+    while True:
+        settings = _settings(world, options)
+        with clock.phase("execution"):
+            executed = execute(world, costs, cases, settings, executor,
+                               lambda done, of: progress("driving routes", done, of), drives)
+        executed = _with_informed(world, executed)
+        summary = summarise(world, options, settings, costs, planned, executed)
+        larger = options.precision.next_size(summary) if options.precision else None
+        if larger is None:
+            break
+        options = replace(options, trials=larger[0], rollouts=larger[1])
+    return Measured(costs=costs, planned=planned, clock=clock, summary=summary,
+                    executed=[run for run in executed if run.case.planner != WORST])
 
 
-_WORST = "deterministic, worst of its ties"
-
-
-def _model_is_executed(world: World) -> bool:
-    """Whether failures are planned for and executed as in the two-stage model."""
-    return world.plan_failure == world.execute_failure == "mission"
+def _with_informed(world: World, executed: list[Executed]) -> list[Executed]:
+    """What was executed, the parts of the informed planner put together, scenario by scenario."""
+    found: list[Executed] = []
+    for scenario in world.scenarios:
+        mine = [run for run in executed if run.case.scenario.name == scenario.name]
+        parts = [run for run in mine if is_part(run.case.planner)]
+        found += [run for run in mine if not is_part(run.case.planner)]
+        if parts:
+            found.append(put_together(parts, [robot.name for robot in world.robots]))
+    return found
 
 
 def execute_plans(
@@ -188,7 +218,7 @@ def execute_plans(
     with clock.phase("execution"):
         executed = execute(world, costs, cases, settings, executor,
                            lambda done, of: progress("driving routes", done, of))
-    runs, instances = _by_stem(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
+    runs, instances = by_stem(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
     robots, entries = [robot.name for robot in world.robots], []
     for scenario in world.scenarios:
         # What the routes are worth if fuel and limits allow them: an infeasible plan may be here to be seen failing.
@@ -196,7 +226,7 @@ def execute_plans(
         judged = [Judged(expected=expected_value(truth, plan), executed=runs[f"{scenario.name}-{name}"])
                   for name, plan in plans.items()]
         entries.append(comparison_summary(judged, robots, noisy=not world.noise.silent))
-    summary = _head(world, options, settings, costs) | {"reproducible": True, "scenarios": entries}
+    summary = head(world, options, settings, costs) | {"reproducible": True, "scenarios": entries}
     return _publish(world, options, costs, instances, executed, summary, out, clock, progress,
                     identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
                                         for name, plan in plans.items()}})
@@ -293,7 +323,7 @@ def _publish(
         told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
         write_json(folder / "manifest.json", told)
         write_report(folder / "report.html", Content(
-            summary=summary, routes={k: v.case.plan.routes for k, v in _by_stem(executed).items()}, legs=legs,
+            summary=summary, routes={k: v.case.plan.routes for k, v in by_stem(executed).items()}, legs=legs,
             world=world, manifest=told))
     return Run(folder=out / name, summary=summary)
 
@@ -336,7 +366,14 @@ def nominal_scenario(world: World) -> Scenario:
 def plan_scenarios(
     world: World, costs: Mapping[str, FuelCosts], options: Options, progress: Progress
 ) -> dict[str, Planned]:
-    """Both plans of each scenario. Scenarios share what doesn't depend on availabilities."""
+    """Both plans of each scenario. Scenarios share what doesn't depend on availabilities.
+
+    Raises:
+        BadInput: If the informed planner is asked for where nothing can be known beforehand.
+    """
+    if options.informed and not model_is_executed(world):
+        raise BadInput("the informed planner knows who is available for a mission; with failures along the route there "
+                       "is no such thing: leave out --informed, or plan for and execute mission")
     known: Knowledge | None = None
     nominal: Plan | None = None
     planned: dict[str, Planned] = {}
@@ -361,60 +398,10 @@ def plan_scenarios(
             instance=instance, stochastic=pair.stochastic, deterministic=pair.plan,
             vss_range=(rp - pair.most, rp - pair.least), worst=pair.worst,
             ws=None if foresight is None else max(foresight, rp),
-            evpi=None if foresight is None else max(foresight - rp, 0.0), value_of_process=process)
+            evpi=None if foresight is None else max(foresight - rp, 0.0), value_of_process=process,
+            informed=plan_informed(instance, options.limits, known, force=options.evpi) if options.informed else None)
         progress("solving", number + 1, len(world.scenarios))
     return planned
-
-
-def expected_value(instance: Instance, plan: Plan) -> float:
-    """Closed-form value of a plan under the instance's failure process, by the independent check."""
-    certificate = certify(instance, replace(plan, value=None))
-    if certificate.expected is None:
-        raise RuntimeError(f"a plan for {instance.name} fails its check: {'; '.join(certificate.reasons)}")
-    return certificate.expected
-
-
-def summarise(
-    world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts],
-    planned: Mapping[str, Planned], executed: list[Executed],
-) -> dict[str, Any]:
-    """The content of ``summary.json``."""
-    runs = _by_stem(executed)
-    mission = _model_is_executed(world)
-    robots = [robot.name for robot in world.robots]
-    scenarios = []
-    for scenario in world.scenarios:
-        plans = planned[scenario.name]
-        truth = replace(plans.instance, failure=world.execute_failure)
-        judged = {name: Judged(expected=expected_value(truth, plan), executed=runs[f"{scenario.name}-{name}"])
-                  for name, plan in (("stochastic", plans.stochastic), ("deterministic", plans.deterministic))}
-        scenarios.append(scenario_summary(ScenarioResult(
-            stochastic=judged["stochastic"], deterministic=judged["deterministic"],
-            modelled_range=plans.vss_range if mission else None,
-            # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
-            vss_mean_value=0.0 if mission else None, worst=runs.get(f"{scenario.name}-{_WORST}"),
-            ws=plans.ws if mission else None, evpi=plans.evpi if mission else None,
-            value_of_process=plans.value_of_process,
-        ), robots, noisy=not world.noise.silent))
-    proved = all(plan.status == "optimal" for p in planned.values() for plan in (p.stochastic, p.deterministic))
-    return _head(world, options, settings, costs) | {"reproducible": proved, "scenarios": scenarios}
-
-
-def _head(world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
-    """What every summary says first."""
-    pairs = sum(cost.pairs for cost in costs.values())
-    changed = sum(cost.changed_pct * cost.pairs for cost in costs.values())
-    return {
-        "format": "sva-bench/summary@1", "world": world.name, "seed": options.seed, "trials": settings.trials,
-        "rollouts": settings.rollouts, "fidelity": settings.fidelity,
-        "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
-        "travel": {"pairs": pairs, "triangle_violations_pct": round(changed / pairs, 6) if pairs else 0.0,
-                   "max_excess_pct": round(max((c.max_excess_pct for c in costs.values()), default=0.0), 6)},
-    }
-
-
-def _by_stem(executed: list[Executed]) -> dict[str, Executed]:
-    return {f"{run.case.scenario.name}-{run.case.planner}": run for run in executed}
 
 
 class Stopwatch:

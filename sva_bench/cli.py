@@ -80,6 +80,13 @@ def run(
     gap: Gap = 1e-6,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
                                                       "takes.")] = False,
+    informed: Annotated[bool, typer.Option("--informed", help="Execute as well what somebody would plan who knew "
+                                                              "beforehand who is available.")] = False,
+    precision: Annotated[str | None, typer.Option(
+        metavar="PCT%", help="Go on with more trials and noise draws until the interval of the executed VSS is within "
+        "so many per cent of the stochastic plan's mean.", show_default="none")] = None,
+    max_trials: Annotated[int, typer.Option(min=1, max=10_000_000, help="With --precision: trials at which to stop all "
+                                                                        "the same.")] = 100_000,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -92,8 +99,10 @@ def run(
     """
     with holding_back_ctrl_c():
         from sva_bench.inputs import about, load
+        from sva_bench.precision import precision_of
 
     set_up_logging(verbose)
+    asked = None if precision is None else precision_of(precision, max_trials, trials, rollouts)
     loaded = load(world, scenario, margin, plan_failure, execute_failure)
     # After the world is read: an error in the file is said at once.
     with holding_back_ctrl_c():
@@ -102,7 +111,8 @@ def run(
         from sva_bench.solver.two_stage import SolveLimits
 
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
-                      limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi)
+                      limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
+                      precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers) as executor:
         result = run_bench(loaded, options, out, executor, progress)
     _show(result.summary, result.folder, as_json, csv=csv)

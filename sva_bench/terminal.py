@@ -97,7 +97,7 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 def print_summary(summary: Any) -> None:
     """Print a summary as a table, and what it comes to."""
-    from sva_bench.analysis.wording import answer, ranked, vss_verdict, with_interval
+    from sva_bench.analysis.wording import answer, ranked, remarks, vss_verdict, with_interval
 
     console = results()
     scenarios, travel = summary["scenarios"], summary["travel"]
@@ -140,6 +140,8 @@ def print_summary(summary: Any) -> None:
         if scenario.get("comparisons"):
             console.print(f"{scenario['name']}: {ranked(scenario)}", highlight=False, markup=False)
     console.print(answer(summary), highlight=False)
+    for said in remarks(summary):
+        console.print(said, highlight=False)
     if not summary["reproducible"]:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
 

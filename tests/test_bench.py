@@ -8,18 +8,24 @@ from typing import Any
 import pytest
 
 from sva_bench.bench import Options, measure
+from sva_bench.errors import BadInput
+from sva_bench.precision import Precision
 from sva_bench.world.model import World
-from tests.worlds_for_tests import world_of
+from tests.worlds_for_tests import SMALL, world_of
 
 QUICK = Options(trials=2000, rollouts=4, fidelity="kinematic")
 
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> World:
-    # 40 s instead of 120 s: not all can be had, so the plans differ.
-    path = tmp_path_factory.mktemp("world")
-    loaded = world_of(path)
-    return replace(loaded, robots=tuple(replace(robot, mission_limit_s=40.0) for robot in loaded.robots))
+    # 30 s instead of 120 s: not all can be had, so the plans differ; by 14 where uv2 is there in 40 % of the missions.
+    text = SMALL.replace("{p1: 10, p2: 20, p3: 30, p4: 40}", "{p1: 30, p2: 20, p3: 25, p4: 20}")
+    text = text.replace("half: {uv2: 0.5}", "half: {uv2: 0.4}").replace("limit_s: 120", "limit_s: 30")
+    return world_of(tmp_path_factory.mktemp("world"), text)
+
+
+def vss_of(scenario: Any) -> float:
+    return float(scenario["vss"]["modelled"])
 
 
 def summary_of(world: World) -> Any:
@@ -29,6 +35,7 @@ def summary_of(world: World) -> Any:
 def test_figures_of_a_mission_agree_with_what_the_model_says(world: World) -> None:
     summary = summary_of(world)
     for scenario in summary["scenarios"]:
+        assert vss_of(scenario) == pytest.approx(14.0 if scenario["name"] == "half" else 0.0)
         plan, vss = scenario["plans"]["stochastic"], scenario["vss"]
         assert scenario["ws"] == pytest.approx(plan["expected"] + scenario["evpi"])
         assert scenario["value_of_process"] is None
@@ -45,3 +52,37 @@ def test_planning_for_failures_along_the_route_is_worth_something_under_them_alo
     assert along["value_of_process"] == exact["value_of_process"] == pytest.approx(
         exact["plans"]["stochastic"]["expected"] - along["plans"]["stochastic"]["expected"])
     assert along["ws"] is along["evpi"] is along["vss_mean_value"] is along["vss"]["executed_range"] is None
+
+
+def test_the_informed_planner_comes_to_the_wait_and_see_value(world: World) -> None:
+    summary = measure(world, replace(QUICK, informed=True), None, lambda *_: None).summary
+    for scenario in summary["scenarios"]:
+        informed = scenario["plans"]["informed"]
+        assert informed["expected"] == pytest.approx(scenario["ws"])
+        found = scenario["evpi_executed"]
+        low, high = found["ci95"]
+        assert low - 1e-9 <= scenario["evpi"] <= high + 1e-9  # of seed 0; nobody runs dry in this world
+        assert found["mean"] == pytest.approx(
+            informed["executed"]["mean"] - scenario["plans"]["stochastic"]["executed"]["mean"])
+        assert informed["ledger"]["out_of_fuel"] == 0.0
+
+
+def test_nothing_can_be_known_beforehand_of_failures_along_the_route(world: World) -> None:
+    with pytest.raises(BadInput, match="leave out --informed"):
+        measure(replace(world, execute_failure="per_leg"), replace(QUICK, informed=True), None, lambda *_: None)
+
+
+def test_a_run_goes_on_until_it_is_as_precise_as_asked_for(world: World) -> None:
+    begun = replace(QUICK, trials=50)
+    loose, tight, never = (measure(
+        world, replace(begun, precision=Precision(pct=pct, max_trials=most)), None, lambda *_: None).summary
+        for pct, most in ((1000.0, 100), (5.2, 400), (1e-6, 80)))
+    assert (loose["trials"], loose["precision"]["met"]) == (50, True)
+    assert 50 < tight["trials"] < 400
+    assert tight["precision"]["met"]
+    assert tight["precision"]["reached_pct"] <= 5.2
+    assert tight["rollouts"] == 4 * tight["trials"] / 50
+    assert (never["trials"], never["precision"]["met"]) == (80, False)
+    # The trials are those of a run that was told to have as many from the start.
+    told = measure(world, replace(begun, trials=tight["trials"], rollouts=tight["rollouts"]), None, lambda *_: None)
+    assert told.summary["scenarios"] == tight["scenarios"]

@@ -19,6 +19,7 @@ from sva_bench.analysis.wording import (
     optional,
     per_cent,
     ranked,
+    remarks,
     vss_verdict,
     with_interval,
 )
@@ -89,7 +90,7 @@ def _answer(summary: Mapping[str, Any]) -> list[str]:
     unproved = "" if summary["reproducible"] else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{text(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
-            unproved, "</div>"]
+            *(note(said) for said in remarks(summary)), unproved, "</div>"]
 
 
 def _comparison(scenarios: Scenarios) -> list[str]:

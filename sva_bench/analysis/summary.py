@@ -40,6 +40,7 @@ class ScenarioResult:
         ws: Value of knowing beforehand who is available (wait and see); ``None`` if not computed.
         evpi: Expected value of perfect information; ``None`` if not computed.
         value_of_process: What planning for failures along the route is worth under them; ``None`` under ``mission``.
+        informed: The planner that knows beforehand who is available, where it was asked for.
     """
 
     stochastic: Judged
@@ -50,6 +51,7 @@ class ScenarioResult:
     ws: float | None
     evpi: float | None
     value_of_process: float | None
+    informed: Judged | None = None
 
 
 def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
@@ -65,7 +67,8 @@ def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bo
     return {
         "name": scenario.name,
         "availability": {name: scenario.availability[name] for name in robots},
-        "plans": {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy) for judged in (s, d)},
+        "plans": {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy)
+                  for judged in (s, d, result.informed) if judged is not None},
         "vss": {
             "modelled": modelled + 0.0,
             "modelled_pct": _percent(modelled, s.expected),
@@ -83,7 +86,15 @@ def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bo
         "ws": result.ws,
         "evpi": result.evpi,
         "value_of_process": result.value_of_process,
+        **({} if result.informed is None else {"evpi_executed": _beyond(result.informed, s, noisy=noisy)}),
     }
+
+
+def _beyond(informed: Judged, stochastic: Judged, *, noisy: bool) -> dict[str, Any]:
+    """What knowing beforehand was worth, in the same trials."""
+    found = estimate(totals(informed.executed) - totals(stochastic.executed), stochastic.executed.rollout, noisy=noisy)
+    return {**found.as_dict(), "distinguishable": found.distinguishable,
+            "verdict": verdict_of(found, "informed", "stochastic")}
 
 
 def verdict_of(difference: Estimate, a: str, b: str) -> str:

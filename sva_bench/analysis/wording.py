@@ -68,6 +68,22 @@ def finding(scenario: Mapping[str, Any]) -> str:
            f"{min(map(abs, interval)):.1f} to {max(map(abs, interval)):.1f}"
 
 
+def remarks(summary: Mapping[str, Any]) -> list[str]:
+    """What was asked for beside the comparison of the two plans: precision, and the informed planner."""
+    said = []
+    asked = summary.get("precision")
+    if asked is not None:
+        reached = "no interval" if asked["reached_pct"] is None else f"{asked['reached_pct']:.2g} %"
+        said.append(f"Precision asked for: VSS within {asked['asked_pct']:g} % of the stochastic plan's incentive; "
+                    f"reached: {reached} after {number(summary['trials'], 'trial')} under "
+                    f"{number(summary['rollouts'], 'noise draw')}{'' if asked['met'] else ', the most that were allowed'}.")
+    known = [f"{s['name']} {verdict(s['evpi_executed'])}" for s in summary["scenarios"] if "evpi_executed" in s]
+    if known:
+        said.append("Knowing beforehand who is available, or planning anew at the base, would add, executed: "
+                    f"{'; '.join(known)}.")
+    return said
+
+
 def verdict(difference: Mapping[str, Any]) -> str:
     """A difference with its interval, or that there is none to speak of."""
     if difference["ci95"] is None:

@@ -174,9 +174,14 @@ Key = tuple[str, Route, int, int]
 """Robot, legs driven, rollout, and the trial under ``physics``, else 0: what a drive depends on in one execution."""
 
 
+Drives = dict[Key, Driven]
+"""What was driven already, of the same world, seed and fidelity."""
+
+
 def execute(
     world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings,
     executor: Executor | None = None, progress: Callable[[int, int], None] | None = None,
+    drives: Drives | None = None,
 ) -> list[Executed]:
     """Execute plans over all trials.
 
@@ -187,10 +192,13 @@ def execute(
         settings: Seed, trials, rollouts, fidelity.
         executor: Where drives run; ``None`` = here.
         progress: Called with the number of drives done and of all.
+        drives: What was driven already; what is driven now is added.
     """
+    drives = {} if drives is None else drives
     orders = [[_orders(world, robot, case.plan.route(robot.name)) for robot in world.robots] for case in cases]
     fails = [_failures(world, case, own, settings) for case, own in zip(cases, orders, strict=True)]
-    drives = _drive_all(_tasks(world, costs, settings, orders, fails), executor, progress)
+    tasks = _tasks(world, costs, settings, orders, fails)
+    drives.update(_drive_all({key: task for key, task in tasks.items() if key not in drives}, executor, progress))
     return [_settle_all(world, costs, case, own, failed, settings, drives)
             for case, own, failed in zip(cases, orders, fails, strict=True)]
 
@@ -255,8 +263,8 @@ def _legs(costs: FuelCosts, route: Route) -> tuple[Leg, ...]:
 
 def _drive_all(
     tasks: Mapping[Key, DriveTask], executor: Executor | None, progress: Callable[[int, int], None] | None
-) -> dict[Key, Driven]:
-    drives: dict[Key, Driven] = {}
+) -> Drives:
+    drives: Drives = {}
     if executor is None:
         for key, task in tasks.items():
             drives[key] = drive_route(task)
