@@ -16,6 +16,7 @@ import numpy as np
 
 from sva_bench.analysis.report import Content, write_report
 from sva_bench.analysis.summary import Judged, comparison_summary
+from sva_bench.assumptions import PlansByProcess, cross_table
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError
 from sva_bench.execution.execute import Case, Drives, Executed, Fidelity, Settings, execute
 from sva_bench.informed import InformedPlans, cases_of, is_part, plan_informed, put_together
@@ -75,6 +76,7 @@ class Options:
         limits: When a solve may stop.
         evpi: Work out the value of perfect information however many outcomes there are.
         informed: Execute what somebody would plan who knew beforehand who is available, too.
+        assumptions: Execute plans for both failure processes under both.
         precision: Go on with more trials and noise draws until the executed VSS is so sure.
     """
 
@@ -86,13 +88,14 @@ class Options:
     limits: SolveLimits = field(default_factory=SolveLimits)
     evpi: bool = False
     informed: bool = False
+    assumptions: bool = False
     precision: Precision | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Everything that changes results."""
         asked = {} if self.precision is None else {"precision_pct": self.precision.pct,
                                                    "max_trials": self.precision.max_trials}
-        return {**asked, "informed": self.informed, "trials": self.trials,
+        return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
                 "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
                 "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
 
@@ -119,6 +122,7 @@ class Planned:
         value_of_process: Greatest value under failures along the route less that of the plan for ``mission``; ``None``
             where such failures are neither planned for nor executed.
         informed: What somebody would plan who knew beforehand who is available, on request.
+        by_process: The plans for both failure processes, where they are known.
     """
 
     instance: Instance
@@ -130,6 +134,7 @@ class Planned:
     evpi: float | None
     value_of_process: float | None
     informed: InformedPlans | None
+    by_process: PlansByProcess | None
 
     def all_plans(self) -> list[Plan]:
         """Every plan that is executed for its own sake."""
@@ -182,6 +187,11 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
         if larger is None:
             break
         options = replace(options, trials=larger[0], rollouts=larger[1])
+    if options.assumptions:
+        plans = {name: p.by_process for name, p in planned.items() if p.by_process is not None}
+        with clock.phase("execution"):
+            rows = cross_table(world, costs, plans, settings, executor, drives)
+        summary["scenarios"] = [{**s, "assumptions": rows[s["name"]]} for s in summary["scenarios"]]
     return Measured(costs=costs, planned=planned, clock=clock, summary=summary,
                     executed=[run for run in executed if run.case.planner != WORST])
 
@@ -387,10 +397,12 @@ def plan_scenarios(
         pair = plan_deterministic(instance, stochastic, options.limits, nominal=nominal, known=known)
         rp = expected_value(instance, pair.stochastic)
         foresight = wait_and_see(instance, options.limits, known, force=options.evpi)
-        process = None
-        if "per_leg" in (world.plan_failure, world.execute_failure):
+        process = by_process = None
+        if options.assumptions or "per_leg" in (world.plan_failure, world.execute_failure):
             along = replace(instance, failure="per_leg")
             best = plan_stochastic(along, options.limits, pair.stochastic, known)
+            by_process = PlansByProcess(instance=instance, deterministic=pair.plan,
+                                        stochastic={"mission": pair.stochastic, "per_leg": best})
             process = max(expected_value(along, best) - expected_value(along, pair.stochastic), 0.0)
             if world.plan_failure == "per_leg":
                 pair = replace(pair, stochastic=best)
@@ -399,7 +411,8 @@ def plan_scenarios(
             vss_range=(rp - pair.most, rp - pair.least), worst=pair.worst,
             ws=None if foresight is None else max(foresight, rp),
             evpi=None if foresight is None else max(foresight - rp, 0.0), value_of_process=process,
-            informed=plan_informed(instance, options.limits, known, force=options.evpi) if options.informed else None)
+            informed=plan_informed(instance, options.limits, known, force=options.evpi) if options.informed else None,
+            by_process=by_process)
         progress("solving", number + 1, len(world.scenarios))
     return planned
 

@@ -82,6 +82,8 @@ def run(
                                                       "takes.")] = False,
     informed: Annotated[bool, typer.Option("--informed", help="Execute as well what somebody would plan who knew "
                                                               "beforehand who is available.")] = False,
+    assumptions: Annotated[bool, typer.Option("--assumptions", help="Execute plans made for mission under per_leg and "
+                                              "the reverse: what does the wrong assumption cost?")] = False,
     precision: Annotated[str | None, typer.Option(
         metavar="PCT%", help="Go on with more trials and noise draws until the interval of the executed VSS is within "
         "so many per cent of the stochastic plan's mean.", show_default="none")] = None,
@@ -112,7 +114,7 @@ def run(
 
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
-                      precision=asked)
+                      assumptions=assumptions, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers) as executor:
         result = run_bench(loaded, options, out, executor, progress)
     _show(result.summary, result.folder, as_json, csv=csv)

@@ -97,7 +97,15 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 def print_summary(summary: Any) -> None:
     """Print a summary as a table, and what it comes to."""
-    from sva_bench.analysis.wording import answer, ranked, remarks, vss_verdict, with_interval
+    from sva_bench.analysis.wording import (
+        ASSUMPTION_HEAD,
+        answer,
+        assumption_rows,
+        ranked,
+        remarks,
+        vss_verdict,
+        with_interval,
+    )
 
     console = results()
     scenarios, travel = summary["scenarios"], summary["travel"]
@@ -142,6 +150,13 @@ def print_summary(summary: Any) -> None:
     console.print(answer(summary), highlight=False)
     for said in remarks(summary):
         console.print(said, highlight=False)
+    if rows := assumption_rows(scenarios):
+        crossed = Table(title="Plans under the failures they were made for and under the others", title_justify="left")
+        for number, heading in enumerate(ASSUMPTION_HEAD):
+            crossed.add_column(heading, justify="left" if number < 4 else "right")
+        for row in rows:
+            crossed.add_row(*row)
+        console.print(crossed)
     if not summary["reproducible"]:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
 

@@ -86,3 +86,20 @@ def test_a_run_goes_on_until_it_is_as_precise_as_asked_for(world: World) -> None
     # The trials are those of a run that was told to have as many from the start.
     told = measure(world, replace(begun, trials=tight["trials"], rollouts=tight["rollouts"]), None, lambda *_: None)
     assert told.summary["scenarios"] == tight["scenarios"]
+
+
+def test_the_wrong_assumption_costs_what_the_plan_for_the_right_one_collects_more(world: World) -> None:
+    summary = measure(world, replace(QUICK, assumptions=True), None, lambda *_: None).summary
+    for scenario in summary["scenarios"]:
+        rows = scenario["assumptions"]
+        assert [(row["executed_under"], row["planner"], row["planned_for"]) for row in rows] == [
+            (process, planner, made_for) for process in ("mission", "per_leg") for planner, made_for in (
+                ("stochastic", "mission"), ("stochastic", "per_leg"), ("deterministic", None))]
+        for row in rows:
+            assert row["loss_modelled"] >= -1e-9
+            if row["planned_for"] == row["executed_under"]:
+                assert row["loss"] == {"mean": 0.0, "ci95": [0.0, 0.0], "distinguishable": False}
+        # Under mission the table repeats what the run itself executed.
+        for row, name in ((rows[0], "stochastic"), (rows[2], "deterministic")):
+            assert row["executed"] == scenario["plans"][name]["executed"]
+        assert rows[3]["loss_modelled"] == pytest.approx(scenario["value_of_process"])

@@ -12,8 +12,10 @@ import numpy as np
 
 from sva_bench.analysis.page import figure, heading, note, table, text, write_page
 from sva_bench.analysis.wording import (
+    ASSUMPTION_HEAD,
     adjusted,
     answer,
+    assumption_rows,
     finding,
     number,
     optional,
@@ -68,6 +70,7 @@ def write_report(path: Path, content: Content) -> None:
         *_world(content.world),
         *_over_trials(scenarios),
         *_from_promise(scenarios),
+        *_assumptions(scenarios),
         *_ends(scenarios),
         *_legs(content.legs),
         *_routes(content.routes),
@@ -158,6 +161,15 @@ def _from_promise(scenarios: Scenarios) -> list[str]:
          "executed, luck of the draw taken out"], rows, words=(0, 1)),
         note("Assumption: the plan's value under the failures executed, against what its maker believed. Draws: "
              "failures as drawn, against their expectation. Then what each unhappy end cost.")]
+
+
+def _assumptions(scenarios: Scenarios) -> list[str]:
+    rows = assumption_rows(scenarios)
+    if not rows:
+        return []
+    return [heading("The wrong assumption"), table(ASSUMPTION_HEAD, rows, words=(0, 1, 2, 3)),
+            note("Loss: what the stochastic plan for the failures that were executed collects beyond this one, in the "
+                 "same trials.")]
 
 
 def _ends(scenarios: Scenarios) -> list[str]:

@@ -76,12 +76,23 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
         reached = "no interval" if asked["reached_pct"] is None else f"{asked['reached_pct']:.2g} %"
         said.append(f"Precision asked for: VSS within {asked['asked_pct']:g} % of the stochastic plan's incentive; "
                     f"reached: {reached} after {number(summary['trials'], 'trial')} under "
-                    f"{number(summary['rollouts'], 'noise draw')}{'' if asked['met'] else ', the most that were allowed'}.")
+                    f"{number(summary['rollouts'], 'noise draw')}"
+                    f"{'' if asked['met'] else ', the most that were allowed'}.")
     known = [f"{s['name']} {verdict(s['evpi_executed'])}" for s in summary["scenarios"] if "evpi_executed" in s]
     if known:
         said.append("Knowing beforehand who is available, or planning anew at the base, would add, executed: "
                     f"{'; '.join(known)}.")
     return said
+
+
+def assumption_rows(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Scenario, failures executed, plan, what it was made for, expected, executed, loss; one row a plan."""
+    return [[s["name"], row["executed_under"], row["planner"], row["planned_for"] or "no failures",
+             f"{row['expected']:.1f}", with_interval(row["executed"]), verdict(row["loss"])]
+            for s in scenarios for row in s.get("assumptions", ())]
+
+
+ASSUMPTION_HEAD = ("scenario", "executed under", "plan", "made for", "expected", "executed", "loss")
 
 
 def verdict(difference: Mapping[str, Any]) -> str:
