@@ -26,6 +26,7 @@ from sva_bench.options import (
     Method,
     Objective,
     Out,
+    Part,
     PlannerOption,
     RiskKind,
     Rollouts,
@@ -353,6 +354,48 @@ def view(
         from sva_bench.recording.viewer import view as open_viewer
 
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
+
+
+@app.command()
+def reproduce(
+    part: Annotated[Part, typer.Argument(metavar="PART", help="rewards (Figure 4), simulation (Figures 7 and 8) or "
+                                         "runtimes (the tables of section 5.1).", show_default=False)],
+    worlds: Annotated[list[Path] | None, typer.Argument(metavar="[WORLD...]", help="simulation: the maps.",
+                                                        show_default="the four shipped ones, in worlds/")] = None,
+    trials: Trials = 1000,
+    rollouts: Rollouts = 8,
+    fidelity: FidelityOption = "rollout",
+    seed: Seed = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (Markdown); default: standard "
+                                                "output.", show_default=False)] = None,
+    workers: WorkerCount = None,
+    verbose: Verbose = False,
+) -> None:
+    """The paper's experiments again, ours beside its figures."""
+    set_up_logging(verbose)
+    if worlds and part != "simulation":
+        raise BadInput(f"reproduce {part} takes no worlds")
+    with holding_back_ctrl_c():
+        from sva_bench import reproduce as paper
+        from sva_bench.execution.execute import Settings
+        from sva_bench.inputs import load
+
+    if part == "runtimes":
+        code = paper.runtimes()
+        if code:
+            raise typer.Exit(code)
+        return
+    with progress_bars() as progress:
+        if part == "rewards":
+            page = paper.rewards_page(paper.rewards(progress=progress))
+        else:
+            maps = worlds or [Path("worlds") / f"{name}.yaml" for name in
+                              ("four-rooms", "open-field", "warehouse", "maze")]
+            loaded = [load(path) for path in maps]
+            settings = Settings(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity)
+            with local_workers(workers) as executor:
+                page = paper.simulation_page(paper.simulation(loaded, settings, executor, progress), settings)
+    write_result(output, page)
 
 
 @app.command()

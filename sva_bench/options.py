@@ -17,6 +17,7 @@ RiskKind = Literal["cvar", "excess"]
 FailureProcess = Literal["mission", "per_leg"]
 Family = Literal["A", "B", "C"]
 WorldFamily = Literal["rooms", "field", "aisles", "maze"]
+Part = Literal["rewards", "simulation", "runtimes"]
 Objective = Literal["stochastic", "deterministic"]
 Unknown = Literal["occupied", "free"]
 

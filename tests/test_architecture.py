@@ -30,10 +30,10 @@ MAY_KNOW: dict[str, set[str]] = {
 }
 # These put the parts together, and may know all.
 TOP = {"options", "inputs", "bench", "batch", "pictures", "proposal", "worlds", "stored", "informed", "precision",
-       "tally", "assumptions", "cli", "cli_inputs", "terminal", "__main__", "__init__"}
+       "tally", "assumptions", "reproduce", "cli", "cli_inputs", "terminal", "__main__", "__init__"}
 # Of these, those that the command line stands on: they know nothing of it.
 BENCH = {"bench", "batch", "pictures", "proposal", "worlds", "stored", "informed", "precision", "tally",
-         "assumptions"}
+         "assumptions", "reproduce"}
 ONLY_IN = {
     "pybullet": "execution/simulator.py", "pybullet_data": "execution/simulator.py",
     "pybullet_utils": "execution/simulator.py", "ompl": "travel/roadmap.py", "highspy": "solver/highs.py",

@@ -1,0 +1,85 @@
+"""The paper's experiments again, on a small scale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from sva_bench.__main__ import run_command_line
+from sva_bench.bench import NOMINAL, nominal_scenario
+from sva_bench.errors import BadInput
+from sva_bench.execution.execute import Settings
+from sva_bench.reproduce import rewards, rewards_page, runtimes, simulation, simulation_page, three_vehicles
+from tests.worlds_for_tests import SMALL, world_of
+
+SETTINGS = Settings(seed=0, trials=400, rollouts=4, fidelity="kinematic")
+
+
+def test_the_third_vehicle_is_the_doubtful_one_and_earns_more() -> None:
+    team = three_vehicles(10, 0.25, 0).vehicles
+    assert [(v.name, v.availability) for v in team] == [("uv1", 1.0), ("uv2", 1.0), ("uv3", 0.25)]
+    assert [int((v.incentives > 0).sum()) for v in team] == [5, 5, 10]
+
+
+def test_rewards_move_to_the_reliable_vehicles_and_the_vss_grows() -> None:
+    rows = rewards(sizes=(6,), seeds=(0, 1))
+    for seed in (0, 1):
+        cases = [row for row in rows if row.seed == seed]
+        assert [row.availability for row in cases] == [1.0, 0.75, 0.25, 0.0]
+        third = [row.by_vehicle[2] for row in cases]
+        assert third == sorted(third, reverse=True)
+        assert third[-1] == 0
+        assert cases[0].least_pct == 0  # all available: the deterministic plan is right
+        for row in cases:
+            assert sum(row.by_vehicle) == pytest.approx(row.stochastic)
+            assert 0 <= row.least_pct <= row.most_pct
+    page = rewards_page(rows)
+    assert "10 to 30 % more" in page
+    assert "| 6 | 4 | 0 % |" in page
+
+
+def test_the_simulation_is_executed_as_in_the_paper_and_as_planned(tmp_path: Path) -> None:
+    world = world_of(tmp_path, SMALL.replace("limit_s: 120", "limit_s: 30"))
+    rows = simulation([world], SETTINGS, None, lambda *_: None)
+    assert [(row["world"], row["scenario"]) for row in rows] == [("small", "half"), ("small", "safe")]
+    safe = rows[1]
+    assert safe["mission"] == safe["per_leg"]  # nobody fails: both processes are the same
+    assert not safe["mission"]["vss"]["distinguishable"]
+    page = simulation_page(rows, SETTINGS)
+    assert "400 trials, 4 noise draws, fidelity kinematic, seed 0" in page
+    assert page.count("| small | half |") == 2
+
+
+def test_a_world_without_scenarios_is_no_such_study(tmp_path: Path) -> None:
+    world = world_of(tmp_path)
+    bare = replace(world, scenarios=(nominal_scenario(world),))
+    assert bare.scenarios[0].name == NOMINAL
+    with pytest.raises(BadInput, match="has no scenarios"):
+        simulation([bare], SETTINGS, None, lambda *_: None)
+
+
+def test_the_table_of_runtimes_is_the_benchmarks_own() -> None:
+    asked: list[list[str]] = []
+
+    def run(command: list[str], *, cwd: Path, check: bool) -> SimpleNamespace:
+        asked.append(command)
+        assert (cwd / "benchmarks" / "solver" / "paper.py").is_file()
+        assert not check
+        return SimpleNamespace(returncode=130)
+
+    assert runtimes(run) == 130
+    assert asked[0][1:4] == ["-m", "benchmarks.solver.paper", "--quick"]
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["reproduce", "rewards", "worlds/maze.yaml"], "reproduce rewards takes no worlds"),
+    (["reproduce", "simulation", "nowhere.yaml"], "nowhere.yaml: no such file"),
+    (["reproduce", "figures"], "'figures'"),
+])
+def test_what_cant_be_reproduced_is_refused(
+        arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command_line(arguments) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
