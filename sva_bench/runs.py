@@ -105,7 +105,7 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 def write_map(folder: Path, source: MapSource) -> None:
     """Write the files that the world's map was read from, as ``map/`` and the names that the world has for them."""
     for file in source.files:
-        path = folder / "map" / file.name
+        path = folder / MAP / file.name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(file.content)
 
@@ -127,6 +127,9 @@ def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
                 rows["via"].append(sites[int(cost.via[i, j])])
     _write(path, rows, {"raw_s": "s", "repaired_s": "s"})
 
+
+MAP = "map"
+"""Folder in a run folder that holds the files that the world's map was read from, under their names there."""
 
 LEG_COLUMNS = ("scenario", "planner", "rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s")
 

@@ -16,7 +16,7 @@ from sva_bench.analysis.report import Content, write_report
 from sva_bench.documents import check_kind, pretty_yaml, read_json
 from sva_bench.documents import parse_yaml as parse
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.runs import LEG_COLUMNS, draft_of
+from sva_bench.runs import LEG_COLUMNS, MAP, draft_of
 from sva_bench.world.load import world_of
 
 _AGREE = 1e-6  # relative; a mean added up in another order
@@ -74,7 +74,7 @@ def read_content(folder: Path) -> Content:
     try:
         plans = [(s["name"], name, plan["executed"]["mean"]) for s in summary["scenarios"]
                  for name, plan in s["plans"].items()]
-        world = world_of(parse(pretty_yaml(manifest["world"], {}), folder / "manifest.json"))
+        world = world_of(parse(pretty_yaml(manifest["world"], {}), folder / "manifest.json"), folder / MAP)
     except (KeyError, TypeError, AttributeError) as error:
         raise BadFile(folder / "summary.json", None, "", f"no summary or manifest as this version writes it ({error}); "
                       "run the command again") from None

@@ -48,14 +48,18 @@ def load_world(path: Path) -> World:
     return world_of(read_yaml(path))
 
 
-def world_of(document: Document) -> World:
+def world_of(document: Document, folder: Path | None = None) -> World:
     """Resolve a world file's content.
+
+    Args:
+        document: The content.
+        folder: Where the files are that it names; by default where it is itself.
 
     Raises:
         BadFile: As ``load_world``.
     """
     file = validate(document, WorldFile, KIND)
-    obstacles, source = _map(document, file.map)
+    obstacles, source = _map(document, file.map, folder or document.path.parent)
     pois = [f"p{k + 1}" for k in range(file.sites.pois.random)] if isinstance(file.sites.pois, RandomPois) else list(
         file.sites.pois)
     robots = tuple(_robot(document, name, entry, pois) for name, entry in file.robots.items())
@@ -70,10 +74,10 @@ def world_of(document: Document) -> World:
     )
 
 
-def _map(document: Document, section: Map) -> tuple[Obstacles, MapSource | None]:
+def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSource | None]:
     if section.shapes is not None:
         return obstacles_of(section.shapes), None
-    root, kind = document.path.parent, "movingai" if section.ros is None else "ros"
+    kind = "movingai" if section.ros is None else "ros"
     entry: dict[str, str | float]
     try:
         if section.ros is not None:

@@ -15,6 +15,7 @@ from sva_bench.documents import pretty_json
 from sva_bench.errors import BadFile
 from sva_bench.inputs import about
 from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.stored import report_again
 from sva_bench.travel.times import UnreachableSite, plan_travel_times
 from sva_bench.world.load import load_world, world_as_dict
 from sva_bench.world.model import World
@@ -98,6 +99,8 @@ def test_a_run_keeps_the_maps_files_and_is_another_run_with_another_map(tmp_path
     for name in ("map.yaml", "map.pgm"):
         assert (done.folder / "map" / name).read_bytes() == (tmp_path / name).read_bytes()
     # The manifest's world, put beside the map's files, is the world that was run.
+    report = (done.folder / "report.html").read_bytes()
+    assert report_again(done.folder).read_bytes() == report  # it needs no file but the run's own
     (done.folder / "map" / "world.yaml").write_text(pretty_json(manifest["world"]))
     again = load_world(done.folder / "map" / "world.yaml")
     np.testing.assert_array_equal(again.obstacles.boxes, world.obstacles.boxes)
