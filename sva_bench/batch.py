@@ -16,9 +16,10 @@ from scipy.stats import t as student_t
 from sva_bench import __version__
 from sva_bench.analysis.report import write_batch_report
 from sva_bench.analysis.statistics import CONFIDENCE
-from sva_bench.bench import Measured, Options, measure
+from sva_bench.bench import Measured, measure
 from sva_bench.documents import read_json
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.planning import Options
 from sva_bench.runs import read_shard, write_json, write_shard
 from sva_bench.world.load import world_as_dict
 from sva_bench.world.model import World

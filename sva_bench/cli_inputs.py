@@ -30,7 +30,7 @@ def check_world(
     set_up_logging(verbose)
     loaded = load(world)
     with holding_back_ctrl_c():
-        from sva_bench.bench import out_of_reach, plan_costs
+        from sva_bench.planning import out_of_reach, plan_costs
 
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)

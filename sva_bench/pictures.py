@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from sva_bench.analysis.drawing import Kind, Leg, Overlays, draw_world
-from sva_bench.bench import Progress, plan_costs, read_plans
 from sva_bench.mission.plan import Plan
+from sva_bench.planning import Progress, plan_costs, read_plans
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import roadmap_edges
 from sva_bench.world.model import World

@@ -15,12 +15,12 @@ import numpy as np
 from sva_bench.analysis.statistics import estimate
 from sva_bench.analysis.summary import totals
 from sva_bench.analysis.wording import per_cent, verdict, with_interval
-from sva_bench.bench import NOMINAL, Options, Progress, plan_costs, plan_scenarios
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Drives, Settings, execute
 from sva_bench.mission.failures import FailureProcess
 from sva_bench.mission.generate import random_instance
 from sva_bench.mission.instance import Instance
+from sva_bench.planning import NOMINAL, Options, Progress, plan_costs, plan_scenarios
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_deterministic, plan_nominal, plan_stochastic
 from sva_bench.tally import expected_value
 from sva_bench.world.model import World

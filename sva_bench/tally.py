@@ -16,7 +16,7 @@ from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
 if TYPE_CHECKING:
-    from sva_bench.bench import Options, Planned
+    from sva_bench.planning import Options, Planned
 
 WORST = "deterministic, worst of its ties"
 

@@ -182,7 +182,7 @@ def with_mission(
         BadInput: If there are too few robots or POIs for a mission.
     """
     with holding_back_ctrl_c():  # after terrain and sites: what does not fit is said at once
-        from sva_bench.bench import plan_costs
+        from sva_bench.planning import plan_costs
         from sva_bench.proposal import propose_mission
 
     head = {"format": KIND, "name": name, **data}

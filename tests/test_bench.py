@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from sva_bench.bench import Options, measure
+from sva_bench.bench import measure
 from sva_bench.errors import BadInput
+from sva_bench.planning import Options
 from sva_bench.precision import Precision
 from sva_bench.world.model import World
 from tests.worlds_for_tests import SMALL, world_of

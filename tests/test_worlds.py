@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.bench import Options, expected_value, instance_of, plan_costs, plan_scenarios
 from sva_bench.documents import parse_yaml
 from sva_bench.errors import BadInput
 from sva_bench.mission.instance import Instance
+from sva_bench.planning import Options, instance_of, plan_costs, plan_scenarios
 from sva_bench.proposal import SCENARIOS, propose_mission
 from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.two_stage import knowledge_of, plan_nominal
+from sva_bench.tally import expected_value
 from sva_bench.world.generate import Family
 from sva_bench.world.load import world_of
 from sva_bench.world.model import Site, World

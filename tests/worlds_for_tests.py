@@ -7,6 +7,16 @@ from pathlib import Path
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World
 
+SITES = """\
+  stations:
+    r1: {at_m: [3.2, 5.2], stop_s: 4}
+  pois:
+    p1: {at_m: [2.2, 0.8]}
+    p2: {at_m: [0.8, 5.0], stop_s: 2}
+    p3: {at_m: [5.2, 5.2]}
+    p4: {at_m: [4.2, 0.8]}
+"""
+
 SMALL = """\
 format: sva-bench/world@1
 name: small
@@ -19,13 +29,7 @@ map:
       - {cylinder: [4.4, 3.2], radius_m: 0.3}
 sites:
   base: {at_m: [0.8, 0.8], heading_deg: 45}
-  stations:
-    r1: {at_m: [3.2, 5.2], stop_s: 4}
-  pois:
-    p1: {at_m: [2.2, 0.8]}
-    p2: {at_m: [0.8, 5.0], stop_s: 2}
-    p3: {at_m: [5.2, 5.2]}
-    p4: {at_m: [4.2, 0.8]}
+""" + SITES + """\
 robots:
   uv1:
     model: turtlebot2

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sva_bench.arrays import FloatArray
+from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.solver.graph import Graph
 from sva_bench.solver.listing import ways
 from sva_bench.solver.pricing import Local, bounds_of, local_of
@@ -48,7 +48,7 @@ def routes_above(
     return tuple(_route(local, site, parent, int(label)) for label in ends)
 
 
-def _route(local: Local, site: FloatArray, parent: FloatArray, label: int) -> tuple[int, ...]:
+def _route(local: Local, site: IntArray, parent: IntArray, label: int) -> tuple[int, ...]:
     backwards = [local.base]
     while label >= 0:
         backwards.append(int(site[label]))

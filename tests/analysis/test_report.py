@@ -18,8 +18,9 @@ import pytest
 from sva_bench.analysis.report import write_batch_report
 from sva_bench.analysis.wording import answer, finding, with_interval
 from sva_bench.batch import aggregate
-from sva_bench.bench import Options, Run, run
+from sva_bench.bench import Run, run
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.planning import Options
 from sva_bench.stored import report_again, write_csv
 from tests.worlds_for_tests import world_of
 

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from sva_bench.batch import settings_of
-from sva_bench.bench import Options, run
+from sva_bench.bench import run
 from sva_bench.documents import pretty_json
 from sva_bench.errors import BadFile
 from sva_bench.inputs import about
+from sva_bench.planning import Options
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.stored import report_again
 from sva_bench.travel.times import UnreachableSite, plan_travel_times

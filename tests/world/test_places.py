@@ -19,7 +19,7 @@ from sva_bench.world.near import clearances
 from sva_bench.world.places import NoRoom, Point, field_of, find_places
 from tests.oracles.worlds import random_obstacles
 from tests.world.maps_for_tests import shared_map
-from tests.worlds_for_tests import SMALL, world_of
+from tests.worlds_for_tests import SITES, SMALL, world_of
 
 RADIUS_M = 0.177
 # A house with a free rim about it, two rooms joined by a door, and a closed closet.
@@ -127,15 +127,7 @@ def test_distances_on_a_lattice_over_shapes_are_never_too_large(seed: int) -> No
     assert (nearer <= np.maximum(clearances(obstacles, between), 0) + 1e-5).all()
 
 
-PLACED = SMALL.replace("""\
-  stations:
-    r1: {at_m: [3.2, 5.2], stop_s: 4}
-  pois:
-    p1: {at_m: [2.2, 0.8]}
-    p2: {at_m: [0.8, 5.0], stop_s: 2}
-    p3: {at_m: [5.2, 5.2]}
-    p4: {at_m: [4.2, 0.8]}
-""", """\
+PLACED = SMALL.replace(SITES, """\
   stations: {spread: 2, stop_s: 4}
   pois: {random: 4, seed: 7, min_spacing_m: 0.8}
 """)
