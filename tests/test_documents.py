@@ -199,7 +199,7 @@ nested = st.recursive(leaves, lambda inner: st.lists(inner, max_size=4) | st.dic
                       max_leaves=12)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.dictionaries(names, nested, min_size=1, max_size=4))
 def test_pretty_yaml_reads_as_what_it_was_made_of(data: dict[str, Any]) -> None:
     remarks: dict[Loc, str] = {(): "what this is", **{(key,): "\nabove" for key in data}}

@@ -16,7 +16,7 @@ from sva_bench.solver.two_stage import plan_averse, plan_nominal, plan_stochasti
 from tests.solver.oracle import random_instance
 
 seeds = st.integers(0, 10**6)
-few = settings(max_examples=12, deadline=None, derandomize=True)  # each example solves two instances
+few = settings(max_examples=12, derandomize=True)  # each example solves two instances
 
 
 def best(instance: Instance) -> float:

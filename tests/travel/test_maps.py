@@ -46,7 +46,7 @@ def distance_to_cells(occupied: BoolArray, a: FloatArray, b: FloatArray) -> floa
     return float(np.hypot(dx, dy).min())
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 @given(arrays(np.bool_, (6, 7), elements=st.sampled_from([False, False, True])), st.floats(0.1, 0.6),
        st.sampled_from([0.0, 0.9]))
 def test_no_path_comes_nearer_to_an_occupied_cell_than_asked(occupied: BoolArray, radius: float, yaw: float) -> None:

@@ -100,7 +100,6 @@ def test_corners_stick_out_where_one_cell_of_four_is_occupied(occupied: BoolArra
     assert {(int(x), int(y)) for x, y, _, _ in convex_corners(cells_of(occupied))} == expected
 
 
-@settings(deadline=None)
 @given(grids, st.floats(-4, 4), st.integers(0, 1000))
 def test_boxes_and_grid_agree_on_what_is_near_whatever_the_yaw(occupied: BoolArray, yaw: float, seed: int) -> None:
     cells = cells_of(occupied, 0.5, (3.0, -2.0, yaw))
@@ -112,7 +111,6 @@ def test_boxes_and_grid_agree_on_what_is_near_whatever_the_yaw(occupied: BoolArr
                        (expected >= 0.3)[abs(expected - 0.3) > 1e-9])
 
 
-@settings(deadline=None)
 @given(grids, st.floats(-4, 4))
 def test_places_go_to_the_grid_and_back(occupied: BoolArray, yaw: float) -> None:
     cells = cells_of(occupied, 0.05, (100.0, -20.0, yaw))

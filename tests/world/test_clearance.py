@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -152,7 +152,6 @@ def test_obstacles_are_read_only_copies_of_the_right_shape() -> None:
         Obstacles(bounds_m=np.array([0, 0, 1, np.nan]), boxes=boxes, cylinders=np.empty((0, 3)))
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10_000), st.floats(0.05, 1.5))
 def test_buckets_know_what_a_look_at_every_obstacle_tells(seed: int, needed: float) -> None:
     o = random_obstacles(seed)

@@ -91,7 +91,7 @@ def test_more_sites_leave_the_first_where_they_are() -> None:
     assert place(cells, stations=4, pois=0)[1][:2] == stations
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_places_keep_their_distances_and_are_connected(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -112,7 +112,7 @@ def test_places_keep_their_distances_and_are_connected(seed: int) -> None:
     assert gaps.min() > 0.2
 
 
-@settings(deadline=None, max_examples=4)
+@settings(max_examples=4)
 @given(st.integers(0, 1000))
 def test_distances_on_a_lattice_over_shapes_are_never_too_large(seed: int) -> None:
     obstacles = random_obstacles(seed)
