@@ -73,6 +73,10 @@ class ColumnGeneration:
         graphs: What each class may drive.
         penalty: What it costs to miss a required visit, or a floor by its size.
         calls: Pricing runs and labels.
+        rows: POIs that can be visited.
+        memory: POIs that each site remembers (ng-sets), bit by bit, for each class, shape (n, words).
+        pool: The routes, by class and sites.
+        cuts: Subset-row cuts.
     """
 
     instance: Instance
@@ -81,8 +85,8 @@ class ColumnGeneration:
     survival: FloatArray
     cutoff: Callable[[], float]
     out: Callable[[], bool]
-    classes: list[Class] = field(default_factory=list)
-    graphs: list[Graph] = field(default_factory=list)
+    classes: list[Class] = field(init=False, default_factory=list)
+    graphs: list[Graph] = field(init=False, default_factory=list)
     penalty: float = field(init=False)
     calls: dict[str, int] = field(default_factory=lambda: {"heuristic": 0, "exact": 0, "labels": 0})
 
@@ -92,8 +96,6 @@ class ColumnGeneration:
         self._floors = np.array([floor for _, floor in self.goal.floors])
         floors = np.array([weights for weights, _ in self.goal.floors]).reshape(
             len(self._floors), len(self.instance.vehicles), n)
-        self.classes: list[Class] = []
-        self.graphs: list[Graph] = []
         for m in range(len(self.instance.vehicles)):
             graph = graph_of(self.instance, self.scopes[m], float(self.survival[m]))
             own = Class(vehicles=(m,), weights=self.goal.weights[m], floors=floors[:, m])
@@ -173,7 +175,7 @@ class ColumnGeneration:
                 added = 0
                 for number, unit in enumerate(side.units):
                     priced = self.price(unit, prices, max(float(prices.unit[number]), 0.0) + self.tolerance,
-                                         exact=False)
+                                        exact=False)
                     added += self.add(master, number, unit, priced)
                 if added:
                     continue
