@@ -89,7 +89,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
               for case in cases_of(scenario, known)]
     drives: Drives = {}
     while True:
-        settings = _settings(world, options)
+        settings = settings_of(world, options)
         with clock.phase("execution"):
             executed = execute(world, costs, cases, settings, executor,
                                lambda done, of: progress("driving routes", done, of), drives)
@@ -134,7 +134,7 @@ def execute_plans(
         costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
     """
     clock = Stopwatch()
-    settings = _settings(world, options)
+    settings = settings_of(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
              for name, plan in plans.items()]
     with clock.phase("execution"):
@@ -154,7 +154,8 @@ def execute_plans(
                                         for name, plan in plans.items()}})
 
 
-def _settings(world: World, options: Options) -> Settings:
+def settings_of(world: World, options: Options) -> Settings:
+    """How plans are executed in a world."""
     return Settings(seed=options.seed, trials=options.trials, fidelity=options.fidelity,
                     rollouts=1 if world.noise.silent else options.rollouts)
 

@@ -9,6 +9,7 @@ import typer
 from rich.markup import escape
 
 from sva_bench import __version__
+from sva_bench.cli_batch import batch_app
 from sva_bench.cli_inputs import instance_app, world_app
 from sva_bench.cli_plans import certify, plan, times
 from sva_bench.errors import BadInput
@@ -35,7 +36,6 @@ from sva_bench.options import (
 )
 from sva_bench.terminal import (
     messages,
-    print_batch,
     print_json,
     print_summary,
     progress_bars,
@@ -51,6 +51,7 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 a fault of the program, 2 bad input or usage, 3 an infeasible plan, "
            "4 some trials unfinished, 130 interrupted.")
 
+app.add_typer(batch_app, name="batch")
 app.add_typer(world_app, name="world")
 app.add_typer(instance_app, name="instance")
 
@@ -161,60 +162,6 @@ def execute(
         with local_workers(workers) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
     _show(result.summary, result.folder, as_json, csv=csv)
-
-
-@app.command()
-def batch(
-    worlds: Annotated[list[Path], typer.Argument(metavar="WORLD...", help="World files (YAML).", show_default=False)],
-    seed: Annotated[list[int] | None, typer.Option(min=0, help="Seed of failures and noise; may be repeated.",
-                                                   show_default="0")] = None,
-    trials: Trials = 1000,
-    rollouts: Rollouts = 8,
-    fidelity: FidelityOption = "rollout",
-    planner: PlannerOption = "prmstar",
-    scenario: ScenarioNames = None,
-    margin: MarginOption = None,
-    execute_failure: ExecuteFailure = None,
-    time_limit: TimeLimit = None,
-    gap: Gap = 1e-6,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The batch folder.",
-                                             show_default="runs/batch-<hash>")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")] = False,
-    workers: WorkerCount = None,
-    as_json: AsJson = False,
-    verbose: Verbose = False,
-) -> None:
-    """Monte Carlo over many worlds: a shard of outcomes for each, and the VSS over maps."""
-    with holding_back_ctrl_c():
-        from sva_bench.inputs import load
-
-    set_up_logging(verbose)
-    loaded = [load(path, scenario, margin, execute_failure=execute_failure) for path in worlds]
-    with holding_back_ctrl_c():
-        from sva_bench.batch import batch_name, run_batch, settings_of
-        from sva_bench.planning import Options
-        from sva_bench.solver.two_stage import SolveLimits
-
-    seeds = list(dict.fromkeys(seed or [0]))
-    options = Options(trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
-                      limits=SolveLimits(time_limit_s=time_limit, gap=gap))
-    folder = out or Path("runs") / batch_name(settings_of(loaded, seeds, options))
-    with progress_bars() as progress, local_workers(workers) as executor:
-        started = False
-
-        def show(done: int, of: int) -> None:
-            nonlocal started
-            if done and not started:
-                messages.print(f"{done} of {of} worlds and seeds are measured already", highlight=False)
-            started = True
-            progress("measuring worlds", done, of)
-
-        summary = run_batch(loaded, seeds, options, folder, executor, show, resume=resume)
-    if as_json:
-        print_json(summary)
-    else:
-        print_batch(summary)
-        messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
 
 
 @app.command()

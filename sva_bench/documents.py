@@ -6,6 +6,7 @@ no document of ours needs them, and an alias bomb can fill any memory.
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 from collections.abc import Callable, Mapping
@@ -83,6 +84,35 @@ class Document:
             else:
                 break
         return int(line) + 1
+
+    def changed(self, key: str, value: Any) -> Document:
+        """The same with another value at a dotted key, e.g. ``robots.uv2.fuel_capacity_s``; lines stay those read.
+
+        Names may hold dots themselves: the longest name that is there counts.
+        """
+        data = copy.deepcopy(self.data)
+        at, words = data, key.split(".")
+        while True:
+            name, words = _next_name(at, words)
+            if isinstance(at, list) and not (isinstance(name, int) and name < len(at)):
+                raise self.error((), f"{key}: there is a list of {len(at)} items at {name!r}; count them from 0")
+            if not isinstance(at, dict | list):
+                raise self.error((), f"{key}: there is nothing called {name!r} to set")
+            if not words:
+                at[name] = value
+                return Document(self.path, data, self._text, self._root)
+            at = at.setdefault(name, {}) if isinstance(at, dict) else at[name]
+
+
+def _next_name(at: Any, words: list[str]) -> tuple[Any, list[str]]:
+    """The next step of a dotted key, and what is left of it."""
+    if isinstance(at, list):
+        return int(words[0]) if words[0].isdecimal() else words[0], words[1:]
+    for count in range(len(words), 0, -1):
+        name = ".".join(words[:count])
+        if isinstance(at, dict) and name in at:
+            return name, words[count:]
+    return words[0], words[1:]
 
 
 def dotted(loc: Loc) -> str:

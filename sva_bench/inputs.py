@@ -22,7 +22,14 @@ def load(
     plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
 ) -> World:
     """The world, as the command line changes it."""
-    world = load_world(path)
+    return adapted(load_world(path), scenarios, margin, plan_failure, execute_failure)
+
+
+def adapted(
+    world: World, scenarios: Sequence[str] | None = None, margin: float | None = None,
+    plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
+) -> World:
+    """A world with some of its settings replaced."""
     if scenarios:
         world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
             scenarios, [s.name for s in world.scenarios])))

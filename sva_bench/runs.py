@@ -26,7 +26,7 @@ from sva_bench.execution.outcome import ENDS
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import MapSource, World
 
-_PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
+PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
 
 
 def run_name(world: str, seed: int, identity: Mapping[str, Any]) -> str:
@@ -93,7 +93,7 @@ def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], st
         "seconds": {phase: round(taken, 3) for phase, taken in seconds.items()},
         "machine": {"platform": platform.platform(), "python": platform.python_version(),
                     "cpus": len(os.sched_getaffinity(0))},
-        "packages": {name: version(name) for name in _PACKAGES}, "world": dict(world),
+        "packages": {name: version(name) for name in PACKAGES}, "world": dict(world),
     }
 
 

@@ -40,27 +40,43 @@ def summarise(
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
     runs = by_stem(executed)
-    mission = model_is_executed(world)
     robots = [robot.name for robot in world.robots]
     scenarios = []
     for scenario in world.scenarios:
         plans = planned[scenario.name]
-        truth = replace(plans.instance, failure=world.execute_failure)
-        judged = {name: Judged(expected=expected_value(truth, plan), executed=runs[f"{scenario.name}-{name}"])
-                  for name, plan in (("stochastic", plans.stochastic), ("deterministic", plans.deterministic))}
+        known = known_ahead(world, plans)
+        judged = {name: Judged(expected=known[name], executed=runs[f"{scenario.name}-{name}"])
+                  for name in ("stochastic", "deterministic")}
         scenarios.append(scenario_summary(ScenarioResult(
             stochastic=judged["stochastic"], deterministic=judged["deterministic"],
-            modelled_range=plans.vss_range if mission else None,
-            # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
-            vss_mean_value=0.0 if mission else None, worst=runs.get(f"{scenario.name}-{WORST}"),
-            ws=plans.ws if mission else None, evpi=plans.evpi if mission else None,
-            value_of_process=plans.value_of_process,
+            modelled_range=known["modelled_range"], vss_mean_value=known["vss_mean_value"],
+            worst=runs.get(f"{scenario.name}-{WORST}"), ws=known["ws"], evpi=known["evpi"],
+            value_of_process=known["value_of_process"],
             informed=None if plans.informed is None else Judged(
                 expected=plans.informed.expected, executed=runs[f"{scenario.name}-{INFORMED}"]),
         ), robots, noisy=not world.noise.silent))
-    proved = all(plan.status == "optimal" for p in planned.values() for plan in p.all_plans())
-    summary = head(world, options, settings, costs) | {"reproducible": proved, "scenarios": scenarios}
+    summary = head(world, options, settings, costs) | {"reproducible": proved(planned), "scenarios": scenarios}
     return summary if options.precision is None else summary | {"precision": options.precision.as_dict(summary)}
+
+
+def known_ahead(world: World, plans: Planned) -> dict[str, Any]:
+    """What is known of a scenario's plans before any trial: each one's value in closed form, and of both together."""
+    mission = model_is_executed(world)
+    truth = replace(plans.instance, failure=world.execute_failure)
+    return {
+        "stochastic": expected_value(truth, plans.stochastic),
+        "deterministic": expected_value(truth, plans.deterministic),
+        "modelled_range": plans.vss_range if mission else None,
+        # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
+        "vss_mean_value": 0.0 if mission else None,
+        "ws": plans.ws if mission else None, "evpi": plans.evpi if mission else None,
+        "value_of_process": plans.value_of_process,
+    }
+
+
+def proved(planned: Mapping[str, Planned]) -> bool:
+    """Whether no solve met a limit."""
+    return all(plan.status == "optimal" for p in planned.values() for plan in p.all_plans())
 
 
 def head(world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:

@@ -159,34 +159,3 @@ def print_summary(summary: Any) -> None:
         console.print(crossed)
     if not summary["reproducible"]:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
-
-
-def print_batch(summary: Any) -> None:
-    """Print a batch: a row per world, seed and scenario, then the VSS over maps."""
-    from sva_bench.analysis.wording import vss_verdict, with_interval
-
-    console = results()
-    worlds, seeds = len(summary["worlds"]), len(summary["seeds"])
-    table = Table(title=f"{worlds} world{'s' * (worlds > 1)}, {seeds} seed{'s' * (seeds > 1)}, "
-                        f"{summary['trials']} trials, "
-                        f"{summary['fidelity']}", title_justify="left")
-    for heading in ("world", "seed", "scenario", "stochastic [95 %]", "deterministic [95 %]", "VSS [95 %]", "VSS %"):
-        table.add_column(heading, justify="left" if heading in ("world", "scenario") else "right")
-    for unit in summary["units"]:
-        for number, scenario in enumerate(unit["scenarios"]):
-            vss, plans = scenario["vss"], scenario["plans"]
-            table.add_row(
-                "" if number else unit["world"], "" if number else str(unit["seed"]), scenario["name"],
-                with_interval(plans["stochastic"]["executed"]), with_interval(plans["deterministic"]["executed"]),
-                vss_verdict(scenario),
-                "" if vss["executed_pct"] is None else f"{vss['executed_pct']:.1f}",
-                end_section=number == len(unit["scenarios"]) - 1)
-    console.print(table)
-    over = Table(title="VSS over maps", title_justify="left")
-    for heading in ("scenario", "maps", "VSS [95 %]", "VSS % [95 %]"):
-        over.add_column(heading, justify="left" if heading == "scenario" else "right")
-    for row in summary["aggregate"]:
-        share = row["vss_pct"]
-        over.add_row(row["scenario"], str(row["maps"]), with_interval(row["vss"]),
-                     "" if share["mean"] is None else with_interval(share))
-    console.print(over)

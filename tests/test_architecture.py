@@ -30,8 +30,8 @@ MAY_KNOW: dict[str, set[str]] = {
 }
 # These put the parts together, and may know all.
 TOP = {"options", "inputs", "bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed",
-       "precision", "tally", "assumptions", "reproduce", "cli", "cli_inputs", "cli_plans", "terminal", "__main__",
-       "__init__"}
+       "precision", "tally", "assumptions", "reproduce", "cli", "cli_batch", "cli_inputs", "cli_plans", "live",
+       "sweeps", "terminal", "__main__", "__init__"}
 # Of these, those that the command line stands on: they know nothing of it.
 BENCH = {"bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed", "precision", "tally",
          "assumptions", "reproduce"}
@@ -39,7 +39,7 @@ ONLY_IN = {
     "pybullet": "execution/simulator.py", "pybullet_data": "execution/simulator.py",
     "pybullet_utils": "execution/simulator.py", "ompl": "travel/roadmap.py", "highspy": "solver/highs.py",
     "rerun": "recording/rerun.py", "networkx": "solver/cuts.py", "ruamel": "documents.py",
-    "matplotlib": "analysis/drawing.py", "PIL": "world/images.py",
+    "matplotlib": "analysis/drawing.py", "PIL": "world/images.py", "distributed": "batch/dask_cluster.py",
 }
 MOST_LINES = 450
 
@@ -70,7 +70,7 @@ def test_imports_point_one_way(module: str) -> None:
     if part in TOP:
         allowed = set(MAY_KNOW) | BENCH
         if part not in BENCH:
-            allowed |= {"cli", "cli_inputs", "cli_plans", "inputs", "options", "terminal"}
+            allowed |= {"cli", "cli_batch", "cli_inputs", "cli_plans", "inputs", "live", "options", "sweeps", "terminal"}
     else:
         assert part in MAY_KNOW, f"say in MAY_KNOW what {part} may import"
         allowed = MAY_KNOW[part] | {part} | (EVERYBODYS if part not in EVERYBODYS else set())
@@ -107,7 +107,8 @@ def test_each_heavy_library_is_imported_in_one_file(module: str) -> None:
         assert home in (None, module), f"sva_bench/{module}:{line} imports {name}, which belongs in sva_bench/{home}"
 
 
-@pytest.mark.parametrize("library", ["pybullet", "ompl", "highspy", "rerun", "networkx", "ruamel", "matplotlib"])
+@pytest.mark.parametrize("library", ["pybullet", "ompl", "highspy", "rerun", "networkx", "ruamel", "matplotlib",
+                                     "distributed"])
 def test_the_file_that_a_heavy_library_belongs_in_does_import_it(library: str) -> None:
     # Else a renamed file would make the rule above hold for nothing.
     found = {name.split(".")[0] for _, name in imports_of(PACKAGE / ONLY_IN[library])}

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sva_bench.batch import aggregate
+from sva_bench.batch.aggregates import aggregate
 from tests.test_cli import sva_bench, world_file
 from tests.worlds_for_tests import SMALL
 
@@ -34,7 +34,7 @@ def rows_of(folder: Path) -> pa.Table:
 
 def test_a_batch_gives_the_same_rows_on_one_worker_and_on_two_and_resumes(tmp_path: Path) -> None:
     small, other = two_worlds(tmp_path)
-    command = ("batch", small, other, "--seed", 0, "--seed", 1, *QUICK)
+    command = ("batch", small, other, "--seed", 0, "--seed", 1, *QUICK, "--cache", tmp_path / "cache")
     one = sva_bench(*command, "--out", "one", "--workers", 1, "--json", cwd=tmp_path)
     assert one.returncode == 0, one.stderr
     two = sva_bench(*command, "--out", "two", "--workers", 2, "--json", cwd=tmp_path)
@@ -68,7 +68,7 @@ def test_a_batch_gives_the_same_rows_on_one_worker_and_on_two_and_resumes(tmp_pa
 
 def test_worlds_of_one_name_are_refused(tmp_path: Path) -> None:
     small = world_file(tmp_path)
-    done = sva_bench("batch", small, small, *QUICK, cwd=tmp_path)
+    done = sva_bench("batch", small, small, *QUICK, "--cache", tmp_path / "cache", cwd=tmp_path)
     assert done.returncode == 2
     assert "'small'" in done.stderr
 

@@ -253,32 +253,40 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
     from sva_bench.analysis import charts
 
     rows = summary["aggregate"]
-    over = [[row["scenario"], str(row["maps"]), with_interval(row["vss"]),
+    over = [[row["variant"], row["scenario"], str(row["maps"]), with_interval(row["vss"]),
              "" if row["vss_pct"]["mean"] is None else with_interval(row["vss_pct"])] for row in rows]
     sure = [row for row in rows if row["vss"]["ci95"] is not None and row["vss"]["ci95"][0] > 0]
-    said = "Over these maps planning for failures pays in " + ", ".join(
-        f"{row['scenario']} ({with_interval(row['vss_pct'])} %)" if row["vss_pct"]["mean"] is not None
-        else row["scenario"] for row in sure) + "." if sure else \
+    pays = [_labelled(row["scenario"], row["variant"]) + (
+        "" if row["vss_pct"]["mean"] is None else f" ({with_interval(row['vss_pct'])} %)") for row in sure]
+    said = f"Over these maps planning for failures pays in {', '.join(pays)}." if pays else \
         "Over these maps no scenario shows a value of planning for failures beyond doubt."
     by_scenario: dict[str, list[float]] = {}
     for unit in summary["units"]:
         for s in unit["scenarios"]:
             if s["vss"]["executed_pct"] is not None:
-                by_scenario.setdefault(s["name"], []).append(s["vss"]["executed_pct"])
+                by_scenario.setdefault(_labelled(s["name"], unit["variant"]), []).append(s["vss"]["executed_pct"])
     pictures = [figure(charts.boxes_of(by_scenario, "VSS over maps", "VSS [% of the stochastic plan]"),
                        "Each point is a map and seed.")] if by_scenario else []
+    failed = [[entry["unit"], entry["world"], str(entry["seed"]), entry["reason"]] for entry in summary["failed"]]
     parts = [
         f"<h1>Value of the stochastic solution over {number(len(summary['worlds']), 'map')}</h1>",
         f"<div class=answer><p>{text(said)}</p></div>",
-        table(["scenario", "maps", "VSS", "VSS [%]"], over),
+        table(["variant", "scenario", "maps", "VSS", "VSS [%]"], over, words=(0, 1)),
         note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, fidelity {summary['fidelity']}; 95 "
              "% intervals in brackets. Over maps, the maps are the sample."),
+        *([heading("Given up"), table(["unit", "map", "seed", "reason"], failed, words=(0, 1, 3))] if failed else []),
         *pictures,
         heading("Map by map"),
-        table(["map", "seed", "scenario", "stochastic", "deterministic", "VSS", "VSS [%]", "VSS, modelled", "EVPI"],
-              [[unit["world"], str(unit["seed"]), s["name"],
+        table(["map", "variant", "seed", "scenario", "stochastic", "deterministic", "VSS", "VSS [%]", "VSS, modelled",
+               "EVPI"],
+              [[unit["world"], unit["variant"], str(unit["seed"]), s["name"],
                 *(with_interval(s["plans"][name]["executed"]) for name in ("stochastic", "deterministic")),
                 vss_verdict(s), per_cent(s["vss"]["executed_pct"]), f"{s['vss']['modelled']:.1f}", optional(s["evpi"])]
-               for unit in summary["units"] for s in unit["scenarios"]], words=(0, 2)),
+               for unit in summary["units"] for s in unit["scenarios"]], words=(0, 1, 3)),
     ]
     write_page(path, "batch", parts)
+
+
+def _labelled(scenario: str, variant: str) -> str:
+    """A scenario, and what a sweep varied in it."""
+    return f"{scenario} ({variant})" if variant else scenario

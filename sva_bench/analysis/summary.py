@@ -12,7 +12,10 @@ import numpy as np
 from sva_bench.analysis.statistics import Estimate, controlled, distribution, estimate, share
 from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.execution.execute import Executed
-from sva_bench.execution.outcome import ENDS
+from sva_bench.execution.outcome import ENDS, End
+from sva_bench.mission.plan import Plan
+
+UNHAPPY: tuple[End, ...] = ("out_of_fuel", "late", "stuck")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,33 +63,58 @@ def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bo
     scenario, rollout = s.executed.case.scenario, s.executed.rollout
     earned = totals(s.executed)
     difference = estimate(earned - totals(d.executed), rollout, noisy=noisy)
-    modelled = s.expected - d.expected
-    sharper = controlled(earned - totals(d.executed), _drawn(s.executed) - _drawn(d.executed), modelled, rollout,
-                         noisy=noisy)
+    sharper = controlled(earned - totals(d.executed), _drawn(s.executed) - _drawn(d.executed), s.expected - d.expected,
+                         rollout, noisy=noisy)
     ends = [difference.mean, *([float(np.mean(earned - totals(result.worst)))] if result.worst else [])]
+    entry = scenario_entry(
+        scenario.name, {name: scenario.availability[name] for name in robots},
+        {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy)
+         for judged in (s, d, result.informed) if judged is not None}, difference,
+        {"modelled_range": None if result.modelled_range is None else [x + 0.0 for x in result.modelled_range],
+         "vss_mean_value": result.vss_mean_value, "ws": result.ws, "evpi": result.evpi,
+         "value_of_process": result.value_of_process},
+        {"executed_range": None if result.modelled_range is None else [min(ends) + 0.0, max(ends) + 0.0],
+         "executed_controlled": sharper.as_dict()})
+    return entry if result.informed is None else entry | {"evpi_executed": _beyond(result.informed, s, noisy=noisy)}
+
+
+def scenario_entry(
+    name: str, availability: Mapping[str, float], plans: Mapping[str, Any], difference: Estimate,
+    model: Mapping[str, Any], sharper: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """What the plans of a scenario come to.
+
+    Args:
+        name: The scenario's name.
+        availability: Of each robot.
+        plans: Entries of the stochastic and the deterministic plan, and of others that were executed beside them.
+        difference: What the first collected beyond the second.
+        model: What is known without trials: ``modelled_range``, ``vss_mean_value``, ``ws``, ``evpi`` and
+            ``value_of_process``.
+        sharper: More about the executed VSS, where single trials are at hand.
+    """
+    s, d = plans["stochastic"], plans["deterministic"]
+    modelled = s["expected"] - d["expected"]
     return {
-        "name": scenario.name,
-        "availability": {name: scenario.availability[name] for name in robots},
-        "plans": {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy)
-                  for judged in (s, d, result.informed) if judged is not None},
+        "name": name,
+        "availability": dict(availability),
+        "plans": dict(plans),
         "vss": {
             "modelled": modelled + 0.0,
-            "modelled_pct": _percent(modelled, s.expected),
-            "modelled_range": None if result.modelled_range is None else [x + 0.0 for x in result.modelled_range],
+            "modelled_pct": _percent(modelled, s["expected"]),
+            "modelled_range": model["modelled_range"],
             "executed": difference.as_dict(),
-            "executed_pct": _percent(difference.mean, float(np.mean(earned))),
-            "executed_range": None if result.modelled_range is None else [min(ends) + 0.0, max(ends) + 0.0],
-            "executed_controlled": sharper.as_dict(),
+            "executed_pct": _percent(difference.mean, s["executed"]["mean"]),
+            **(sharper or {}),
             "distinguishable": difference.distinguishable,
             "verdict": verdict_of(difference, "stochastic", "deterministic"),
         },
-        "vss_mean_value": result.vss_mean_value,
+        "vss_mean_value": model["vss_mean_value"],
         # The plan for the mean is the stochastic plan itself, drive for drive.
-        "vss_mean_value_executed": result.vss_mean_value,
-        "ws": result.ws,
-        "evpi": result.evpi,
-        "value_of_process": result.value_of_process,
-        **({} if result.informed is None else {"evpi_executed": _beyond(result.informed, s, noisy=noisy)}),
+        "vss_mean_value_executed": model["vss_mean_value"],
+        "ws": model["ws"],
+        "evpi": model["evpi"],
+        "value_of_process": model["value_of_process"],
     }
 
 
@@ -143,23 +171,58 @@ def ranking(means: Mapping[str, float], comparisons: Sequence[Mapping[str, Any]]
 
 def plan_summary(judged: Judged, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
     """What one plan promised and what came of it."""
-    run, plan = judged.executed, judged.executed.case.plan
+    run = judged.executed
     earned = totals(run)
-    executed = estimate(earned, run.rollout, noisy=noisy)
-    counts = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
-    return {
-        "promised": judged.expected if plan.value is None else plan.value,
-        "bound": plan.bound,
-        "status": plan.status,
-        "expected": judged.expected + 0.0,
-        "executed": executed.as_dict(),
+    counts: dict[str, int] = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
+    sharper = {
         "executed_controlled": controlled(earned, _drawn(run), judged.expected, run.rollout, noisy=noisy).as_dict(),
         "distribution": distribution(earned),
-        "by_robot": {name: float(run.incentive[:, k].mean()) for k, name in enumerate(robots)},
-        "ends": {end: count for end, count in counts.items() if count},
         "end_shares": {name: {end: _share(run.end[:, k] == ENDS.index(end), run, noisy=noisy) for end in ENDS
                               if (run.end[:, k] == ENDS.index(end)).any()} for k, name in enumerate(robots)},
-        "ledger": ledger(judged, executed.mean),
+    }
+    return plan_entry(promise_of(run.case.plan, judged.expected), estimate(earned, run.rollout, noisy=noisy),
+                      {name: float(run.incentive[:, k].mean()) for k, name in enumerate(robots)}, counts,
+                      {end: lost / len(run.end) for end, lost in charges(run).items()}, sharper)
+
+
+def promise_of(plan: Plan, expected: float) -> dict[str, Any]:
+    """What is known of a plan before any trial.
+
+    Args:
+        plan: The plan.
+        expected: Its closed-form value under the failure process executed.
+    """
+    return {"promised": expected if plan.value is None else plan.value, "bound": plan.bound, "status": plan.status,
+            "expected": expected + 0.0}
+
+
+def charges(run: Executed) -> dict[str, float]:
+    """What each unhappy end cost in all trials together; a POI is charged to the end of the robot that planned it."""
+    lost = run.planned_incentive - run.incentive
+    return {end: float(np.where(run.end == ENDS.index(end), lost, 0.0).sum()) for end in UNHAPPY}
+
+
+def plan_entry(
+    promise: Mapping[str, Any], executed: Estimate, by_robot: Mapping[str, float], ends: Mapping[str, int],
+    charged: Mapping[str, float], sharper: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """What one plan promised and what came of it.
+
+    Args:
+        promise: As ``promise_of`` gives it.
+        executed: What it collected.
+        by_robot: What each robot collected, on average.
+        ends: How often missions ended which way.
+        charged: What each unhappy end cost, on average.
+        sharper: More about it, where single trials are at hand.
+    """
+    return {
+        **promise,
+        "executed": executed.as_dict(),
+        **(sharper or {}),
+        "by_robot": dict(by_robot),
+        "ends": {end: count for end, count in ends.items() if count},
+        "ledger": _ledger(promise, charged, executed.mean),
     }
 
 
@@ -170,13 +233,16 @@ def ledger(judged: Judged, executed: float) -> dict[str, float]:
     draw, against what they were expected to lose, is ``draws``.
     """
     run = judged.executed
-    promised = judged.expected if run.case.plan.value is None else run.case.plan.value
-    lost = run.planned_incentive - run.incentive
-    charged = {end: -float(np.where(run.end == ENDS.index(end), lost, 0.0).sum(axis=1).mean()) + 0.0
-               for end in ("out_of_fuel", "late", "stuck")}
-    assumption = judged.expected - promised
-    draws = executed - promised - assumption - sum(charged.values())
-    return {"promised": promised, "assumption": assumption + 0.0, "draws": draws + 0.0, **charged, "executed": executed}
+    return _ledger(promise_of(run.case.plan, judged.expected),
+                   {end: lost / len(run.end) for end, lost in charges(run).items()}, executed)
+
+
+def _ledger(promise: Mapping[str, Any], charged: Mapping[str, float], executed: float) -> dict[str, float]:
+    promised = promise["promised"]
+    costs: dict[str, float] = {end: -charged[end] + 0.0 for end in UNHAPPY}
+    assumption = promise["expected"] - promised
+    draws = executed - promised - assumption - sum(costs.values())
+    return {"promised": promised, "assumption": assumption + 0.0, "draws": draws + 0.0, **costs, "executed": executed}
 
 
 def totals(run: Executed) -> FloatArray:

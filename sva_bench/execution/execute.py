@@ -48,12 +48,16 @@ class Settings:
         trials: Number of trials.
         rollouts: Number of noise draws; trial t has that of rollout t mod ``rollouts``. 1 without noise.
         fidelity: ``kinematic`` (the twin), ``rollout`` (physics, once per noise draw) or ``physics`` (every trial).
+        first: Number of the first trial: a range of trials is settled as if all before it had been too.
+        recorded: Whether legs and traces are kept; a batch has no use for them.
     """
 
     seed: int
     trials: int
     rollouts: int
     fidelity: Fidelity
+    first: int = 0
+    recorded: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +87,8 @@ class Executed:
         end_time_s, fuel_used_s: When it ended, and on how much.
         planned_incentive: What each robot's route holds, shape (robots,).
         drawn_incentive: What the failures drawn would have left of that, had nothing else gone wrong.
-        legs: Every leg that was driven.
-        traces: Trial 0 over time, a trace for each robot.
+        legs: Every leg that was driven; none unless recorded.
+        traces: The first trial over time, a trace for each robot; none unless recorded.
     """
 
     case: Case
@@ -203,6 +207,34 @@ def execute(
             for case, own, failed in zip(cases, orders, fails, strict=True)]
 
 
+def drives_ahead(
+    world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings
+) -> dict[Key, DriveTask]:
+    """Every drive that some trial may need, whatever its number; not for ``physics``, where each trial has its own."""
+    tasks: dict[Key, DriveTask] = {}
+    for case in cases:
+        for number, robot in enumerate(world.robots):
+            route = case.plan.route(robot.name)
+            if not route or (world.execute_failure == "mission" and case.scenario.availability[robot.name] == 0):
+                continue
+            for rollout in range(min(settings.rollouts, settings.trials)):
+                key = (robot.name, route, rollout, 0)
+                if key not in tasks:
+                    tasks[key] = _task(world, costs, settings, number, key, traced=False)
+    return tasks
+
+
+def settle_trials(
+    world: World, cases: Sequence[Case], settings: Settings, drives: Mapping[Key, Driven]
+) -> list[Executed]:
+    """Settle trials by drives made ahead, which cannot be recorded."""
+    settled = []
+    for case in cases:
+        orders = [_orders(world, robot, case.plan.route(robot.name)) for robot in world.robots]
+        settled.append(_settle_all(world, {}, case, orders, _failures(world, case, orders, settings), settings, drives))
+    return settled
+
+
 def _orders(world: World, robot: Robot, route: Route) -> Assignment:
     return Assignment(
         robot=robot.name, route=route, stations=frozenset(s.name for s in world.stations),
@@ -214,7 +246,7 @@ def _failures(world: World, case: Case, orders: Sequence[Assignment], settings: 
     pois = np.array([sum(o.is_poi(site) for site in o.route) for o in orders])
     fails = draw_failures(
         settings.seed, [robot.name for robot in world.robots], case.scenario.availability, world.execute_failure,
-        trials=settings.trials, pois=int(pois.max(initial=0)), joint=case.scenario.joint)
+        trials=settings.trials, first=settings.first, pois=int(pois.max(initial=0)), joint=case.scenario.joint)
     return np.where(fails > pois, NEVER, fails)  # draws for a longer route of another robot mean nothing to this one
 
 
@@ -224,21 +256,44 @@ def _tasks(
 ) -> dict[Key, DriveTask]:
     """The drives that some trial needs: a robot that fails at the base in all its trials drives none."""
     tasks: dict[Key, DriveTask] = {}
-    base = world.sites[0]
-    solids = replace(world.obstacles, cells=None)  # a worker needs the boxes alone
     for own, failed in zip(orders, fails, strict=True):
-        for number, (robot, order) in enumerate(zip(world.robots, own, strict=True)):
-            legs = _legs(costs[robot.model.name], order.route)
-            for trial, fails_before in enumerate(failed[:, number].tolist()):
-                key = _key(settings, order, trial, fails_before)
-                if key is None or key in tasks:
-                    continue
-                tasks[key] = DriveTask(
-                    obstacles=solids, model=robot.model, start=(base.x_m, base.y_m, base.heading_rad),
-                    legs=legs[: len(key[1]) - 1],
-                    wheel_gains=wheel_gains(settings.seed, key[2], number, world.noise),
-                    fidelity=settings.fidelity, traced=trial == 0 or (key[2] == 0 and settings.fidelity != "physics"))
+        for number, order in enumerate(own):
+            for row in _alike(settings, failed[:, number])[0]:
+                trial = settings.first + row
+                key = _key(settings, order, trial, int(failed[row, number]))
+                if key is not None and key not in tasks:
+                    traced = settings.recorded and (row == 0 or (key[2] == 0 and settings.fidelity != "physics"))
+                    tasks[key] = _task(world, costs, settings, number, key, traced=traced)
     return tasks
+
+
+def _task(
+    world: World, costs: Mapping[str, FuelCosts], settings: Settings, number: int, key: Key, *, traced: bool
+) -> DriveTask:
+    base, model = world.sites[0], world.robots[number].model
+    solids = replace(world.obstacles, cells=None)  # a worker needs the boxes alone
+    return DriveTask(
+        obstacles=solids, model=model, start=(base.x_m, base.y_m, base.heading_rad),
+        legs=_legs(costs[model.name], key[1]), wheel_gains=wheel_gains(settings.seed, key[2], number, world.noise),
+        fidelity=settings.fidelity, traced=traced)
+
+
+def _alike(settings: Settings, failed: IntArray) -> tuple[list[int], IntArray]:
+    """Trials that end alike, since they share a drive and fail alike.
+
+    Returns:
+        The first row of each kind, in order; the kind of each row, shape (trials,).
+    """
+    rows = np.arange(len(failed))
+    if settings.fidelity == "physics":
+        return rows.tolist(), rows
+    _, how = np.unique(failed, return_inverse=True)
+    kind = how * settings.rollouts + (settings.first + rows) % settings.rollouts
+    _, first, kind = np.unique(kind, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return first[order].tolist(), rank[kind]
 
 
 def _key(settings: Settings, order: Assignment, trial: int, fails_before: int) -> Key | None:
@@ -290,35 +345,36 @@ def _settle_all(
     settings: Settings, drives: Mapping[Key, Driven],
 ) -> Executed:
     shape = fails.shape
-    rollout = np.arange(settings.trials) % settings.rollouts
+    rollout = (settings.first + np.arange(settings.trials)) % settings.rollouts
     incentive, end_time, fuel = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     pois, stops, end = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
     traces = []
     mine: dict[Key, Driven] = {}
     for number, order in enumerate(orders):
-        settled: dict[tuple[Key | None, int], Outcome] = {}
-        for trial in range(settings.trials):
-            failed = int(fails[trial, number])
-            which = (_key(settings, order, trial, failed), failed)
-            if which not in settled:
-                driven = _drive_of(drives, which[0])
-                settled[which] = settle(order, driven, failed)
-                if which[0] is not None:
-                    mine[which[0]] = driven
-            outcome = settled[which]
-            incentive[trial, number], end_time[trial, number] = outcome.incentive, outcome.end_time_s
-            fuel[trial, number], end[trial, number] = outcome.fuel_used_s, ENDS.index(outcome.end)
-            pois[trial, number], stops[trial, number] = outcome.pois_reached, outcome.stops_reached
-        failed = int(fails[0, number])
-        key = _key(settings, order, 0, failed)
-        traces.append(_trace(world, costs[world.robots[number].model.name], order, _drive_of(drives, key),
-                             settled[key, failed]))
+        rows, kind = _alike(settings, fails[:, number])
+        outcomes = []
+        for row in rows:
+            failed = int(fails[row, number])
+            key = _key(settings, order, settings.first + row, failed)
+            driven = _drive_of(drives, key)
+            outcomes.append(settle(order, driven, failed))
+            if key is not None:
+                mine[key] = driven
+        for column, figures in (
+                (incentive, [o.incentive for o in outcomes]), (end_time, [o.end_time_s for o in outcomes]),
+                (fuel, [o.fuel_used_s for o in outcomes]), (end, [ENDS.index(o.end) for o in outcomes]),
+                (pois, [o.pois_reached for o in outcomes]), (stops, [o.stops_reached for o in outcomes])):
+            column[:, number] = np.array(figures)[kind]
+        if settings.recorded:
+            key = _key(settings, order, settings.first, int(fails[0, number]))
+            traces.append(_trace(world, costs[world.robots[number].model.name], order, _drive_of(drives, key),
+                                 outcomes[kind[0]]))
     return Executed(
         case=case, rollout=rollout, available=fails == NEVER, incentive=incentive, pois_reached=pois,
         stops_reached=stops, end=end, end_time_s=end_time, fuel_used_s=fuel,
         planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
         drawn_incentive=np.column_stack([_left_by_draws(o, fails[:, k]) for k, o in enumerate(orders)]),
-        legs=tuple(_leg_times(world, costs, mine)), traces=tuple(traces))
+        legs=tuple(_leg_times(world, costs, mine)) if settings.recorded else (), traces=tuple(traces))
 
 
 def _left_by_draws(orders: Assignment, fails: IntArray) -> FloatArray:

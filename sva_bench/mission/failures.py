@@ -63,6 +63,7 @@ def draw_failures(
     *,
     trials: int,
     pois: int,
+    first: int = 0,
     joint: Sequence[JointState] | None = None,
 ) -> IntArray:
     """Number of the POI before which each robot fails in each trial.
@@ -77,6 +78,7 @@ def draw_failures(
         process: The failure process.
         trials: Number of trials.
         pois: Greatest number of POIs on a route; per-leg draws are made for as many.
+        first: Number of the first trial.
         joint: Joint distribution of the availabilities (``mission`` only); replaces the independent draws.
 
     Returns:
@@ -86,7 +88,7 @@ def draw_failures(
     fails = np.full((trials, len(vehicles)), NEVER, dtype=np.int64)
     if joint is not None and process == "mission":
         edges = np.cumsum([state.probability for state in joint])
-        u = uniforms(seed, Stream.JOINT_FAILURE, count=trials)
+        u = uniforms(seed, Stream.JOINT_FAILURE, first=first, count=trials)
         state = np.minimum(np.searchsorted(edges, u, side="right"), len(joint) - 1)
         for column, name in enumerate(vehicles):
             there = np.array([name in s.available for s in joint])
@@ -95,13 +97,13 @@ def draw_failures(
     for column, name in enumerate(vehicles):
         p = availability[name]
         if process == "mission":
-            fails[failure_uniforms(seed, column, 1, trials) >= p, column] = 0
+            fails[failure_uniforms(seed, column, 1, trials, first) >= p, column] = 0
             continue
         for k in range(pois, 0, -1):  # downwards, so that the first failure stands
-            fails[failure_uniforms(seed, column, k, trials) >= p, column] = k
+            fails[failure_uniforms(seed, column, k, trials, first) >= p, column] = k
     return fails
 
 
-def failure_uniforms(seed: int, vehicle: int, poi: int, trials: int) -> FloatArray:
+def failure_uniforms(seed: int, vehicle: int, poi: int, trials: int, first: int = 0) -> FloatArray:
     """The uniform of each trial that decides on one vehicle before its ``poi``-th POI, shape (trials,)."""
-    return uniforms(seed, Stream.FAILURE, vehicle, poi, count=trials)
+    return uniforms(seed, Stream.FAILURE, vehicle, poi, first=first, count=trials)

@@ -17,7 +17,7 @@ import pytest
 
 from sva_bench.analysis.report import write_batch_report
 from sva_bench.analysis.wording import answer, finding, with_interval
-from sva_bench.batch import aggregate
+from sva_bench.batch.aggregates import aggregate
 from sva_bench.bench import Run, run
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.planning import Options
@@ -173,10 +173,10 @@ def test_tables_say_their_units_and_open_as_csv(folder: Path) -> None:
 
 
 def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> None:
-    units = [finished.summary]
+    units = [{**finished.summary, "variant": ""}]
     write_batch_report(tmp_path / "report.html", {
         "trials": 40, "fidelity": "kinematic", "worlds": ["small"], "seeds": [0], "units": units,
-        "aggregate": aggregate(units)})
+        "failed": [], "aggregate": aggregate(units)})
     text = (tmp_path / "report.html").read_text()
     assert "over 1 map<" in text
     assert "<svg" in text

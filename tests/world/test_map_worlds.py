@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sva_bench.batch import settings_of
+from sva_bench.batch.folder import write_maps
+from sva_bench.batch.grid import Grid, Point, grid_of
 from sva_bench.bench import run
 from sva_bench.documents import pretty_json
 from sva_bench.errors import BadFile
@@ -107,7 +108,15 @@ def test_a_run_keeps_the_maps_files_and_is_another_run_with_another_map(tmp_path
     np.testing.assert_array_equal(again.obstacles.boxes, world.obstacles.boxes)
     write_pgm(tmp_path / "map.pgm", np.where(np.eye(7, 10), 254, 254))  # no wall is left
     other = load_world(tmp_path / "world.yaml")
-    assert settings_of([other], [0], options) != settings_of([world], [0], options)
+
+    def grid(of: World) -> Grid:
+        return Grid(points=[Point(world=of, planner="prmstar")], seeds=[0], options=options, unit_trials=10)
+
+    assert grid(other).settings() != grid(world).settings()
+    # A batch folder has the map, so the manifest's settings are all that it takes to go on.
+    write_maps(tmp_path / "batch", grid(world).map_files())
+    held = grid_of(grid(world).settings(), tmp_path / "batch" / "manifest.json")
+    assert held.settings() == grid(world).settings()
     assert run(other, options, tmp_path / "runs", None, lambda *_: None).folder != done.folder
 
 

@@ -1,0 +1,165 @@
+"""Hands out jobs as strands come to need them, keeps what is worth keeping, and tries again what failed."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sva_bench.batch.answers import Answer, Done
+from sva_bench.batch.cache import Cache
+from sva_bench.batch.engines import Engine
+from sva_bench.batch.grid import Point
+from sva_bench.batch.jobs import Job, TrialsJob
+from sva_bench.batch.shards import Shard
+from sva_bench.batch.strands import Strand
+
+ATTEMPTS = 3
+_TICK_S = 0.5
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(eq=False, kw_only=True)
+class Open:
+    """A strand at work.
+
+    Attributes:
+        point, seed: What it measures.
+        strand: Its steps.
+        results: Those of the step at hand, by position.
+        lacking: How many of them are missing.
+        failure: Why one of them will always be missing, and after how many attempts.
+    """
+
+    point: Point
+    seed: int
+    strand: Strand
+    results: list[Any] = field(default_factory=list)
+    lacking: int = 0
+    failure: tuple[str, int] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hooks:
+    """What the conductor tells of.
+
+    Attributes:
+        shard: A unit is measured.
+        unit_failed: A unit is given up: why, after how many attempts.
+        strand_failed: All units of a point and seed that are not done are given up.
+        tick: Time has passed.
+    """
+
+    shard: Callable[[str, Shard], None]
+    unit_failed: Callable[[str, str, int], None]
+    strand_failed: Callable[[Point, int, str, int], None]
+    tick: Callable[[], None]
+
+
+class Conductor:
+    """The jobs at hand. Strands share a job where its hash is the same, whether it runs, waits, or ran before."""
+
+    def __init__(self, engine: Engine, cache: Cache, hooks: Hooks) -> None:
+        self._engine, self._cache, self._hooks = engine, cache, hooks
+        self._queue: deque[str] = deque()
+        self._jobs: dict[str, Job] = {}
+        self._attempts: dict[str, int] = {}
+        self._wanted: dict[str, list[tuple[Open, int]]] = {}
+        self._flying = 0
+        self._open = 0
+        self._given_up: dict[str, tuple[str, int]] = {}
+        self._warned: set[str] = set()
+
+    def run(self, strands: Iterator[tuple[Point, int, Strand]]) -> None:
+        """Bring all strands to their end."""
+        more = True
+        while more or self._open:
+            # A few more than there are workers: one that plans leaves them work, and memory stays bounded.
+            while more and self._open < 2 * self._engine.slots + 2 and len(self._queue) < 4 * self._engine.slots:
+                following = next(strands, None)
+                if following is None:
+                    more = False
+                    break
+                self._open += 1
+                self._advance(Open(point=following[0], seed=following[1], strand=following[2]), None)
+            while self._queue and self._flying < self._engine.slots:
+                key = self._queue.popleft()
+                self._attempts[key] = self._attempts.get(key, 0) + 1
+                self._flying += 1
+                self._engine.submit(key, self._jobs[key])
+            if self._flying:
+                for key, answer in self._engine.answers(_TICK_S):
+                    self._flying -= 1
+                    self._take(key, answer)
+            self._hooks.tick()
+
+    def _advance(self, opened: Open, results: Sequence[Any] | None) -> None:
+        """Take a strand to its next step that must wait for something."""
+        while True:
+            try:
+                jobs = opened.strand.send(results) if results is not None else next(opened.strand)
+            except StopIteration:
+                self._open -= 1
+                return
+            opened.results, opened.lacking = [None] * len(jobs), 0
+            for position, job in enumerate(jobs):
+                key = job.key
+                if key in self._given_up:
+                    opened.failure = opened.failure or self._given_up[key]
+                    continue
+                if key not in self._jobs:
+                    kept = self._cache.get(job.kind, key) if job.kept else None
+                    if kept is not None:
+                        opened.results[position] = kept
+                        continue
+                    self._jobs[key] = job
+                    self._queue.append(key)
+                self._wanted.setdefault(key, []).append((opened, position))
+                opened.lacking += 1
+            if opened.lacking:
+                return
+            if opened.failure is not None:
+                self._give_up(opened, opened.failure)
+                return
+            results = opened.results
+
+    def _give_up(self, opened: Open, failure: tuple[str, int]) -> None:
+        self._open -= 1
+        opened.strand.close()
+        self._hooks.strand_failed(opened.point, opened.seed, *failure)
+
+    def _take(self, key: str, answer: Answer) -> None:
+        job, attempts = self._jobs[key], self._attempts[key]
+        if not isinstance(answer, Done) and not answer.mendable and attempts < ATTEMPTS:
+            _log.info("%s: %s; trying again", job.what, answer.reason)
+            self._queue.append(key)  # last, so that others come first
+            return
+        if isinstance(answer, Done):
+            for warning in answer.warnings:
+                if warning not in self._warned:
+                    self._warned.add(warning)
+                    _log.warning("%s", warning)
+            if job.kept:
+                self._cache.put(job.kind, key, answer.result)
+            elif isinstance(job, TrialsJob):
+                self._hooks.shard(job.unit, answer.result)
+        elif isinstance(job, TrialsJob):
+            self._hooks.unit_failed(job.unit, f"{job.what}: {answer.reason}", attempts)
+        else:
+            self._given_up[key] = (f"{job.what}: {answer.reason}", attempts)
+        del self._jobs[key], self._attempts[key]
+        for opened, position in self._wanted.pop(key):
+            opened.lacking -= 1
+            if isinstance(answer, Done):
+                opened.results[position] = answer.result if job.kept else None
+            elif job.kept:
+                opened.failure = opened.failure or self._given_up[key]
+            if opened.lacking:
+                continue
+            if opened.failure is None:
+                self._advance(opened, opened.results)
+            else:
+                self._give_up(opened, opened.failure)

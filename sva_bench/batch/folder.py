@@ -1,0 +1,195 @@
+"""A batch folder: one writer at a time by the kernel's lock, and every file whole or absent."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from sva_bench.documents import pretty_json, read_json
+from sva_bench.errors import BadFile, BadInput
+
+MANIFEST = "sva-bench/batch-manifest@1"
+FAILURES = "sva-bench/batch-failures@1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """A unit that was given up, and why."""
+
+    unit: str
+    world: str
+    seed: int
+    reason: str
+    attempts: int
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """The only batch at work in a folder. The lock is the kernel's, on the folder itself: it ends with the process.
+
+    Raises:
+        BadInput: If the folder cannot be made or opened, or another batch is at work there.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BadInput(f"{folder}: another batch is at work in this folder; wait for it, or choose another with "
+                           "--out") from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def at_work(folder: Path) -> bool:
+    """Whether a batch is at work in a folder."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(handle)
+    return False
+
+
+def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
+    """Make a locked folder ready for a batch of these settings.
+
+    Raises:
+        BadInput: If it holds something else, or cannot be written to.
+    """
+    try:
+        held = [path for path in folder.iterdir() if path.suffix != ".tmp"]
+        if held and not resume:
+            raise BadInput(f"{folder}: the folder isn't empty; go on with --resume, or choose another with --out")
+        if held:
+            refuse_other_settings(folder, settings)
+        for draft in folder.glob("*.tmp"):
+            draft.unlink()
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    if not held:
+        write(folder / "manifest.json", pretty_json({"format": MANIFEST, "settings": dict(settings)}).encode())
+
+
+def settings_in(folder: Path) -> dict[str, Any]:
+    """The settings that a batch folder was made with.
+
+    Raises:
+        BadFile: If it is no batch folder.
+    """
+    document = read_json(folder / "manifest.json")
+    data = document.data
+    settings = data.get("settings") if isinstance(data, dict) and data.get("format") == MANIFEST else None
+    if not isinstance(settings, dict):
+        raise BadFile(document.path, None, "settings", "this is no batch folder of ours; choose another")
+    return settings
+
+
+def refuse_other_settings(folder: Path, settings: Mapping[str, Any]) -> None:
+    """Refuse to go on with a folder of other settings, naming the first difference."""
+    held, now = settings_in(folder), json.loads(json.dumps(settings))
+    if held != now:
+        key, was, is_now = _difference(held, now)
+        plain = all(isinstance(value, bool | int | float | str | None) for value in (was, is_now))
+        told = f" ({_shown(was)} there, {_shown(is_now)} now)" if plain else ""
+        raise BadFile(folder / "manifest.json", None, key, f"differs from the batch in this folder{told}; use the "
+                      "same settings, or choose another folder with --out")
+
+
+_ABSENT = "absent"
+
+
+def _difference(held: Any, now: Any, key: str = "settings") -> tuple[str, Any, Any]:
+    """The first key at which two settings differ, and both values."""
+    if isinstance(held, dict) and isinstance(now, dict):
+        for name in [*held, *(name for name in now if name not in held)]:
+            if name not in held or name not in now or held[name] != now[name]:
+                return _difference(held.get(name, _ABSENT), now.get(name, _ABSENT), f"{key}.{name}")
+    if isinstance(held, list) and isinstance(now, list) and len(held) == len(now):
+        for number, (one, other) in enumerate(zip(held, now, strict=True)):
+            if one != other:
+                return _difference(one, other, f"{key}[{number}]")
+    return key, held, now
+
+
+def _shown(value: Any) -> str:
+    return _ABSENT if value is _ABSENT or value == _ABSENT else json.dumps(value)[:60]
+
+
+def shard_path(folder: Path, unit: str) -> Path:
+    """Where a unit's rows are."""
+    return folder / f"outcomes-{unit}.parquet"
+
+
+def units_in(folder: Path) -> set[str]:
+    """Names of the units whose rows are there."""
+    return {path.stem.removeprefix("outcomes-") for path in folder.glob("outcomes-*.parquet")}
+
+
+def failures_in(folder: Path) -> list[Failure]:
+    """The units that were given up."""
+    path = folder / "failures.json"
+    if not path.exists():
+        return []
+    document = read_json(path)
+    try:
+        return [Failure(**entry) for entry in document.data["failures"]]
+    except (KeyError, TypeError):
+        raise BadFile(path, None, "failures", "this is no list of failures of ours; remove it, and those units are "
+                      "tried again with --resume") from None
+
+
+def write_failures(folder: Path, failures: Sequence[Failure]) -> None:
+    """Put down the units that were given up."""
+    write(folder / "failures.json", pretty_json(
+        {"format": FAILURES, "failures": [asdict(failure) for failure in failures]}).encode())
+
+
+def write_maps(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Put the files of maps into a batch folder, unless they are there: it is all that ``retry`` needs."""
+    for name, content in files.items():
+        path = folder / name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            held = path.exists() and path.read_bytes() == content
+        except OSError as error:
+            raise _unwritable(folder, error) from None
+        if not held:
+            write(path, content)
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file of a batch folder, whole or not at all, to the disk itself.
+
+    Raises:
+        BadInput: If it cannot be written; what was written before stays.
+    """
+    draft = path.with_name(f"{path.name}.tmp")
+    try:
+        with draft.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())  # else a power cut could leave a renamed file empty
+        draft.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            draft.unlink(missing_ok=True)
+        raise _unwritable(path.parent, error) from None
+
+
+def _unwritable(folder: Path, error: OSError) -> BadInput:
+    return BadInput(f"{folder}: cannot be written to ({error.strerror}); what is done is kept: make room and go on "
+                    "with --resume, or choose another folder with --out")

@@ -1,0 +1,137 @@
+"""The grid of a batch: worlds and their variants, seeds, and the units that they come to."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sva_bench import __version__
+from sva_bench.batch.digest import digest
+from sva_bench.planning import Options
+from sva_bench.documents import Document
+from sva_bench.errors import BadInput
+from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.world.load import world_as_dict, world_of
+from sva_bench.world.model import World
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Point:
+    """A world as it is measured.
+
+    Attributes:
+        world: The world, with its variations.
+        planner: How its paths are planned.
+        variant: What a sweep varied, e.g. ``robots.uv2.fuel_capacity_s=200``; empty without a sweep.
+    """
+
+    world: World
+    planner: Any
+    variant: str = ""
+
+    @property
+    def name(self) -> str:
+        """Part of file names: the world's name, and a hash of the variation."""
+        return f"{self.world.name}-{digest(self.variant)[:6]}" if self.variant else self.world.name
+
+    @property
+    def label(self) -> str:
+        """For a person."""
+        return f"{self.world.name} ({self.variant})" if self.variant else self.world.name
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Grid:
+    """Everything that a batch is to measure: every point with every seed, trials cut into units.
+
+    Attributes:
+        points: Worlds and variants.
+        seeds: Seeds of failures and noise.
+        options: All else; its seed and planner are those of seeds and points.
+        unit_trials: Trials of one unit at most.
+    """
+
+    points: Sequence[Point]
+    seeds: Sequence[int]
+    options: Options
+    unit_trials: int
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that the rows and shards of a batch depend on."""
+        options = self.options.as_dict()
+        del options["planner"]
+        return {"version": __version__, "seeds": list(self.seeds), "options": options,
+                "unit_trials": self.unit_trials, "points": {point.name: {
+                    "variant": point.variant, "planner": point.planner, "world": world_as_dict(point.world),
+                    **({} if point.world.map_source is None else {"files": point.world.map_source.digests()})}
+                    for point in self.points}}
+
+    def map_files(self) -> dict[str, bytes]:
+        """The files behind worlds of maps, by their names within the batch folder; equal ones once."""
+        sources = [point.world.map_source for point in self.points if point.world.map_source is not None]
+        return {f"{_map_folder(source.digests())}/{file.name}": file.content
+                for source in sources for file in source.files}
+
+    def strands(self) -> Iterator[tuple[Point, int]]:
+        """Every point with every seed."""
+        for point in self.points:
+            for seed in self.seeds:
+                yield point, seed
+
+    def ranges(self) -> list[tuple[int, int]]:
+        """First trial and number of trials of each unit of a point and seed."""
+        trials = self.options.trials
+        return [(first, min(self.unit_trials, trials - first)) for first in range(0, trials, self.unit_trials)]
+
+    def unit_name(self, point: Point, seed: int, first: int) -> str:
+        """Part of a shard's file name."""
+        name = f"{point.name}-seed{seed}"
+        return name if self.options.trials <= self.unit_trials else f"{name}-t{first:08d}"
+
+    def units(self) -> list[str]:
+        """Names of all units, in order."""
+        ranges = self.ranges()
+        return [self.unit_name(point, seed, first) for point, seed in self.strands() for first, _ in ranges]
+
+
+def checked(grid: Grid) -> Grid:
+    """The grid, refused if two of its points would write the same files."""
+    names = [point.name for point in grid.points]
+    for point in grid.points:
+        if names.count(point.name) > 1:
+            raise BadInput(f"two worlds are named {point.name!r}; names must differ within a batch")
+    return grid
+
+
+def grid_of(settings: Mapping[str, Any], path: Path) -> Grid:
+    """The grid that gave these settings, read from the file at ``path``."""
+    told = settings["options"]
+    options = Options(
+        trials=told["trials"], rollouts=told["rollouts"], fidelity=told["fidelity"], evpi=told["evpi"],
+        limits=SolveLimits(time_limit_s=told["time_limit_s"], gap=told["gap"]))
+    points = [Point(world=world_of(Document(_beside_map(path, entry), entry["world"], json.dumps(entry["world"]))),
+                    planner=entry["planner"], variant=entry["variant"])
+              for entry in settings["points"].values()]
+    return Grid(points=points, seeds=settings["seeds"], options=options, unit_trials=settings["unit_trials"])
+
+
+def _map_folder(digests: Mapping[str, str]) -> str:
+    return f"map-{digest(digests)[:12]}"
+
+
+def _beside_map(path: Path, entry: Mapping[str, Any]) -> Path:
+    """Where a point's world would stand so that it finds its map."""
+    return path.parent / _map_folder(entry["files"]) / path.name if "files" in entry else path
+
+
+def batch_name(settings: Mapping[str, Any]) -> str:
+    """Default name of a batch folder: equal batches get equal names."""
+    return f"batch-{digest(settings)[:8]}"
+
+
+def options_at(grid: Grid, point: Point, seed: int) -> Options:
+    """The options of one point and seed."""
+    return replace(grid.options, seed=seed, planner=point.planner)

@@ -1,0 +1,176 @@
+"""What a batch is made of: jobs that depend on nothing but their content, and run anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol
+
+from sva_bench.batch.digest import digest
+from sva_bench.batch.shards import Facts, Shard, shard_of
+from sva_bench.planning import Options, Planned, instance_of, plan_scenarios
+from sva_bench.execution.execute import (
+    Case,
+    DriveTask,
+    Key,
+    Settings,
+    drive_route,
+    execute,
+    settle_trials,
+)
+from sva_bench.execution.outcome import Driven
+from sva_bench.robot.model import RobotModel
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.travel.roadmap import PlannerName
+from sva_bench.travel.times import TravelTimes, plan_travel_times
+from sva_bench.world.model import World
+
+
+class Job(Protocol):
+    """One piece of work.
+
+    Attributes:
+        kind: What sort of result it has.
+        kept: Whether its result goes into the cache.
+    """
+
+    kind: ClassVar[str]
+    kept: ClassVar[bool]
+
+    @property
+    def key(self) -> str:
+        """Hash of all that the result depends on; equal jobs run once."""
+
+    @property
+    def what(self) -> str:
+        """For a person: what is being done."""
+
+    def run(self) -> Any:
+        """Do it."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TravelTimesJob:
+    """Plan the paths of one robot model in a world."""
+
+    kind: ClassVar[str] = "travel-times"
+    kept: ClassVar[bool] = True
+    world: World
+    model: RobotModel
+    planner: PlannerName
+
+    @property
+    def key(self) -> str:
+        """Obstacles and sites, not what robots earn, burn or fear: sweeps over those share it."""
+        sites = [(site.name, site.x_m, site.y_m, site.heading_rad) for site in self.world.sites]
+        return digest(self.kind, self.world.obstacles, sites, self.model, self.planner)
+
+    @property
+    def what(self) -> str:
+        """For a person."""
+        return f"travel times of {self.model.name}"
+
+    def run(self) -> TravelTimes:
+        """Plan them."""
+        return plan_travel_times(self.world, self.model, self.planner)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlansJob:
+    """Make both plans for each scenario of a world."""
+
+    kind: ClassVar[str] = "plans"
+    kept: ClassVar[bool] = True
+    world: World
+    costs: Mapping[str, FuelCosts]
+    options: Options
+
+    @property
+    def key(self) -> str:
+        """The instances, and when solves may stop."""
+        instances = [instance_of(self.world, self.costs, scenario) for scenario in self.world.scenarios]
+        return digest(self.kind, [s.name for s in self.world.scenarios], instances, self.world.plan_failure,
+                      self.world.execute_failure, self.options.limits, self.options.evpi, self.options.informed,
+                      self.options.assumptions)
+
+    @property
+    def what(self) -> str:
+        """For a person."""
+        return "plans"
+
+    def run(self) -> dict[str, Planned]:
+        """Make them."""
+        return plan_scenarios(self.world, self.costs, self.options, lambda *_: None)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DriveJob:
+    """Drive one route under one noise draw."""
+
+    kind: ClassVar[str] = "drives"
+    kept: ClassVar[bool] = True
+    task: DriveTask
+    robot: str
+    rollout: int
+
+    @property
+    def key(self) -> str:
+        """The drive's task: whose route it is doesn't matter."""
+        return digest(self.kind, self.task)
+
+    @property
+    def what(self) -> str:
+        """For a person."""
+        return f"drive of {self.robot} under noise draw {self.rollout}"
+
+    def run(self) -> Driven:
+        """Drive it."""
+        return drive_route(self.task)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrialsJob:
+    """Settle a range of trials: a unit of a batch, which becomes a shard.
+
+    Attributes:
+        unit: Name of the unit, unique in its batch.
+        world: The world.
+        variant: What a sweep varied in it, for the table.
+        cases: Plans under their scenarios.
+        settings: Seed, rollouts and fidelity.
+        first, trials: The range.
+        facts: What is known of the plans before any trial.
+        drives: All drives, but for ``physics``, which needs ``costs`` to make its own.
+    """
+
+    kind: ClassVar[str] = "trials"
+    kept: ClassVar[bool] = False
+    unit: str
+    world: World
+    variant: str
+    cases: tuple[Case, ...]
+    settings: Settings
+    first: int
+    trials: int
+    facts: Facts
+    drives: Mapping[Key, Driven]
+    costs: Mapping[str, FuelCosts]
+
+    @property
+    def key(self) -> str:
+        """The unit's name: a batch has each of its units once."""
+        return f"{self.kind}:{self.unit}"
+
+    @property
+    def what(self) -> str:
+        """For a person."""
+        return f"trials {self.first} to {self.first + self.trials - 1}"
+
+    def run(self) -> Shard:
+        """Settle them."""
+        settings = replace(self.settings, first=self.first, trials=self.trials, recorded=False)
+        if settings.fidelity == "physics":
+            executed = execute(self.world, self.costs, self.cases, settings)
+        else:
+            executed = settle_trials(self.world, self.cases, settings, self.drives)
+        return shard_of(self.world, self.variant, executed, settings, self.facts)

@@ -1,0 +1,161 @@
+"""A batch from its grid to its summary; only this process writes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sva_bench.analysis.report import write_batch_report
+from sva_bench.batch.aggregates import aggregate, entry_of, joined, summary_of
+from sva_bench.batch.cache import Cache
+from sva_bench.batch.conductor import Conductor, Hooks
+from sva_bench.batch.engines import Engine
+from sva_bench.batch.folder import (
+    Failure,
+    begin,
+    failures_in,
+    locked,
+    shard_path,
+    units_in,
+    write,
+    write_failures,
+    write_maps,
+)
+from sva_bench.batch.grid import Grid, Point
+from sva_bench.batch.shards import Note, Shard, read_note
+from sva_bench.batch.strands import Strand, strand
+from sva_bench.documents import pretty_json
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Progress:
+    """How far a batch is.
+
+    Attributes:
+        done, failed, units: Units measured, given up, and all.
+        before: Units that were measured before this process began.
+        seconds: Time since it began.
+        vss: The VSS over maps so far, when it is asked for.
+    """
+
+    done: int
+    failed: int
+    units: int
+    before: int
+    seconds: float
+    vss: Callable[[], list[dict[str, Any]]]
+
+    @property
+    def rate(self) -> float | None:
+        """Units per second of this process; ``None`` before the first."""
+        return (self.done - self.before) / self.seconds if self.done > self.before and self.seconds > 0 else None
+
+    @property
+    def left_s(self) -> float | None:
+        """Time left at this rate."""
+        return None if self.rate is None else (self.units - self.done - self.failed) / self.rate
+
+
+def run_batch(
+    grid: Grid, folder: Path, engine: Callable[[], AbstractContextManager[Engine]], cache: Cache,
+    report: Callable[[Progress], None], *, resume: bool, retry: bool = False,
+) -> dict[str, Any]:
+    """Measure every unit of a grid that is not measured yet, and sum up.
+
+    Args:
+        grid: What to measure.
+        folder: The batch folder.
+        engine: Makes the place where jobs run; not called if nothing is left.
+        cache: Travel times, plans and drives.
+        report: Called every half a second or so.
+        resume: Go on with what the folder holds.
+        retry: Take up again the units that were given up.
+
+    Returns:
+        The content of ``summary.json``.
+
+    Raises:
+        BadInput: If the folder holds something else, is in use, or cannot be written to.
+    """
+    with locked(folder):
+        begin(folder, grid.settings(), resume=resume or retry)
+        write_maps(folder, grid.map_files())
+        books = _Books(grid, folder, retry=retry)
+        report(books.progress())
+        if books.left:
+            with engine() as running:
+                Conductor(running, cache, Hooks(
+                    shard=books.keep, unit_failed=books.unit_failed, strand_failed=books.strand_failed,
+                    tick=lambda: report(books.progress()))).run(books.strands())
+        summary = summary_of(grid, folder, books.done, books.failures)
+        write(folder / "summary.json", pretty_json(summary).encode())
+        write_batch_report(folder / "report.html.tmp", summary)
+        (folder / "report.html.tmp").replace(folder / "report.html")
+        return summary
+
+
+class _Books:
+    """What is done, what was given up, and what it comes to so far."""
+
+    def __init__(self, grid: Grid, folder: Path, *, retry: bool) -> None:
+        self._grid, self._folder, self._begun = grid, folder, time.monotonic()
+        self._owner = {grid.unit_name(point, seed, first): (point, seed)
+                       for point, seed in grid.strands() for first, _ in grid.ranges()}
+        self.done = units_in(folder) & set(self._owner)
+        held = failures_in(folder)
+        self.failures = [] if retry else [failure for failure in held if failure.unit not in self.done]
+        if self.failures != held:
+            write_failures(folder, self.failures)
+        self._before = len(self.done)
+        self._so_far: dict[tuple[str, int], Note] = {}
+        for unit, (point, seed) in self._owner.items():
+            if unit in self.done:
+                self._add(point.name, seed, read_note(shard_path(folder, unit)))
+
+    @property
+    def left(self) -> bool:
+        """Whether there is something to do."""
+        return len(self.done) + len(self.failures) < len(self._owner)
+
+    def strands(self) -> Iterator[tuple[Point, int, Strand]]:
+        """The work that is left."""
+        over = frozenset(self.done | {failure.unit for failure in self.failures})
+        for point, seed in self._grid.strands():
+            yield point, seed, strand(self._grid, point, seed, over)
+
+    def keep(self, unit: str, shard: Shard) -> None:
+        """Write a unit's rows."""
+        write(shard_path(self._folder, unit), shard.content)
+        self.done.add(unit)
+        point, seed = self._owner[unit]
+        self._add(point.name, seed, shard.note)
+
+    def unit_failed(self, unit: str, reason: str, attempts: int) -> None:
+        """Put down that a unit was given up."""
+        point, seed = self._owner[unit]
+        self._put_down([(unit, point, seed)], reason, attempts)
+
+    def strand_failed(self, point: Point, seed: int, reason: str, attempts: int) -> None:
+        """Put down that all that was left of a point and seed was given up."""
+        over = self.done | {failure.unit for failure in self.failures}
+        names = [self._grid.unit_name(point, seed, first) for first, _ in self._grid.ranges()]
+        self._put_down([(name, point, seed) for name in names if name not in over], reason, attempts)
+
+    def progress(self) -> Progress:
+        """How far the batch is."""
+        return Progress(done=len(self.done), failed=len(self.failures), units=len(self._owner), before=self._before,
+                        seconds=time.monotonic() - self._begun,
+                        vss=lambda: aggregate([entry_of(note) for note in self._so_far.values()]))
+
+    def _put_down(self, units: list[tuple[str, Point, int]], reason: str, attempts: int) -> None:
+        self.failures += [Failure(unit=unit, world=point.label, seed=seed, reason=reason, attempts=attempts)
+                          for unit, point, seed in units]
+        write_failures(self._folder, self.failures)
+
+    def _add(self, point: str, seed: int, note: Note) -> None:
+        known = self._so_far.get((point, seed))
+        self._so_far[point, seed] = note if known is None else joined(known, note)

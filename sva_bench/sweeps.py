@@ -1,0 +1,184 @@
+"""Sweeps: what the command line or a ``sweep.yaml`` asks for, as a grid of worlds, variants and seeds."""
+
+from __future__ import annotations
+
+import glob
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from pydantic import Field
+
+from sva_bench.batch.grid import Grid, Point, checked
+from sva_bench.planning import Options
+from sva_bench.documents import Document, Name, Number, Section, WholeNumber, parse_yaml, read_yaml, validate
+from sva_bench.errors import BadInput, nearest
+from sva_bench.inputs import adapted
+from sva_bench.options import FailureProcess, Fidelity, Planner
+from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.world.load import world_of
+
+KIND = "sva-bench/sweep@1"
+UNIT_TRIALS = 10_000
+UNIT_TRIALS_PHYSICS = 10
+"""A trial in physics takes seconds, a settled one microseconds; a unit should take seconds."""
+
+_MOST_SEEDS = 100_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """What a batch is asked for; ``None`` = not said.
+
+    Attributes:
+        worlds: World files.
+        seeds: Seeds of failures and noise.
+        trials, rollouts, fidelity, unit_trials: As for ``Options`` and ``Grid``.
+        planners: How paths are planned.
+        scenarios: Only these.
+        margin, execute_failure: In place of the worlds' own.
+        time_limit_s, gap: When a solve may stop.
+        vary: Values by dotted key of a world file.
+    """
+
+    worlds: tuple[Path, ...] = ()
+    seeds: tuple[int, ...] | None = None
+    trials: int | None = None
+    rollouts: int | None = None
+    fidelity: Fidelity | None = None
+    unit_trials: int | None = None
+    planners: tuple[Planner, ...] | None = None
+    scenarios: tuple[str, ...] | None = None
+    margin: float | None = None
+    execute_failure: FailureProcess | None = None
+    time_limit_s: float | None = None
+    gap: float | None = None
+    vary: Mapping[str, Sequence[Any]] | None = None
+
+
+class _SweepFile(Section):
+    format: Literal["sva-bench/sweep@1"]
+    worlds: list[str] = Field(min_length=1)
+    seeds: list[WholeNumber] | str | None = None
+    trials: int | None = Field(default=None, ge=1, le=10_000_000)
+    rollouts: int | None = Field(default=None, ge=1, le=100_000)
+    fidelity: Fidelity | None = None
+    unit_trials: int | None = Field(default=None, ge=1)
+    planners: list[Planner] | None = Field(default=None, min_length=1)
+    scenarios: list[Name] | None = Field(default=None, min_length=1)
+    margin: Number | None = Field(default=None, ge=0, le=1)
+    execute_failure: FailureProcess | None = None
+    time_limit_s: Number | None = Field(default=None, ge=0)
+    gap: Number | None = Field(default=None, ge=0)
+    set: dict[str, list[Any]] | None = None
+
+
+def sweep_of(paths: Sequence[Path], told: Sweep) -> Sweep:
+    """The sweep of these files, worlds or one ``sweep.yaml``; what is told beside them comes first."""
+    if len(paths) == 1 and paths[0].is_file() and (read := read_yaml(paths[0])).data is not None \
+            and isinstance(read.data, dict) and str(read.data.get("format", "")).startswith("sva-bench/sweep"):
+        held = _from_file(read)
+        return replace(held, **{key: value for key, value in vars(told).items() if value not in (None, ())})
+    return replace(told, worlds=tuple(path for given in paths for path in _matching(given)))
+
+
+def _from_file(document: Document) -> Sweep:
+    file = validate(document, _SweepFile, KIND)
+    try:
+        seeds = seeds_of([file.seeds]) if isinstance(file.seeds, str) else file.seeds and tuple(file.seeds)
+    except BadInput as error:
+        raise document.error(("seeds",), str(error)) from None
+    for key, values in (file.set or {}).items():
+        if not values:
+            raise document.error(("set", key), "give at least one value")
+    return Sweep(
+        worlds=tuple(path for word in file.worlds for path in _matching(document.path.parent / word)),
+        seeds=seeds or None, trials=file.trials, rollouts=file.rollouts, fidelity=file.fidelity,
+        unit_trials=file.unit_trials, planners=tuple(file.planners) if file.planners else None,
+        scenarios=tuple(file.scenarios) if file.scenarios else None, margin=file.margin,
+        execute_failure=file.execute_failure,
+        time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set)
+
+
+def _matching(given: Path) -> list[Path]:
+    """The files that a pattern matches; the path itself where it is none."""
+    if given.exists() or not glob.has_magic(str(given)):
+        return [given]
+    found = sorted(glob.glob(str(given), recursive=True))
+    if not found:
+        raise BadInput(f"{given}: no file matches")
+    return [Path(path) for path in found]
+
+
+def seeds_of(words: Sequence[str]) -> tuple[int, ...]:
+    """Seeds as told: ``3``, ``0-9``, ``1,5,7-9``."""
+    seeds: list[int] = []
+    for part in ",".join(words).split(","):
+        ends = part.strip().split("-")
+        if len(ends) > 2 or not all(end.strip().isdecimal() and len(end) < 19 for end in ends):
+            raise BadInput(f"--seed {part.strip()!r}: expected a whole number, or a range like 0-9")
+        first, last = int(ends[0]), int(ends[-1])
+        if last < first or last - first >= _MOST_SEEDS:
+            raise BadInput(f"--seed {part.strip()!r}: a range goes from the smaller to the greater, over "
+                           f"{_MOST_SEEDS} seeds at most")
+        seeds += range(first, last + 1)
+    return tuple(dict.fromkeys(seeds))
+
+
+def planners_of(words: Sequence[str]) -> tuple[Planner, ...]:
+    """Planners as told, each once."""
+    known = get_args(Planner)
+    for word in words:
+        if word not in known:
+            raise BadInput(f"--planner {word}: there is no such planner; {nearest(word, list(known))}")
+    return tuple(planner for planner in known if planner in words)
+
+
+def varied(words: Sequence[str]) -> dict[str, list[Any]]:
+    """Values by key as told: ``robots.uv2.fuel_capacity_s=200,250,300``, in the syntax of a world file."""
+    vary: dict[str, list[Any]] = {}
+    for word in words:
+        key, equals, values = word.partition("=")
+        if not (key and equals and values.strip()):
+            raise BadInput(f"--set {word}: expected KEY=VALUE,VALUE,...")
+        if key in vary:
+            raise BadInput(f"--set {key}: told twice; put all its values into one")
+        vary[key] = parse_yaml(f"[{values}]", Path(f"--set {key}")).data
+        if not isinstance(vary[key], list) or not vary[key]:
+            raise BadInput(f"--set {word}: expected KEY=VALUE,VALUE,...")
+    return vary
+
+
+def grid_of(sweep: Sweep) -> Grid:
+    """The grid that a sweep comes to.
+
+    Raises:
+        BadFile: If a world is wrong, as it is or varied.
+        BadInput: If two worlds share a name, or values don't differ.
+    """
+    vary = sweep.vary or {}
+    planners = sweep.planners or ("prmstar",)
+    for key, values in vary.items():
+        if len({json.dumps(value) for value in values}) < len(values):
+            raise BadInput(f"--set {key}: a value stands there twice")
+    points = []
+    for path in sweep.worlds:
+        document = read_yaml(path)
+        for values in product(*vary.values()):
+            changed = document
+            for key, value in zip(vary, values, strict=True):
+                changed = changed.changed(key, value)
+            world = adapted(world_of(changed), sweep.scenarios, sweep.margin, execute_failure=sweep.execute_failure)
+            for planner in planners:
+                parts = [f"{key}={json.dumps(value)}" for key, value in zip(vary, values, strict=True)]
+                parts += [f"planner={planner}"] if len(planners) > 1 else []
+                points.append(Point(world=world, planner=planner, variant="; ".join(parts)))
+    options = Options(
+        trials=sweep.trials or 1000, rollouts=sweep.rollouts or 8, fidelity=sweep.fidelity or "rollout",
+        limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap))
+    usual = UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS
+    return checked(Grid(points=points, seeds=sweep.seeds or (0,), options=options,
+                        unit_trials=sweep.unit_trials or usual))

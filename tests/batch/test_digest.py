@@ -1,0 +1,34 @@
+"""Content hashes tell different content apart, and only that."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sva_bench.batch.cache import Cache
+from sva_bench.batch.digest import digest
+from tests.worlds_for_tests import SMALL, world_of
+
+
+def test_equal_worlds_have_equal_hashes_and_any_other_figure_another(tmp_path: Path) -> None:
+    one, same = world_of(tmp_path), world_of(tmp_path)
+    other = world_of(tmp_path, SMALL.replace("stop_s: 4", "stop_s: 5"))
+    assert digest(one) == digest(same)
+    assert digest(one) != digest(other)
+
+
+def test_content_that_only_looks_alike_has_other_hashes() -> None:
+    alike = [["ab", "c"], ["a", "bc"], ["abc"], [["ab"], "c"], {"ab": "c"}, 1, 1.0, True, "1", None, np.array([1]),
+             np.array([1.0]), np.array([[1]])]
+    assert len({digest(item) for item in alike}) == len(alike)
+
+
+def test_a_torn_cache_file_counts_as_absent(tmp_path: Path) -> None:
+    cache = Cache(folder=tmp_path)
+    cache.put("drives", "ab12", [1, 2])
+    assert cache.get("drives", "ab12") == [1, 2]
+    assert cache.get("drives", "ab13") is None
+    (file,) = (path for path in tmp_path.rglob("ab12") if path.is_file())
+    file.write_bytes(file.read_bytes()[:-1])
+    assert cache.get("drives", "ab12") is None
