@@ -87,6 +87,9 @@ class Conductor:
                 self._advance(Open(point=following[0], seed=following[1], strand=following[2]), None)
             while self._queue and self._flying < self._engine.slots:
                 key = self._queue.popleft()
+                if all(opened.failure is not None for opened, _ in self._wanted[key]):
+                    self._drop(key)
+                    continue
                 self._attempts[key] = self._attempts.get(key, 0) + 1
                 self._flying += 1
                 self._engine.submit(key, self._jobs[key])
@@ -125,6 +128,15 @@ class Conductor:
                 self._give_up(opened, opened.failure)
                 return
             results = opened.results
+
+    def _drop(self, key: str) -> None:
+        """Leave out a job that only strands want which failed in another: a world that hangs would do so for hours."""
+        del self._jobs[key]
+        self._attempts.pop(key, None)
+        for opened, _ in self._wanted.pop(key):
+            opened.lacking -= 1
+            if not opened.lacking and opened.failure is not None:
+                self._give_up(opened, opened.failure)
 
     def _give_up(self, opened: Open, failure: tuple[str, int]) -> None:
         self._open -= 1

@@ -17,7 +17,7 @@ from sva_bench.batch.guarded import GuardedWorker
 from sva_bench.batch.jobs import Job
 from sva_bench.errors import BadInput
 
-_CONNECT_S = 20.0
+_CONNECT_S = 10.0
 _LOST_S = 60.0
 """A scheduler that is away for longer is taken for gone."""
 _COUNT_S = 2.0
@@ -34,7 +34,7 @@ class DaskCluster:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters of it is said by us
         where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
         try:
-            self._client = Client(**where, timeout=_CONNECT_S, set_as_default=False)
+            self._client = Client(**where, timeout=_CONNECT_S)
         except (OSError, TimeoutError, ValueError) as error:
             raise BadInput(f"--dask {address}: no Dask scheduler answers there ({error})") from None
         self._address, self._caps = address, caps

@@ -1,0 +1,196 @@
+"""Batches as a user runs them: what goes wrong on the way, and what is never lost."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from tests.test_batch import rows_of
+from tests.test_cli import sva_bench
+from tests.worlds_for_tests import SMALL
+
+POST = "- {cylinder: [4.4, 3.2], radius_m: 0.3}"
+
+# Only in workers, and only for the worlds that the test marks by the number of their posts: a crash and a hang in the
+# physics engine, as it is started.
+SABOTAGE = """
+import sys
+if "sva_bench.batch.worker" in sys.orig_argv:
+    import ctypes, time
+    from sva_bench.execution.simulator import Simulator
+    start = Simulator.__init__
+    def sabotaged(self, obstacles, *others):
+        if len(obstacles.cylinders) == 2:
+            ctypes.string_at(0)
+        if len(obstacles.cylinders) == 3:
+            time.sleep(600)
+        start(self, obstacles, *others)
+    Simulator.__init__ = sabotaged
+"""
+
+
+def posted(folder: Path, name: str, posts: int) -> Path:
+    """The small world with so many posts, the others far from all ways."""
+    more = "".join(f"\n      - {{cylinder: [{5.9 - 0.05 * k}, {5.95}], radius_m: 0.02}}" for k in range(posts - 1))
+    path = folder / f"{name}.yaml"
+    path.write_text(SMALL.replace("name: small", f"name: {name}").replace(POST, POST + more), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("cache")
+
+
+def started(*arguments: object, cwd: Path, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen([sys.executable, "-m", "sva_bench", "batch", *map(str, arguments)], cwd=cwd, text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ | environment)
+
+
+@pytest.mark.parametrize("hanging", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_worlds_that_crash_or_hang_the_physics_are_named_and_the_rest_goes_on(
+    hanging: bool, tmp_path: Path, cache: Path
+) -> None:
+    worlds = [posted(tmp_path, "sound", 1), posted(tmp_path, "crashing", 2), posted(tmp_path, "hanging", 3)]
+    (tmp_path / "sitecustomize.py").write_text(SABOTAGE, encoding="utf-8")
+    command = (*worlds[:3 if hanging else 2], "--trials", 20, "--rollouts", 1, "--scenario", "half", "--out", "out",
+               "--cache", cache / str(hanging), "--workers", 2)
+    # A hang takes three times the limit; a shorter one would cut short what is only slow on a busy machine.
+    with started(*command, "--unit-time-limit", 60, "--json", cwd=tmp_path, PYTHONPATH=str(tmp_path)) as batch:
+        output, messages = batch.communicate(timeout=900)
+    assert batch.returncode == 4, messages
+    summary = json.loads(output)
+    assert [unit["world"] for unit in summary["units"]] == ["sound"]
+    reasons = {entry["world"]: entry["reason"] for entry in summary["failed"]}
+    assert set(reasons) == ({"crashing", "hanging"} if hanging else {"crashing"})
+    assert "SIGSEGV" in reasons["crashing"]
+    assert "longer than 60 s" in reasons.get("hanging", "longer than 60 s")
+    assert {entry["attempts"] for entry in summary["failed"]} == {3}
+
+    told = sva_bench("batch", "status", "out", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert f"1 of {3 if hanging else 2} units done, {2 if hanging else 1} failed: over" in told.stdout
+    assert "crashing" in told.stdout
+    # Mended, they are taken up again, and nothing else is.
+    kept = (tmp_path / "out" / "outcomes-sound-seed0.parquet").stat().st_mtime_ns
+    again = sva_bench("batch", "retry", "out", "--cache", cache / str(hanging), "--workers", 1, "--json", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert [unit["world"] for unit in json.loads(again.stdout)["units"]] == [world.stem for world in worlds[
+        :3 if hanging else 2]]
+    assert (tmp_path / "out" / "outcomes-sound-seed0.parquet").stat().st_mtime_ns == kept
+
+
+def test_ctrl_c_ends_a_batch_with_130_and_resume_goes_on(tmp_path: Path, cache: Path) -> None:
+    world = posted(tmp_path, "small", 1)
+    command = (world, "--trials", 3000, "--unit-trials", 10, "--rollouts", 2, "--fidelity", "kinematic", "--out", "out",
+               "--cache", cache, "--workers", 1)
+    out = tmp_path / "out"
+    with started(*command, cwd=tmp_path) as batch:
+        wait_for(lambda: len(list(out.glob("outcomes-*"))) > 5)
+        second = sva_bench("batch", *command, "--resume", cwd=tmp_path)  # while the first is at it
+        batch.send_signal(signal.SIGINT)
+        _, messages = batch.communicate(timeout=60)
+    assert second.returncode == 2
+    assert "another batch is at work" in second.stderr
+    assert batch.returncode == 130, messages
+    assert "Traceback" not in messages
+    done = len(list(out.glob("outcomes-*")))
+    assert 5 < done < 300
+    resumed = sva_bench("batch", *command, "--resume", cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    table = rows_of(out)
+    assert table.num_rows == 3000 * 2 * 2 * 2
+    whole = sva_bench("batch", *command[:-1], 2, "--out", "whole", "--unit-trials", 3000, cwd=tmp_path)
+    assert whole.returncode == 0, whole.stderr
+    assert rows_of(tmp_path / "whole").equals(table)  # however trials are cut into units
+
+
+def test_a_folder_that_cannot_be_written_to_is_told_and_loses_nothing(tmp_path: Path, cache: Path) -> None:
+    world = posted(tmp_path, "small", 1)
+    command = ("batch", world, "--trials", 40, "--fidelity", "kinematic", "--workers", 1, "--cache", cache)
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    refused = sva_bench(*command, "--out", tmp_path / "file", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "cannot be written to" in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+FULL = """
+import errno, os, sys
+from sva_bench.batch import folder
+from sva_bench.__main__ import run_command_line
+
+def full(handle, sync=os.fsync):
+    if len(list(folder.Path("out").glob("outcomes-*.parquet"))) >= 2:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    sync(handle)
+
+folder.os.fsync = full
+sys.exit(run_command_line(sys.argv[1:]))
+"""
+
+
+def test_a_full_disk_ends_a_batch_with_one_clear_error_and_keeps_what_is_done(tmp_path: Path, cache: Path) -> None:
+    world = posted(tmp_path, "small", 1)
+    (tmp_path / "full.py").write_text(FULL, encoding="utf-8")
+    command = ["batch", str(world), "--trials", "40", "--unit-trials", "10", "--fidelity", "kinematic", "--workers",
+               "1", "--cache", str(cache), "--out", "out"]
+    filled = subprocess.run([sys.executable, "full.py", *command], cwd=tmp_path, text=True, capture_output=True,
+                            timeout=120, check=False)
+    assert filled.returncode == 2
+    assert "No space left on device" in filled.stderr
+    assert "--resume" in filled.stderr
+    assert "Traceback" not in filled.stderr
+    assert len(list((tmp_path / "out").glob("outcomes-*.parquet"))) == 2
+    assert not list((tmp_path / "out").glob("*.tmp"))
+    resumed = sva_bench(*command, "--resume", cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    assert rows_of(tmp_path / "out").num_rows == 40 * 2 * 2 * 2
+
+
+def test_the_lock_on_a_folder_is_the_kernels(tmp_path: Path) -> None:
+    from sva_bench.batch.folder import at_work, locked
+
+    with locked(tmp_path / "out"):
+        assert at_work(tmp_path / "out")
+    assert not at_work(tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []  # no file that could be left over
+    handle = os.open(tmp_path / "out", os.O_RDONLY)
+    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    os.close(handle)
+
+
+def wait_for(happened: Any, seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.02)
+
+
+def test_shards_have_the_columns_of_a_run_and_their_world_seed_and_variant(tmp_path: Path, cache: Path) -> None:
+    world = posted(tmp_path, "small", 1)
+    done = sva_bench("batch", world, "--set", "robots.uv2.fuel_capacity_s=50,60", "--seed", "3-4", "--trials", 10,
+                     "--scenario", "half", "--fidelity", "kinematic", "--workers", 1, "--cache", cache, "--out", "out",
+                     "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["variants"] == ["robots.uv2.fuel_capacity_s=50", "robots.uv2.fuel_capacity_s=60"]
+    assert [(row["variant"][-2:], row["maps"]) for row in summary["aggregate"]] == [("50", 1), ("60", 1)]
+    shards = sorted((tmp_path / "out").glob("outcomes-*.parquet"))
+    assert len(shards) == 4
+    table = pq.read_table(shards[0])
+    assert table.column_names == [
+        "scenario", "planner", "trial", "rollout", "robot", "available", "incentive", "pois_reached", "stops_reached",
+        "end", "end_time_s", "fuel_used_s", "fidelity", "world", "seed", "variant"]
+    assert set(table["seed"].to_pylist()) < {3, 4}
+    assert table.schema.field("end_time_s").metadata == {b"unit": b"s"}
