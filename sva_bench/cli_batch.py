@@ -80,6 +80,8 @@ def over(
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="The batch folder.",
                                              show_default="runs/batch-<hash>")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the grid, with an estimate of time and disk, and do "
+                                          "nothing.")] = False,
     workers: WorkerCount = None,
     dask: DaskOption = None,
     unit_trials: Annotated[int | None, typer.Option("--unit-trials", min=1, help="Trials of one unit, which is what "
@@ -106,6 +108,9 @@ def over(
         vary=varied(vary) if vary else None, unit_trials=unit_trials))
     grid = grid_of(sweep)
     folder = out or Path("runs") / batch_name(grid.settings())
+    if dry_run:
+        _list(grid, folder, cache, as_json)
+        return
     _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, resume=resume)
 
 
@@ -157,6 +162,21 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     console.print(f"{len(done)} of {len(units)} units done, {len(failures)} failed: {state}", highlight=False)
     console.print(over_maps(summary["aggregate"], "VSS over maps, so far"))
     print_failed(summary["failed"], console)
+
+
+def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool) -> None:
+    with holding_back_ctrl_c():
+        from sva_bench.batch.cache import Cache, default_folder
+        from sva_bench.batch.estimates import estimates
+        from sva_bench.live import print_grid
+
+    listed = estimates(grid, Cache(folder=cache or default_folder()), folder)
+    if as_json:
+        print_json({"format": "sva-bench/batch-grid@1", "strands": [
+            {"world": e.point.world.name, "variant": e.point.variant, "seed": e.seed, "units": e.units, "rows": e.rows,
+             "disk_mb": round(e.disk_bytes / 1e6, 3), "processor_s": round(e.processor_s, 1)} for e in listed]})
+    else:
+        print_grid(listed)
 
 
 def _existing(folder: Path) -> None:

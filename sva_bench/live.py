@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from sva_bench.analysis.wording import verdict, with_interval
+from sva_bench.batch.estimates import Estimate
 from sva_bench.batch.run import Progress
 from sva_bench.terminal import messages, results
 
@@ -126,6 +127,28 @@ def print_failed(failed: Sequence[Mapping[str, Any]], console: Console, most: in
                       markup=False, soft_wrap=True)
     if len(failed) > most:
         console.print(f"  and {len(failed) - most} more: see failures.json", highlight=False)
+
+
+def print_grid(listed: Sequence[Estimate]) -> None:
+    """Print what a batch would do, and take."""
+    console = results()
+    table = Table(title="the grid", title_justify="left")
+    for heading in ("world", "variant", "seed", "units", "rows", "disk [MB]", "processor time [s]"):
+        table.add_column(heading, justify="left" if heading in ("world", "variant") else "right")
+    for e in listed[:_MOST_LISTED]:
+        table.add_row(e.point.world.name, Text(e.point.variant), str(e.seed), str(e.units), str(e.rows),
+                      f"{e.disk_bytes / 1e6:.1f}", f"{e.processor_s:.0f}")
+    console.print(table)
+    if len(listed) > _MOST_LISTED:
+        console.print(f"and {len(listed) - _MOST_LISTED} more", highlight=False)
+    seconds = sum(e.processor_s for e in listed)
+    console.print(f"{sum(e.units for e in listed)} units, {sum(e.rows for e in listed)} rows; about "
+                  f"{sum(e.disk_bytes for e in listed) / 1e6:.1f} MB and {timedelta(seconds=round(seconds))} of "
+                  "processor time, to be divided by the number of workers. Time is rough until travel times and plans "
+                  "are in the cache.", highlight=False, soft_wrap=True)
+
+
+_MOST_LISTED = 200
 
 
 def _means(units: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str, str], list[float]]:

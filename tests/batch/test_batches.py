@@ -97,8 +97,10 @@ def test_ctrl_c_ends_a_batch_with_130_and_resume_goes_on(tmp_path: Path, cache: 
     out = tmp_path / "out"
     with started(*command, cwd=tmp_path) as batch:
         wait_for(lambda: len(list(out.glob("outcomes-*"))) > 5)
-        second = sva_bench("batch", *command, "--resume", cwd=tmp_path)  # while the first is at it
+        batch.send_signal(signal.SIGSTOP)  # else it would be over when the second has started
+        second = sva_bench("batch", *command, "--resume", cwd=tmp_path)
         batch.send_signal(signal.SIGINT)
+        batch.send_signal(signal.SIGCONT)
         _, messages = batch.communicate(timeout=60)
     assert second.returncode == 2
     assert "another batch is at work" in second.stderr

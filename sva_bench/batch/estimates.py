@@ -1,0 +1,93 @@
+"""What a grid will take, before it is run: roughly where nothing is known, closely where the cache knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sva_bench.batch.cache import Cache
+from sva_bench.batch.folder import units_in
+from sva_bench.batch.grid import Grid, Point
+from sva_bench.batch.jobs import DriveJob, Job, PlansJob, TravelTimesJob
+from sva_bench.batch.strands import strand
+
+# Measured on a core of a shared virtual machine.
+_PATHS_S, _PLANS_S, _ROW_S = 5.0, 5.0, 1.5e-6
+_REAL_TIME = 135.0
+"""Physics is so many times faster than the mission."""
+_TWIN_TIME = 3000.0
+_USUAL_MISSION_S = 600.0
+_ROW_BYTES = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """One point and seed: units, rows, bytes on disk, and processor time [s]."""
+
+    point: Point
+    seed: int
+    units: int
+    rows: int
+    disk_bytes: float
+    processor_s: float
+
+
+def estimates(grid: Grid, cache: Cache, folder: Path) -> list[Estimate]:
+    """What is left of a grid, a point and seed at a time."""
+    done = frozenset(units_in(folder)) if folder.is_dir() else frozenset()
+    seen: set[str] = set()
+    return [_estimate(grid, point, seed, done, cache, seen) for point, seed in grid.strands()]
+
+
+def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: Cache, seen: set[str]) -> Estimate:
+    world = point.world
+    left = [count for first, count in grid.ranges() if grid.unit_name(point, seed, first) not in done]
+    rows = sum(left) * len(world.scenarios) * 2 * len(world.robots)
+    each = _REAL_TIME if grid.options.fidelity != "kinematic" else _TWIN_TIME
+    seconds = rows * _ROW_S
+    if grid.options.fidelity == "physics":
+        seconds += rows * _mission_s(point) / each
+    steps = strand(grid, point, seed, done)
+    jobs: Sequence[Job] | None = next(steps, None)
+    while jobs and jobs[0].kept:
+        results = []
+        for job in jobs:
+            found = None if job.key in seen else cache.get(job.kind, job.key)
+            if found is None and job.key not in seen:
+                seconds += _seconds(job, each)
+            seen.add(job.key)
+            results.append(found if found is not None else cache.get(job.kind, job.key))
+        if any(result is None for result in results):
+            seconds += _beyond(jobs[0], point, grid, each)
+            break
+        jobs = steps.send(results)
+    steps.close()
+    return Estimate(point=point, seed=seed, units=len(left), rows=rows, disk_bytes=rows * _ROW_BYTES,
+                    processor_s=seconds)
+
+
+def _seconds(job: Job, each: float) -> float:
+    if isinstance(job, TravelTimesJob):
+        return _PATHS_S
+    if isinstance(job, PlansJob):
+        return _PLANS_S * len(job.world.scenarios)
+    assert isinstance(job, DriveJob)
+    return _USUAL_MISSION_S / each
+
+
+def _beyond(job: Job, point: Point, grid: Grid, each: float) -> float:
+    """What comes after a step whose result isn't known yet."""
+    scenarios = len(point.world.scenarios)
+    plans = _PLANS_S * scenarios if isinstance(job, TravelTimesJob) else 0.0
+    if isinstance(job, DriveJob) or grid.options.fidelity == "physics":
+        return plans
+    rollouts = 1 if point.world.noise.silent else min(grid.options.rollouts, grid.options.trials)
+    # A stochastic plan for each scenario and about one deterministic plan for all.
+    return plans + (scenarios + 1) * len(point.world.robots) * rollouts * _mission_s(point) / each
+
+
+def _mission_s(point: Point) -> float:
+    limits = [robot.mission_limit_s for robot in point.world.robots]
+    return sum(limit if math.isfinite(limit) else _USUAL_MISSION_S for limit in limits) / len(limits)
