@@ -54,7 +54,8 @@ def main() -> None:
         small = batch("small", "--rollouts", 2, "--trials", 16)
         wall, cpu = batch("many", *many)
         print(f"10^6 trials of {WORLDS} worlds, all cached: {wall:.1f} s, processor {cpu:.1f} s "
-              f"(of it the program's start {small[1]:.1f} s); target 60 s")
+              f"(of it the program's start {small[1]:.1f} s); target 60 s; largest process "
+              f"{resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3:.0f} MB, target 1000 MB")
 
         few = batch("few", "--rollouts", 2, "--trials", 2000, "--unit-trials", 2000, "--workers", 1)
         cut = batch("cut", "--rollouts", 2, "--trials", 2000, "--unit-trials", 10, "--workers", 1)

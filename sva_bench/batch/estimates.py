@@ -19,7 +19,7 @@ _REAL_TIME = 135.0
 """Physics is so many times faster than the mission."""
 _TWIN_TIME = 3000.0
 _USUAL_MISSION_S = 600.0
-_ROW_BYTES = 10.0
+_ROW_BYTES = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)

