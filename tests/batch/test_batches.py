@@ -17,6 +17,7 @@ import pytest
 
 from tests.test_batch import rows_of
 from tests.test_cli import sva_bench
+from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL
 
 POST = "- {cylinder: [4.4, 3.2], radius_m: 0.3}"
@@ -57,7 +58,8 @@ def started(*arguments: object, cwd: Path, **environment: str) -> subprocess.Pop
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ | environment)
 
 
-@pytest.mark.parametrize("hanging", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.long  # what fails is tried three times
+@pytest.mark.parametrize("hanging", [False, True])
 def test_worlds_that_crash_or_hang_the_physics_are_named_and_the_rest_goes_on(
     hanging: bool, tmp_path: Path, cache: Path
 ) -> None:
@@ -90,6 +92,7 @@ def test_worlds_that_crash_or_hang_the_physics_are_named_and_the_rest_goes_on(
     assert (tmp_path / "out" / "outcomes-sound-seed0.parquet").stat().st_mtime_ns == kept
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_a_batch_with_130_and_resume_goes_on(tmp_path: Path, cache: Path) -> None:
     world = posted(tmp_path, "small", 1)
     command = (world, "--trials", 3000, "--unit-trials", 10, "--rollouts", 2, "--fidelity", "kinematic", "--out", "out",
@@ -138,6 +141,7 @@ sys.exit(run_command_line(sys.argv[1:]))
 """
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_a_batch_with_one_clear_error_and_keeps_what_is_done(tmp_path: Path, cache: Path) -> None:
     world = posted(tmp_path, "small", 1)
     (tmp_path / "full.py").write_text(FULL, encoding="utf-8")
@@ -192,3 +196,18 @@ def test_shards_have_the_columns_of_a_run_and_their_world_seed_and_variant(tmp_p
         "end", "end_time_s", "fuel_used_s", "fidelity", "world", "seed", "variant"]
     assert set(table["seed"].to_pylist()) < {3, 4}
     assert table.schema.field("end_time_s").metadata == {b"unit": b"s"}
+
+
+@pytest.mark.long
+def test_a_batch_folder_holds_the_maps_that_it_takes_to_go_on(tmp_path: Path, cache: Path) -> None:
+    two_rooms(tmp_path)
+    command = ("batch", "world.yaml", "--trials", "8", "--unit-trials", "4", "--fidelity", "kinematic", "--out", "out",
+               "--cache", str(cache), "--workers", "1")
+    assert sva_bench(*command, cwd=tmp_path).returncode == 0
+    lost = next((tmp_path / "out").glob("outcomes-*-t00000004.parquet"))
+    content = lost.read_bytes()
+    lost.unlink()
+    (tmp_path / "map.pgm").unlink()
+    again = sva_bench("batch", "retry", "out", "--cache", str(cache), "--workers", "1", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert lost.read_bytes() == content

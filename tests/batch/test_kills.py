@@ -65,7 +65,7 @@ def shards(out: Path) -> int:
     return len(list(out.glob("outcomes-*.parquet")))
 
 
-@pytest.mark.parametrize("kills", [3, pytest.param(56, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [1, *(pytest.param(kills, marks=pytest.mark.long) for kills in (3, 56))])
 def test_killing_parent_and_workers_at_random_moments_changes_no_row(
     kills: int, undisturbed: tuple[Path, pa.Table]
 ) -> None:
@@ -123,6 +123,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
             process.wait()
 
 
+@pytest.mark.long
 def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(
     undisturbed: tuple[Path, pa.Table], cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
