@@ -13,11 +13,11 @@ from typing import Any, Literal, get_args
 from pydantic import Field
 
 from sva_bench.batch.grid import Grid, Point, checked
-from sva_bench.planning import Options
 from sva_bench.documents import Document, Name, Number, Section, WholeNumber, parse_yaml, read_yaml, validate
 from sva_bench.errors import BadInput, nearest
 from sva_bench.inputs import adapted
 from sva_bench.options import FailureProcess, Fidelity, Planner
+from sva_bench.planning import Options
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.world.load import world_of
 

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Protocol
 
 from sva_bench.batch.digest import digest
 from sva_bench.batch.shards import Facts, Shard, shard_of
-from sva_bench.planning import Options, Planned, instance_of, plan_scenarios
 from sva_bench.execution.execute import (
     Case,
     DriveTask,
@@ -19,6 +18,7 @@ from sva_bench.execution.execute import (
     settle_trials,
 )
 from sva_bench.execution.outcome import Driven
+from sva_bench.planning import Options, Planned, instance_of, plan_scenarios
 from sva_bench.robot.model import RobotModel
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import PlannerName
