@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadInput
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.mission.plan import Plan
 from sva_bench.robot.model import USUAL_MODEL
 from sva_bench.seeds import Stream, rng_for
 from sva_bench.solver.heuristic import Orders, search
@@ -111,10 +111,9 @@ def propose_mission(sites: Sequence[Site], fuel_s: FloatArray, *, robots: int, s
         instance = _instance(proposal, sites, fuel_s)
         if _hopeless(instance):
             continue
-        nominal = plan_nominal(instance, SolveLimits(gap=_PROOF))
-        if _trivial(instance, nominal):
+        if _trivial(instance):
             continue
-        if _pays(instance, nominal, certain):
+        if _pays(instance, certain):
             return proposal
         first = first or proposal
     if first is None:
@@ -166,23 +165,34 @@ def _hopeless(instance: Instance) -> bool:
     return False
 
 
-def _trivial(instance: Instance, nominal: Plan) -> bool:
-    """Whether all incentives can be collected, or that can't be ruled out."""
-    everything = float(_weights(instance).max(axis=0).sum())
-    return nominal.bound is None or nominal.bound >= everything * (1 - 1e-6)
+def _trivial(instance: Instance) -> bool:
+    """Whether all incentives can be collected, or that can't be ruled out.
+
+    For that, each robot must visit the POIs where it alone earns most, and no tour is shorter than a spanning tree.
+    """
+    weights = _weights(instance)
+    most = weights.max(axis=0)
+    shared = (weights == most).sum(axis=0) > 1
+    for vehicle, earned in zip(instance.vehicles, weights, strict=True):
+        stops = [instance.base, *(poi for poi in instance.pois if earned[poi] == most[poi] and not shared[poi])]
+        either_way = np.minimum(vehicle.fuel_s, vehicle.fuel_s.T)[np.ix_(stops, stops)]
+        if minimum_spanning_tree(either_way).sum() > vehicle.mission_limit_s:
+            return False
+    nominal = plan_nominal(instance, SolveLimits(gap=_PROOF))
+    return nominal.bound is None or nominal.bound >= float(most.sum()) * (1 - 1e-6)
 
 
-def _pays(instance: Instance, nominal: Plan, certain: int) -> bool:
-    """Whether the certain robots would do better than in the best plan for all, if the others all failed.
+def _pays(instance: Instance, certain: int) -> bool:
+    """Whether the certain robots would do better than in a plan for all, if the others all failed.
 
     Judged by good plans, not by proved ones: that is quick, and seldom wrong.
     """
     weights = _weights(instance)
-    weights[certain:] = 0.0
-    otherwise = sum(float(vehicle.incentives[instance.sites.index(name)]) for vehicle in instance.vehicles[:certain]
-                    for name in nominal.route(vehicle.name))
-    return _worth(weights, _good_orders(instance, weights, lambda value: value >= _PAYS * otherwise)
-                  ) >= _PAYS * otherwise
+    for_all = _good_orders(instance, weights, lambda value: False)  # noqa: ARG005
+    alone = weights.copy()
+    alone[certain:] = 0.0
+    otherwise = _worth(alone, for_all)
+    return _worth(alone, _good_orders(instance, alone, lambda value: value >= _PAYS * otherwise)) >= _PAYS * otherwise
 
 
 def _instance(proposal: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> Instance:
