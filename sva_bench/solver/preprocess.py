@@ -9,6 +9,7 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
@@ -73,16 +74,14 @@ def shortest_paths(cost: FloatArray, base: int) -> FloatArray:
 
 def warn_of_unreachable(instance: Instance) -> None:
     """Log the POIs that no vehicle can reach and come home from, however much fuel and time it has."""
+    there_and_back = np.zeros(len(instance.sites), dtype=np.bool_)
+    for vehicle in instance.vehicles:
+        _, part = connected_components(np.isfinite(vehicle.fuel_s), connection="strong")
+        there_and_back |= part == part[instance.base]
     for poi in instance.pois:
-        if instance.vehicles and not any(_way_there_and_back(v, instance.base)[poi] for v in instance.vehicles):
+        if instance.vehicles and not there_and_back[poi]:
             _log.warning("instance %s: POI %s cannot be reached and left again; it is left out of the plan",
                          instance.name, instance.sites[poi])
-
-
-def _way_there_and_back(vehicle: Vehicle, base: int) -> BoolArray:
-    shortest = shortest_paths(vehicle.fuel_s, base)
-    found: BoolArray = np.isfinite(shortest[base]) & np.isfinite(shortest[:, base])
-    return found
 
 
 def scope_of(instance: Instance, vehicle: Vehicle, rewarded: BoolArray) -> Scope:

@@ -74,11 +74,11 @@ def solve(
     progress = Progress(orders=start, value=value_of(goal, known.roads, start), bound=trivial_bound(goal),
                         grain=grain_of(goal))
     routes: Sequence[Route] = ()
-    rewarded = goal.rewarded()
-    scopes = [scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles)]
-    if method == "auto":
-        method = choice(instance, scopes, goal)
     try:
+        rewarded = goal.rewarded()
+        scopes = [scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles)]
+        if method == "auto":
+            method = choice(instance, scopes, goal)
         if (not goal.floors or goal.risk) and not goal.driving and bool((goal.weights >= 0).all()):
             began = clock.used_s()
             found = search(

@@ -124,16 +124,19 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
 def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(
-    undisturbed: tuple[Path, pa.Table], cluster: tuple[str, list[subprocess.Popen[bytes]]]
+    seed: int, undisturbed: tuple[Path, pa.Table], cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
     folder, whole = undisturbed
     scheduler, workers = cluster
-    out = folder / "dask"
+    draw = random.Random(seed)
+    out = folder / f"dask-{seed}"
     with started("small.yaml", "other.yaml", *TRIALS, "--dask", scheduler, "--cache", "cache", "--out", out,
                  cwd=folder) as batch:
-        wait_for(lambda: shards(out) > 20 or batch.poll() is not None)
-        workers[0].kill()
+        enough = draw.randint(1, UNITS // 2)
+        wait_for(lambda: shards(out) >= enough or batch.poll() is not None)
+        draw.choice(workers).kill()
         _, messages = batch.communicate(timeout=600)
     assert batch.returncode == 0, messages
     assert rows_of(out).equals(whole)
