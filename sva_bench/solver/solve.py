@@ -42,8 +42,8 @@ TWO_STAGE: tuple[Method, ...] = ("dep", "relaxed", "lshaped")
 
 _log = logging.getLogger(__name__)
 
-LONG = 2.0  # mission limit in longest legs from which routes count as long
-MOST_LONG = 4  # vehicles up to which long routes want the edge model
+LONG = {1: 2.0, 2: 2.0, 3: 2.6, 4: 2.6}
+"""Mission limit in longest legs from which the edge model proves sooner than columns do, by number of vehicles."""
 _WITHIN = 0.99  # of the gap, for rounding
 
 
@@ -148,7 +148,7 @@ def choice(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> Method:
     # Of all legs: those that a short limit leaves are short themselves.
     longest = max((float(v.fuel_s[np.isfinite(v.fuel_s)].max()) for v in instance.vehicles), default=0.0)
     shortest_limit = min((v.mission_limit_s for v in instance.vehicles), default=0.0)
-    if len(scopes) <= MOST_LONG and shortest_limit >= LONG * longest and serves(instance, scopes):
+    if len(scopes) in LONG and shortest_limit >= LONG[len(scopes)] * longest and serves(instance, scopes):
         return "undirected"
     return "branch-and-price"
 
