@@ -19,7 +19,7 @@ from rich.markup import escape  # noqa: E402
 from typer.exceptions import TyperException  # noqa: E402
 
 from sva_bench.cli import app  # noqa: E402
-from sva_bench.errors import ExitCode, SvaBenchError  # noqa: E402
+from sva_bench.errors import ExitCode, Interrupted, SvaBenchError  # noqa: E402
 from sva_bench.terminal import messages  # noqa: E402
 
 _log = logging.getLogger(__name__)
@@ -35,6 +35,9 @@ def run_command_line(arguments: Sequence[str]) -> int:
     try:
         result = app(list(arguments), standalone_mode=False)
         sys.stdout.flush()  # here, where a full disk or a closed pipe is answered for
+    except Interrupted as kept:
+        messages.print(escape(str(kept)), highlight=False, soft_wrap=True)
+        return int(kept.exit_code)
     except SvaBenchError as error:
         messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return int(error.exit_code)
@@ -57,7 +60,10 @@ def run_command_line(arguments: Sequence[str]) -> int:
                        "installation, not of your input: please report it.", highlight=False, soft_wrap=True)
         _log.debug("where it happened", exc_info=True)
         return int(ExitCode.FAULT)
-    return int(result) if isinstance(result, int) else int(ExitCode.DONE)
+    code = int(result) if isinstance(result, int) else int(ExitCode.DONE)
+    if code == ExitCode.INTERRUPTED:  # the command line's own answer to Ctrl-C is a number alone
+        messages.print("interrupted")
+    return code
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ from sva_bench.options import (
     WorldArgument,
 )
 from sva_bench.terminal import (
+    check_output,
     messages,
     print_json,
     print_summary,
@@ -198,6 +199,7 @@ def reproduce(
 ) -> None:
     """The paper's experiments again, ours beside its figures."""
     set_up_logging(verbose)
+    check_output(output)
     if worlds and part != "simulation":
         raise BadInput(f"reproduce {part} takes no worlds")
     with holding_back_ctrl_c():

@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 from typer.core import TyperGroup
 
-from sva_bench.errors import BadInput, ExitCode
+from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import (
     AsJson,
@@ -160,7 +160,8 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     state = "at work" if running else "complete" if len(done) == len(units) else "not at work; --resume goes on" \
         if len(done) + len(failures) < len(units) else "over"
     console.print(f"{len(done)} of {len(units)} units done, {len(failures)} failed: {state}", highlight=False)
-    console.print(over_maps(summary["aggregate"], "VSS over maps, so far"))
+    if done:
+        console.print(over_maps(summary["aggregate"], "VSS over maps, so far"))
     print_failed(summary["failed"], console)
 
 
@@ -192,6 +193,7 @@ def _run(
         from sva_bench.batch.answers import Caps
         from sva_bench.batch.cache import Cache, default_folder
         from sva_bench.batch.engines import LocalProcesses
+        from sva_bench.batch.folder import units_in
         from sva_bench.batch.run import run_batch
         from sva_bench.live import print_batch, watching
         from sva_bench.workers import count_of
@@ -215,9 +217,14 @@ def _run(
         finally:
             running.close()
 
-    with watching() as report:
-        summary = run_batch(grid, folder, engine, Cache(folder=cache or default_folder()), report, resume=resume,
-                            retry=again)
+    try:
+        with watching() as report:
+            summary = run_batch(grid, folder, engine, Cache(folder=cache or default_folder()), report, resume=resume,
+                                retry=again)
+    except KeyboardInterrupt:
+        done = len(units_in(folder) & set(grid.units()))
+        raise Interrupted(f"interrupted: {done} of {len(grid.units())} units are done and kept in {folder}; the same "
+                          "command goes on with --resume") from None
     if as_json:
         print_json(summary)
     else:

@@ -11,7 +11,15 @@ import typer
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import Family, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
-from sva_bench.terminal import print_json, progress_bars, results, set_up_logging, write_beside, write_result
+from sva_bench.terminal import (
+    check_output,
+    print_json,
+    progress_bars,
+    results,
+    set_up_logging,
+    write_beside,
+    write_result,
+)
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
@@ -70,6 +78,7 @@ def make_random_world(
         from sva_bench.worlds import random_world
 
     set_up_logging(verbose)
+    check_output(output)
     with progress_bars() as progress:
         text = random_world(family, size_m=size, density=density, pois=pois, stations=stations, robots=robots,
                             seed=seed, progress=progress)
@@ -139,6 +148,7 @@ def draw(
         from sva_bench.inputs import about, load
 
     set_up_logging(verbose)
+    check_output(output, world)
     loaded = load(world)
     with holding_back_ctrl_c():
         from sva_bench.pictures import picture_of

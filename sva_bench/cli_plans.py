@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from sva_bench.errors import BadInput, ExitCode
+from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import (
     AsJson,
@@ -26,6 +26,7 @@ from sva_bench.options import (
     finite,
 )
 from sva_bench.terminal import (
+    check_output,
     messages,
     print_json,
     progress_bars,
@@ -53,6 +54,7 @@ def times(
         from sva_bench.mission.instance import instance_text
 
     set_up_logging(verbose)
+    check_output(output, world)
     with progress_bars() as progress:
         instance = instance_of_world(world, scenario, planner, margin, progress)
     write_result(output, instance_text(instance))
@@ -67,13 +69,14 @@ def plan(
                                                             "available.")] = "stochastic",
     method: Annotated[Method, typer.Option(help="Solution method: auto chooses; expected is the collapsed model; dep, "
                                                 "relaxed and lshaped are the paper's.")] = "auto",
-    cuts: Annotated[Cuts, typer.Option(help="Optimality cuts of lshaped.")] = "single",
+    cuts: Annotated[Cuts | None, typer.Option(help="Optimality cuts of lshaped.", show_default="single")] = None,
     risk: Annotated[RiskKind | None, typer.Option(help="Plan for the worst outcomes: their mean, or the shortfall "
                                                   "below a target.", show_default="none")] = None,
-    beta: Annotated[float, typer.Option(min=0, max=0.999999, callback=finite, help="cvar: the mean of the worst "
-                                        "1 - BETA share of outcomes.")] = 0.9,
-    weight: Annotated[float, typer.Option(min=0, max=1, callback=finite, help="Share of the risk measure in the "
-                                          "objective; the rest is the expected incentive.")] = 1.0,
+    beta: Annotated[float | None, typer.Option(min=0, max=0.999999, callback=finite, help="cvar: the mean of the worst "
+                                               "1 - BETA share of outcomes.", show_default="0.9")] = None,
+    weight: Annotated[float | None, typer.Option(min=0, max=1, callback=finite, help="Share of the risk measure in the "
+                                                 "objective; the rest is the expected incentive.",
+                                                 show_default="1")] = None,
     target: Annotated[float | None, typer.Option(min=0, callback=finite, help="excess: the incentive below which the "
                                                  "shortfall counts.", show_default=False)] = None,
     scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
@@ -88,14 +91,19 @@ def plan(
         from sva_bench.inputs import instance_of_world
         from sva_bench.mission.instance import read_instance
         from sva_bench.mission.plan import plan_as_dict
-        from sva_bench.solver.risk import RiskMeasure
-        from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
 
     set_up_logging(verbose)
+    check_output(output, source)
     if risk is not None and (objective != "stochastic" or method != "auto"):
         raise BadInput("--risk goes with the stochastic objective and the method auto alone")
     if (risk == "excess") != (target is not None):
         raise BadInput("--risk excess and --target go together")
+    if beta is not None and risk != "cvar":
+        raise BadInput("--beta belongs to --risk cvar")
+    if weight is not None and risk is None:
+        raise BadInput("--weight is the share of a measure of risk: choose one with --risk cvar or --risk excess")
+    if cuts is not None and method != "lshaped":
+        raise BadInput("--cuts are those of --method lshaped")
     with progress_bars() as progress:
         if source.suffix.lower() in (".yaml", ".yml"):
             instance = instance_of_world(source, scenario, "prmstar", None, progress)
@@ -103,22 +111,32 @@ def plan(
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
         else:
             instance = read_instance(source)
+        with holding_back_ctrl_c():  # after reading: what is wrong is said at once
+            from sva_bench.solver.risk import RiskMeasure
+            from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
+
         progress("solving", 0, 1)
         limits = SolveLimits(time_limit_s=time_limit, gap=gap)
         if risk is not None:
-            made = plan_averse(instance, RiskMeasure(kind=risk, weight=weight, beta=beta, target=target or 0.0), limits)
+            made = plan_averse(instance, RiskMeasure(
+                kind=risk, weight=1.0 if weight is None else weight, beta=0.9 if beta is None else beta,
+                target=target or 0.0), limits)
         elif objective == "stochastic":
-            made = plan_stochastic(instance, limits, method=method, cuts=cuts)
+            made = plan_stochastic(instance, limits, method=method, cuts=cuts or "single")
         else:
-            stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method, cuts=cuts)
-            made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts).plan
+            stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
+                                         cuts=cuts or "single")
+            made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts or "single").plan
         progress("solving", 1, 1)
     write_result(output, pretty_json(plan_as_dict(made)))
-    gap_left = 0.0 if made.value is None or made.bound is None else made.bound - made.value
-    messages.print(f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, gap {gap_left:.3g}, "
-                   f"{made.runtime_s:.2f} s", highlight=False)
+    assert made.value is not None
+    assert made.bound is not None
+    gap_left = (made.bound - made.value) / max(1.0, abs(made.value))  # as --gap counts it
+    told = (f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, relative gap {gap_left:.2g}, "
+            f"{made.runtime_s:.2f} s")
     if made.status == "interrupted":
-        raise typer.Exit(ExitCode.INTERRUPTED)
+        raise Interrupted(told)
+    messages.print(told, highlight=False)
 
 
 def certify(

@@ -32,6 +32,12 @@ class BadInput(SvaBenchError):
         super().__init__(message)
 
 
+class Interrupted(SvaBenchError):
+    """Ctrl-C, once a command has kept what it had: says what that is."""
+
+    exit_code = ExitCode.INTERRUPTED
+
+
 class BadFile(SvaBenchError):
     """A file whose content is wrong, with the place in it."""
 

@@ -53,8 +53,9 @@ def watching() -> Iterator[Callable[[Progress], None]]:
         def show(progress: Progress) -> None:
             greet(progress)
             if due(_TABLE_S):
-                live.update(Group(Text(how_far(progress)), over_maps(progress.vss(), "VSS over maps, so far")),
-                            refresh=True)
+                rows = progress.vss()
+                tables = [over_maps(rows, "VSS over maps, so far")] if rows else []
+                live.update(Group(Text(how_far(progress)), *tables), refresh=True)
 
         yield show
 
@@ -96,7 +97,9 @@ def print_batch(summary: Any, console: Console | None = None) -> None:
                         f"{summary['trials']} trials, {summary['fidelity']}", title_justify="left")
     for heading in ("world", *(("variant",) if varied else ()), "scenario", "stochastic", "deterministic",
                     "VSS [95 %]", "VSS %"):
-        table.add_column(heading, justify="left" if heading in ("world", "variant", "scenario") else "right")
+        # Names of worlds tell them apart by their ends.
+        table.add_column(heading, justify="left" if heading in ("world", "variant", "scenario") else "right",
+                         overflow="fold")
     means = _means(summary["units"])
     before = None
     for row in summary["maps"]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import json
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -20,6 +21,8 @@ from sva_bench.options import FailureProcess, Fidelity, Planner
 from sva_bench.planning import Options
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.world.load import world_of
+
+_log = logging.getLogger(__name__)
 
 KIND = "sva-bench/sweep@1"
 UNIT_TRIALS = 10_000
@@ -179,6 +182,8 @@ def grid_of(sweep: Sweep) -> Grid:
     options = Options(
         trials=sweep.trials or 1000, rollouts=sweep.rollouts or 8, fidelity=sweep.fidelity or "rollout",
         limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap))
+    if options.fidelity == "kinematic" and any(key.split(".")[0] == "noise" for key in vary):
+        _log.warning("noise is varied to no effect: kinematic trials have none")
     usual = UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS
     return checked(Grid(points=points, seeds=sweep.seeds or (0,), options=options,
                         unit_trials=sweep.unit_trials or usual))

@@ -31,6 +31,20 @@ def print_json(data: Any) -> None:
     sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
+def check_output(path: Path | None, *sources: Path) -> None:
+    """Refuse a place for a result where nothing can be written, or one that would write over what it is made of.
+
+    Raises:
+        BadInput: If the folder isn't there, or the file is one of the sources.
+    """
+    if path is None:
+        return
+    if not path.resolve().parent.is_dir():
+        raise BadInput(f"{path}: there is no such folder; choose another place with -o")
+    if any(source.exists() and path.exists() and path.samefile(source) for source in sources):
+        raise BadInput(f"{path}: this is what is read, and would be lost; choose another name with -o")
+
+
 def write_result(path: Path | None, content: str | bytes) -> None:
     """Write a result to a file, whole or not at all, or to standard output; pipes and devices are written through."""
     data = content.encode("utf-8") if isinstance(content, str) else content

@@ -221,13 +221,17 @@ def test_bad_worlds_give_one_clear_error_and_leave_nothing(
     ("run", "missing.yaml"), ("run", "small.yaml", "--scenario", "S9"), ("run", "small.yaml", "--trials", "0"),
     ("run", "small.yaml", "--trails", "5"), ("run", "small.yaml", "--gap", "inf"),
     ("run", "small.yaml", "--margin", "nan"), ("plan", "small.yaml", "--method", "magic"), ("certify", "small.yaml"),
-    ("view", "nothing.rrd"), ("times", "small.yaml", "-o", "no/such/folder/i.json"), ("fly",)])
+    ("view", "nothing.rrd"), ("times", "small.yaml", "-o", "no/such/folder/i.json"),
+    ("plan", "small.yaml", "-o", "./small.yaml"), ("times", "small.yaml", "-o", "small.yaml"),
+    ("world", "draw", "small.yaml", "-o", "no/such/folder/p.png"), ("plan", "small.yaml", "--beta", "0.5"),
+    ("plan", "small.yaml", "--weight", "0.5"), ("plan", "small.yaml", "--cuts", "multi"), ("fly",)])
 def test_bad_usage_exits_with_two(arguments: tuple[str, ...], tmp_path: Path) -> None:
     world_file(tmp_path)
     done = sva_bench(*arguments, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
+    assert (tmp_path / "small.yaml").read_text(encoding="utf-8") == SMALL
 
 
 def test_an_output_that_is_a_link_or_a_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
@@ -280,4 +284,5 @@ def test_ctrl_c_ends_a_run_with_130_and_leaves_nothing_half_written(after_s: flo
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130, said
     assert "Traceback" not in said
+    assert "interrupted" in said
     assert not list(tmp_path.glob("runs/*"))

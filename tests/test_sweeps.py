@@ -91,6 +91,14 @@ def test_a_key_that_no_world_has_is_refused_with_the_file(key: str, told: str, t
     assert told in str(caught.value)
 
 
+def test_noise_that_no_trial_has_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    vary = {"noise.wheel_gain_sd": [0.0, 0.02]}
+    grid_of(Sweep(worlds=(world(tmp_path),), vary=vary, fidelity="rollout"))
+    assert caplog.messages == []
+    grid_of(Sweep(worlds=(world(tmp_path),), vary=vary, fidelity="kinematic"))
+    assert caplog.messages == ["noise is varied to no effect: kinematic trials have none"]
+
+
 def test_a_wrong_sweep_file_is_told_by_line_and_key(tmp_path: Path) -> None:
     path = tmp_path / "sweep.yaml"
     path.write_text(SWEEP.replace("trials: 50", "trails: 50"), encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import json
 import os
@@ -72,6 +73,9 @@ def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
     """
     try:
         held = [path for path in folder.iterdir() if path.suffix != ".tmp"]
+        manifest = folder / "manifest.json"
+        if not resume and held == [manifest] and settings_in(folder):
+            held = []  # begun, but nothing was done
         if held and not resume:
             raise BadInput(f"{folder}: the folder isn't empty; go on with --resume, or choose another with --out")
         if held:
@@ -81,7 +85,7 @@ def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
     except OSError as error:
         raise _unwritable(folder, error) from None
     if not held:
-        write(folder / "manifest.json", pretty_json({"format": MANIFEST, "settings": dict(settings)}).encode())
+        write(manifest, pretty_json({"format": MANIFEST, "settings": dict(settings)}).encode())
 
 
 def settings_in(folder: Path) -> dict[str, Any]:
@@ -191,5 +195,7 @@ def write(path: Path, content: bytes) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> BadInput:
-    return BadInput(f"{folder}: cannot be written to ({error.strerror}); what is done is kept: make room and go on "
-                    "with --resume, or choose another folder with --out")
+    way_out = "make room and go on with --resume" if error.errno in (errno.ENOSPC, errno.EDQUOT) else \
+        "make it writable and go on with --resume"
+    return BadInput(f"{folder}: cannot be written to ({error.strerror}); what is done is kept: {way_out}, or choose "
+                    "another folder with --out")

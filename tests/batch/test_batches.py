@@ -15,6 +15,8 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from sva_bench.batch.folder import begin, settings_in, shard_path
+from sva_bench.errors import BadFile, BadInput
 from tests.test_batch import rows_of
 from tests.test_cli import sva_bench
 from tests.world.test_map_worlds import two_rooms
@@ -92,6 +94,17 @@ def test_worlds_that_crash_or_hang_the_physics_are_named_and_the_rest_goes_on(
     assert (tmp_path / "out" / "outcomes-sound-seed0.parquet").stat().st_mtime_ns == kept
 
 
+def test_a_batch_that_did_nothing_yet_is_in_nobodys_way(tmp_path: Path) -> None:
+    begin(tmp_path, {"trials": 10}, resume=False)
+    with pytest.raises(BadFile, match=r"settings\.trials"):
+        begin(tmp_path, {"trials": 20}, resume=True)
+    begin(tmp_path, {"trials": 20}, resume=False)
+    assert settings_in(tmp_path) == {"trials": 20}
+    shard_path(tmp_path, "small-seed0").touch()
+    with pytest.raises(BadInput, match="--resume"):
+        begin(tmp_path, {"trials": 20}, resume=False)
+
+
 @pytest.mark.long
 def test_ctrl_c_ends_a_batch_with_130_and_resume_goes_on(tmp_path: Path, cache: Path) -> None:
     world = posted(tmp_path, "small", 1)
@@ -110,6 +123,7 @@ def test_ctrl_c_ends_a_batch_with_130_and_resume_goes_on(tmp_path: Path, cache: 
     assert batch.returncode == 130, messages
     assert "Traceback" not in messages
     done = len(list(out.glob("outcomes-*")))
+    assert f"interrupted: {done} of 300 units are done" in messages
     assert 5 < done < 300
     resumed = sva_bench("batch", *command, "--resume", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
