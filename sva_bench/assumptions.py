@@ -63,7 +63,8 @@ def cross_table(
                     "executed_under": process, "planner": name.split()[0], "planned_for": made_for,
                     "expected": expected + 0.0, "executed": estimate(totals(run), run.rollout, noisy=noisy).as_dict(),
                     "loss_modelled": best - expected + 0.0,
-                    "loss": {**loss.as_dict(), "distinguishable": loss.distinguishable}})
+                    "loss": {**loss.as_dict(), "distinguishable": loss.distinguishable,
+                             "same_plan": plan.drives_like(mine.stochastic[process])}})
     return rows
 
 

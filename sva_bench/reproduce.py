@@ -141,7 +141,8 @@ def simulation(
                 found[scenario.name][process] = {
                     "stochastic": mean, "deterministic": float(totals(d).mean()),
                     "by_robot": s.incentive.mean(axis=0).tolist(),
-                    "vss": {**vss.as_dict(), "distinguishable": vss.distinguishable},
+                    "vss": {**vss.as_dict(), "distinguishable": vss.distinguishable,
+                            "same_plan": s.case.plan.drives_like(d.case.plan)},
                     "vss_pct": 100 * vss.mean / mean if mean else None}
         rows += list(found.values())
     return rows

@@ -99,7 +99,7 @@ def test_the_wrong_assumption_costs_what_the_plan_for_the_right_one_collects_mor
         for row in rows:
             assert row["loss_modelled"] >= -1e-9
             if row["planned_for"] == row["executed_under"]:
-                assert row["loss"] == {"mean": 0.0, "ci95": [0.0, 0.0], "distinguishable": False}
+                assert row["loss"] == {"mean": 0.0, "ci95": [0.0, 0.0], "distinguishable": False, "same_plan": True}
         # Under mission the table repeats what the run itself executed.
         for row, name in ((rows[0], "stochastic"), (rows[2], "deterministic")):
             assert row["executed"] == scenario["plans"][name]["executed"]

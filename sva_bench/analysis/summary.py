@@ -72,7 +72,8 @@ def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bo
          for judged in (s, d, result.informed) if judged is not None}, difference,
         {"modelled_range": None if result.modelled_range is None else [x + 0.0 for x in result.modelled_range],
          "vss_mean_value": result.vss_mean_value, "ws": result.ws, "evpi": result.evpi,
-         "value_of_process": result.value_of_process},
+         "value_of_process": result.value_of_process,
+         "same_plan": s.executed.case.plan.drives_like(d.executed.case.plan)},
         {"executed_range": None if result.modelled_range is None else [min(ends) + 0.0, max(ends) + 0.0],
          "executed_controlled": sharper.as_dict()})
     return entry if result.informed is None else entry | {"evpi_executed": _beyond(result.informed, s, noisy=noisy)}
@@ -89,12 +90,13 @@ def scenario_entry(
         availability: Of each robot.
         plans: Entries of the stochastic and the deterministic plan, and of others that were executed beside them.
         difference: What the first collected beyond the second.
-        model: What is known without trials: ``modelled_range``, ``vss_mean_value``, ``ws``, ``evpi`` and
-            ``value_of_process``.
+        model: What is known without trials: ``modelled_range``, ``vss_mean_value``, ``ws``, ``evpi``,
+            ``value_of_process`` and ``same_plan``.
         sharper: More about the executed VSS, where single trials are at hand.
     """
     s, d = plans["stochastic"], plans["deterministic"]
     modelled = s["expected"] - d["expected"]
+    same = bool(model.get("same_plan"))  # shards written before this was asked don't say
     return {
         "name": name,
         "availability": dict(availability),
@@ -107,7 +109,8 @@ def scenario_entry(
             "executed_pct": _percent(difference.mean, s["executed"]["mean"]),
             **(sharper or {}),
             "distinguishable": difference.distinguishable,
-            "verdict": verdict_of(difference, "stochastic", "deterministic"),
+            "same_plan": same,
+            "verdict": verdict_of(difference, "stochastic", "deterministic", same=same),
         },
         "vss_mean_value": model["vss_mean_value"],
         # The plan for the mean is the stochastic plan itself, drive for drive.
@@ -125,8 +128,10 @@ def _beyond(informed: Judged, stochastic: Judged, *, noisy: bool) -> dict[str, A
             "verdict": verdict_of(found, "informed", "stochastic")}
 
 
-def verdict_of(difference: Estimate, a: str, b: str) -> str:
-    """Which of two plans is worth more, in words, if that can be told."""
+def verdict_of(difference: Estimate, a: str, b: str, *, same: bool = False) -> str:
+    """Which of two plans is worth more, in words, if that can be told; ``same`` where they have the same routes."""
+    if same:
+        return "the same plan"
     if difference.interval is None:
         return "no interval"
     if not difference.distinguishable:
@@ -147,9 +152,10 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
         difference = estimate(trials, a.executed.rollout, noisy=noisy)
         together = estimate(trials, a.executed.rollout, noisy=noisy, comparisons=len(pairs))
         names = a.executed.case.planner, b.executed.case.planner
+        same = a.executed.case.plan.drives_like(b.executed.case.plan)
         comparisons.append({"a": names[0], "b": names[1], **difference.as_dict(),
                             "ci95_adjusted": together.as_dict()["ci95"], "distinguishable": together.distinguishable,
-                            "verdict": verdict_of(together, *names)})
+                            "same_plan": same, "verdict": verdict_of(together, *names, same=same)})
     return {
         "name": scenario.name,
         "availability": {name: scenario.availability[name] for name in robots},

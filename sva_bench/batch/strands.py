@@ -58,6 +58,7 @@ def facts_of(
             "plans": {"stochastic": promise_of(plans.stochastic, known["stochastic"]),
                       "deterministic": promise_of(plans.deterministic, known["deterministic"])},
             "modelled_range": None if known["modelled_range"] is None else [x + 0.0 for x in known["modelled_range"]],
+            "same_plan": plans.stochastic.drives_like(plans.deterministic),
             **{figure: known[figure] for figure in ("vss_mean_value", "ws", "evpi", "value_of_process")}})
     return head(world, options, settings_of(world, options), costs) | {
         "reproducible": proved(planned), "scenarios": scenarios}

@@ -54,6 +54,10 @@ class Plan:
         """The robot's route; empty if it isn't named."""
         return self.routes.get(robot, ())
 
+    def drives_like(self, other: Plan) -> bool:
+        """Whether every robot has the same route in both: whatever happens, they collect the same."""
+        return all(self.route(robot) == other.route(robot) for robot in {*self.routes, *other.routes})
+
 
 class _PlanFile(Section):
     format: Literal["sva-bench/plan@1"]

@@ -33,7 +33,7 @@ def executed(incentive: list[list[float]], ends: list[list[End]], planned: list[
     earned = np.array(incentive)
     end = np.array([[ENDS.index(e) for e in row] for row in ends], dtype=np.int64)
     zeros = np.zeros(earned.shape, dtype=np.int64)
-    plan = Plan(routes={}, value=promised, bound=promised, status="optimal")
+    plan = Plan(routes={"uv1": ("base", f"by-{planner}", "base")}, value=promised, bound=promised, status="optimal")
     return Executed(
         case=Case(scenario=SCENARIO, planner=planner, plan=plan), rollout=np.arange(len(earned)) % rollouts,
         available=end != ENDS.index("failed"), incentive=earned, pois_reached=zeros, stops_reached=zeros, end=end,
@@ -183,6 +183,19 @@ def test_pairs_are_told_apart_by_intervals_adjusted_for_their_number() -> None:
         "a is worth more", "not distinguishable from zero", "a is worth more"]
     assert summary["ranking"] == [{"rank": 1, "plan": "a", "mean": 19.0}, {"rank": 2, "plan": "b", "mean": 15.0},
                                   {"rank": 2, "plan": "c", "mean": 15.0}]
+
+
+def test_plans_of_the_same_routes_are_one_plan_whatever_their_trials() -> None:
+    once = executed([[10, 0], [20, 0]], [["home", "home"]] * 2, [20, 0], promised=20.0, planner="once")
+    again = replace(once, case=replace(once.case, planner="again"))
+    (pair,) = comparison_summary([Judged(expected=20.0, executed=once), Judged(expected=20.0, executed=again)],
+                                 ROBOTS, noisy=False)["comparisons"]
+    assert pair["same_plan"]
+    assert pair["verdict"] == "the same plan"
+    plan = once.case.plan
+    # A robot that isn't named stays home.
+    assert plan.drives_like(replace(plan, routes={**plan.routes, "uv2": ()}, value=1.0))
+    assert not plan.drives_like(replace(plan, routes={**plan.routes, "uv2": ("base", "p1", "base")}))
 
 
 def test_one_plan_alone_has_a_rank_and_nothing_to_be_compared_with() -> None:
