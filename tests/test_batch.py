@@ -82,7 +82,17 @@ def test_vss_over_maps_takes_maps_as_the_sample() -> None:
     assert row["maps"] == 2
     assert row["vss"]["mean"] == 4.0
     np.testing.assert_allclose(row["vss"]["ci95"], [4 - 25.412, 4 + 25.412], atol=1e-3)
-    assert row["vss_pct"] == {"mean": None, "ci95": None}
+    assert row["vss_pct"] == {"mean": None, "ci95": None, "maps": 0}
+
+
+def test_percentages_say_over_how_many_maps_they_are_where_one_collects_nothing() -> None:
+    def unit(world: str, share: float | None) -> dict[str, Any]:
+        return {"world": world, "scenarios": [{"name": "S", "vss": {"executed": {"mean": 1.0}, "executed_pct": share}}]}
+
+    (row,) = aggregate([unit("a", 9.5), unit("b", None)])
+    assert (row["maps"], row["vss_pct"]) == (2, {"mean": 9.5, "ci95": None, "maps": 1})
+    (row,) = aggregate([unit("a", 9.5), unit("b", 9.5)])
+    assert row["vss_pct"] == {"mean": 9.5, "ci95": [9.5, 9.5]}
 
 
 def plan_file(folder: Path, name: str, routes: dict[str, list[str]]) -> Path:

@@ -65,29 +65,33 @@ def entry_of(note: Note) -> dict[str, Any]:
 def aggregate(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """VSS over maps, for each variant and scenario: the maps are the sample, seeds and trials are nested in them.
 
-    The interval is that of a mean over maps, each map's figure being the mean over its seeds.
+    The interval is that of a mean over maps, each map's figure being the mean over its seeds. A map where the
+    stochastic plan collects nothing has no percentage: then those are over fewer maps, and say over how many.
     """
     rows = []
     for (variant, scenario), by_map in _figures(entries).items():
         vss = [float(np.mean([mean for mean, _ in figures])) for figures in by_map.values()]
         shares = [[pct for _, pct in figures if pct is not None] for figures in by_map.values()]
+        pcts = [float(np.mean(pct)) for pct in shares if pct]
         rows.append({"variant": variant, "scenario": scenario, "maps": len(by_map), "vss": over(vss),
-                     "vss_pct": over([float(np.mean(pct)) for pct in shares if pct])})
+                     "vss_pct": over(pcts) | ({} if len(pcts) == len(by_map) else {"maps": len(pcts)})})
     return rows
 
 
 def maps(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """VSS map by map: over its seeds where there are several, else over its trials."""
-    within = {(e.get("variant", ""), s["name"], e["world"]): s["vss"]["executed"] for e in entries
-              for s in e["scenarios"]}
+    within = {(e.get("variant", ""), s["name"], e["world"]): s["vss"] for e in entries for s in e["scenarios"]}
+    differing = {(e.get("variant", ""), s["name"], e["world"]) for e in entries for s in e["scenarios"]
+                 if not s["vss"]["same_plan"]}
     rows = []
     for (variant, scenario), by_map in _figures(entries).items():
         for world, figures in by_map.items():
-            one = len(figures) == 1
+            key = variant, scenario, world
+            vss = dict(within[key]["executed"]) if len(figures) == 1 else over([mean for mean, _ in figures])
             pct = [share for _, share in figures if share is not None]
             rows.append({
                 "variant": variant, "world": world, "scenario": scenario, "seeds": len(figures),
-                "vss": dict(within[variant, scenario, world]) if one else over([mean for mean, _ in figures]),
+                "vss": vss | {"same_plan": key not in differing},
                 "vss_pct": float(np.mean(pct)) if pct else None})
     order = {world: number for number, world in enumerate(dict.fromkeys(e["world"] for e in entries))}
     return sorted(rows, key=lambda row: (order[row["world"]], row["variant"]))
