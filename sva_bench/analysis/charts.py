@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,15 +18,24 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 Scenario = Mapping[str, Any]
 
 
-def incentive_by_robot(scenarios: Sequence[Scenario], plan: str) -> str:
-    """Bars: what each robot collected, scenario by scenario (Figures 4 and 7 of the paper)."""
+def incentive_by_robot(scenarios: Sequence[Scenario], plan: str, beside: Sequence[str] = ()) -> str:
+    """Bars: what each robot collected, scenario by scenario (Figures 4 and 7 of the paper).
+
+    Args:
+        scenarios: Of a summary.
+        plan: Whose bars they are.
+        beside: Plans whose charts stand beside this one: all have the axis of the greatest.
+    """
     robots = list(scenarios[0]["availability"])
     heights = {robot: [s["plans"][plan]["by_robot"][robot] for s in scenarios] for robot in robots}
+    most = max(s["plans"][name]["by_robot"][robot] for s in scenarios for name in {plan, *beside} for robot in robots)
 
     def draw(axes: Axes) -> None:
         _bars(axes, [s["name"] for s in scenarios], heights, {})
         axes.set_ylabel("mean incentive [world file's units]")
         axes.set_title(f"Incentive by robot, {plan} plan")
+        if most > 0:
+            axes.set_ylim(0, 1.05 * most)
 
     return chart(_name("robots", plan), f"Mean incentive that each robot collects in each scenario, {plan} plan",
                  (_width(len(scenarios), len(robots)), 3.6), draw)
@@ -90,23 +100,32 @@ def distributions(scenarios: Sequence[Scenario]) -> str:
 
 
 def boxes_of(groups: Mapping[str, Sequence[float]], title: str, unit: str) -> str:
-    """A box and its points for each group."""
+    """A box and its points for each group, one below the other: their names may be long."""
+    labels = [textwrap.fill(name, _LABEL) for name in groups]
+    lines = sum(label.count("\n") + 1 for label in labels)
+
     def draw(axes: Axes) -> None:
         figures = [np.asarray(group, dtype=np.float64) for group in groups.values()]
-        axes.axhline(0, color="#444", linewidth=1)
+        axes.axvline(0, color="#444", linewidth=1)
         drawn = axes.boxplot(figures, positions=range(len(groups)), widths=0.5, patch_artist=True, manage_ticks=False,
-                             showfliers=False, medianprops={"color": "black", "linewidth": 1.6})
+                             showfliers=False, orientation="horizontal",
+                             medianprops={"color": "black", "linewidth": 1.6})
         for box in drawn["boxes"]:
             box.set(facecolor="#cfe3f1")
         for k, group in enumerate(figures):
             spread = np.linspace(-0.12, 0.12, len(group)) if len(group) > 1 else np.zeros(1)
-            axes.plot(k + spread, group, linestyle="none", marker="o", color=_COLOURS[0], markersize=4,
+            axes.plot(group, k + spread, linestyle="none", marker="o", color=_COLOURS[0], markersize=4,
                       markeredgecolor="black", markeredgewidth=0.4)
-        _names(axes, list(groups))
-        axes.set_ylabel(unit)
+        axes.set_yticks(range(len(groups)), labels)
+        axes.set_ylim(len(groups) - 0.5, -0.5)
+        axes.set_xlabel(unit)
         axes.set_title(title)
+        axes.grid(axis="x", color="#ddd")
 
-    return chart(_name("boxes", title), title, (_width(len(groups), 1), 3.6), draw)
+    return chart(_name("boxes", title), title, (7.0, 1.3 + max(0.4 * len(groups), 0.22 * lines)), draw)
+
+
+_LABEL = 32  # letters of a label from which on it goes on in the next line
 
 
 def legs_driven(planned_s: FloatArray, driven_s: FloatArray, robots: Sequence[str]) -> str:

@@ -13,12 +13,15 @@ import numpy as np
 from sva_bench.analysis.page import figure, heading, note, table, text, write_page
 from sva_bench.analysis.wording import (
     ASSUMPTION_HEAD,
+    VSS_PCT,
     adjusted,
     answer,
     assumption_rows,
     finding,
+    listed,
     number,
     optional,
+    over_few_maps,
     per_cent,
     ranked,
     remarks,
@@ -86,7 +89,8 @@ def _answer(summary: Mapping[str, Any]) -> list[str]:
         if "vss" in scenario:
             doubtful = ", ".join(f"{robot} {per_cent(100 * p)}" for robot, p in scenario["availability"].items()
                                  if p < 1)
-            lines.append(f"<li><b>{text(scenario['name'])}</b> ({text(doubtful or 'all available')}): "
+            known = f"availability: {doubtful}" if doubtful else "all available"
+            lines.append(f"<li><b>{text(scenario['name'])}</b> ({text(known)}): "
                          f"{text(finding(scenario))}</li>")
         elif scenario["comparisons"]:
             lines.append(f"<li><b>{text(scenario['name'])}</b>: {text(ranked(scenario))}</li>")
@@ -130,7 +134,7 @@ def _charts(scenarios: Scenarios, *, compared: bool) -> list[str]:
         rows = [(s["name"], s["vss"]["executed"]) for s in scenarios]
         parts.append(figure(charts.differences(rows, "VSS, executed", "incentive"), "Stochastic less deterministic in "
                             "the same trials: right of zero, planning for failures pays."))
-    robots = [figure(charts.incentive_by_robot(scenarios, plan), f"What each robot collects by the {plan} plan.")
+    robots = [figure(charts.incentive_by_robot(scenarios, plan, shown), f"What each robot collects by the {plan} plan.")
               for plan in shown]
     parts += ["</div>", heading("Incentive by robot and scenario"), "<div class=pair>", *robots, "</div>"]
     names = list(scenarios[0]["availability"])
@@ -205,10 +209,10 @@ def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
     late = np.argsort(-(driven - planned), kind="stable")[:_WORST_LEGS]
     worst = [[*(str(legs[key][k]) for key in ("scenario", "planner", "robot", "rollout", "origin", "destination")),
               f"{planned[k]:.2f}", f"{driven[k]:.2f}", f"{driven[k] - planned[k]:+.2f}"] for k in late.tolist()]
-    return [*parts, "<div class=pair>",
+    return [*parts,
             figure(charts.legs_driven(planned, driven, names), "Each point is a leg under one noise draw. Fuel is "
                    "measured in seconds of driving, so a leg's time is its fuel."),
-            table(["robot", "legs", "planned [s]", "driven [s]", "off [%]", "least [%]", "most [%]"], rows), "</div>",
+            table(["robot", "legs", "planned [s]", "driven [s]", "off [%]", "least [%]", "most [%]"], rows),
             table(["scenario", "plan", "robot", "noise draw", "from", "to", "planned [s]", "driven [s]", "off [s]"],
                   worst, words=(0, 1, 2, 4, 5), caption="The legs that took longest beyond their plan")]
 
@@ -252,41 +256,52 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
     """
     from sva_bench.analysis import charts
 
-    rows = summary["aggregate"]
-    over = [[row["variant"], row["scenario"], str(row["maps"]), with_interval(row["vss"]),
+    rows, varied = summary["aggregate"], any(summary["variants"])
+    over = [[*([row["variant"]] if varied else []), row["scenario"], str(row["maps"]), with_interval(row["vss"]),
              "" if row["vss_pct"]["mean"] is None else with_interval(row["vss_pct"])] for row in rows]
-    sure = [row for row in rows if row["vss"]["ci95"] is not None and row["vss"]["ci95"][0] > 0]
-    pays = [_labelled(row["scenario"], row["variant"]) + (
-        "" if row["vss_pct"]["mean"] is None else f" ({with_interval(row['vss_pct'])} %)") for row in sure]
-    said = f"Over these maps planning for failures pays in {', '.join(pays)}." if pays else \
-        "Over these maps no scenario shows a value of planning for failures beyond doubt."
+    # A map is a point, as it is in the interval: seeds of one map are no sample of maps.
     by_scenario: dict[str, list[float]] = {}
-    for unit in summary["units"]:
-        for s in unit["scenarios"]:
-            if s["vss"]["executed_pct"] is not None:
-                by_scenario.setdefault(_labelled(s["name"], unit["variant"]), []).append(s["vss"]["executed_pct"])
+    for row in summary["maps"]:
+        if row["vss_pct"] is not None:
+            by_scenario.setdefault(_labelled(row["scenario"], row["variant"]), []).append(row["vss_pct"])
+    seeds = ", the mean over its seeds" if len(summary["seeds"]) > 1 else ""
     pictures = [figure(charts.boxes_of(by_scenario, "VSS over maps", "VSS [% of the stochastic plan]"),
-                       "Each point is a map and seed.")] if by_scenario else []
+                       f"Each point is a map{seeds}.")] if by_scenario else []
     failed = [[entry["unit"], entry["world"], str(entry["seed"]), entry["reason"]] for entry in summary["failed"]]
+    caution = over_few_maps(rows)
     parts = [
         f"<h1>Value of the stochastic solution over {number(len(summary['worlds']), 'map')}</h1>",
-        f"<div class=answer><p>{text(said)}</p></div>",
-        table(["variant", "scenario", "maps", "VSS", "VSS [%]"], over, words=(0, 1)),
+        f"<div class=answer><p>{text(_over_maps(rows))}</p>{note(VSS_PCT)}</div>",
+        table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
+              words=(0, 1) if varied else (0,)),
+        *([note(caution)] if caution else []),
         note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, fidelity {summary['fidelity']}; 95 "
              "% intervals in brackets. Over maps, the maps are the sample."),
         *([heading("Given up"), table(["unit", "map", "seed", "reason"], failed, words=(0, 1, 3))] if failed else []),
         *pictures,
         heading("Map by map"),
-        table(["map", "variant", "seed", "scenario", "stochastic", "deterministic", "VSS", "VSS [%]", "VSS, modelled",
-               "EVPI"],
-              [[unit["world"], unit["variant"], str(unit["seed"]), s["name"],
+        table(["scenario", "seed", "stochastic", "deterministic", "VSS", "VSS [%]", "VSS, modelled", "EVPI"],
+              [[s["name"], str(unit["seed"]),
                 *(with_interval(s["plans"][name]["executed"]) for name in ("stochastic", "deterministic")),
                 vss_verdict(s), per_cent(s["vss"]["executed_pct"]), f"{s['vss']['modelled']:.1f}", optional(s["evpi"])]
-               for unit in summary["units"] for s in unit["scenarios"]], words=(0, 1, 3)),
+               for unit in summary["units"] for s in unit["scenarios"]],
+              sections=[_labelled(unit["world"], unit["variant"]) for unit in summary["units"]
+                        for _ in unit["scenarios"]]),
     ]
     write_page(path, "batch", parts)
 
 
-def _labelled(scenario: str, variant: str) -> str:
-    """A scenario, and what a sweep varied in it."""
-    return f"{scenario} ({variant})" if variant else scenario
+def _over_maps(rows: Sequence[Mapping[str, Any]]) -> str:
+    """What a batch comes to, in one sentence."""
+    if rows and all(row["vss"]["ci95"] is None for row in rows):
+        return "One map can't tell what planning for failures is worth over maps; below is its worth on this one."
+    sure = [row for row in rows if row["vss"]["ci95"] is not None and row["vss"]["ci95"][0] > 0]
+    pays = [_labelled(row["scenario"], row["variant"]) + (
+        "" if row["vss_pct"]["mean"] is None else f" (VSS {with_interval(row['vss_pct'], unit=' %')})") for row in sure]
+    return f"Over these maps planning for failures pays in {listed(pays)}." if pays else \
+        "Over these maps no scenario shows a value of planning for failures beyond doubt."
+
+
+def _labelled(name: str, variant: str) -> str:
+    """A scenario or a map, and what a sweep varied in it."""
+    return f"{name} ({variant})" if variant else name

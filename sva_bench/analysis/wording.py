@@ -20,21 +20,34 @@ def answer(summary: Mapping[str, Any]) -> str:
             clear[_MOST_NAMED:] = [f"{len(clear) - _MOST_NAMED} more"]
         return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
             "No difference between plans stands out of the noise."
-    if all(s["vss"]["executed"]["ci95"] is None for s in scenarios):
-        return "Too few trials or noise draws for an interval: whether planning for failures pays can't be said."
-    pays = [s for s in scenarios if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] > 0]
-    costs = [s["name"] for s in scenarios if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] < 0]
+    differing = [s for s in scenarios if not s["vss"]["same_plan"]]
+    alike = [s["name"] for s in scenarios if s["vss"]["same_plan"]]
+    if not differing:
+        return "Planning for failures changes nothing here: both plans are the same" + (
+            "." if len(alike) == 1 else " in every scenario.")
+    same = f" In {listed(alike)} both plans are the same." if alike else ""
+    if all(s["vss"]["executed"]["ci95"] is None for s in differing):
+        return f"Too few trials or noise draws for an interval: whether planning for failures pays can't be said.{same}"
+    pays = [s for s in differing if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] > 0]
+    costs = [s["name"] for s in differing if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] < 0]
     loses = f" In {listed(costs)} it collects less." if costs else ""
     if not pays:
-        return f"Planning for failures pays in no scenario, as far as these trials can tell.{loses}"
-    named = listed([f"{s['name']} ({per_cent(s['vss']['executed_pct'])})" for s in pays])
-    rest = [s["name"] for s in scenarios if not s["vss"]["distinguishable"]]
+        return f"Planning for failures pays in no scenario, as far as these trials can tell.{loses}{same}"
+    named = listed([s["name"] + _share(s) for s in pays])
+    rest = [s["name"] for s in differing if not s["vss"]["distinguishable"]]
     other = f" In {listed(rest)} the two can't be told apart." if rest else ""
-    return f"Planning for failures pays in {named}: share of the stochastic plan's executed incentive that the " \
-           f"deterministic plan misses.{other}{loses}"
+    return f"Planning for failures pays in {named}.{other}{loses}{same}"
+
+
+def _share(scenario: Mapping[str, Any]) -> str:
+    share = scenario["vss"]["executed_pct"]
+    return "" if share is None else f" (VSS {per_cent(share)})"
 
 
 _MOST_NAMED = 6
+FEW = 5
+"""Samples (noise draws, maps) below which an interval wants a word of caution: Student's t is wide and shaky there."""
+VSS_PCT = "VSS in %: how much more the stochastic plan collects than the deterministic one, in per cent of the former."
 
 
 def ranked(scenario: Mapping[str, Any]) -> str:
@@ -44,13 +57,14 @@ def ranked(scenario: Mapping[str, Any]) -> str:
 
 def adjusted(comparison: Mapping[str, Any]) -> str:
     """A difference with the interval that is adjusted for the number of pairs."""
-    return verdict({"mean": comparison["mean"], "ci95": comparison["ci95_adjusted"],
-                    "distinguishable": comparison["distinguishable"]})
+    return verdict({**comparison, "ci95": comparison["ci95_adjusted"]})
 
 
 def finding(scenario: Mapping[str, Any]) -> str:
     """What a scenario comes to: how much more, how sure."""
     vss = scenario["vss"]
+    if vss["same_plan"]:
+        return "the same plan is best either way: no difference in any trial"
     executed, interval = vss["executed"], vss["executed"]["ci95"]
     if interval is None:
         return f"{executed['mean']:+.1f} collected by planning for failures; no interval: more trials or noise draws " \
@@ -69,8 +83,15 @@ def finding(scenario: Mapping[str, Any]) -> str:
 
 
 def remarks(summary: Mapping[str, Any]) -> list[str]:
-    """What was asked for beside the comparison of the two plans: precision, and the informed planner."""
+    """What the answer leaves out: what its percentages are of, how little it rests on, and what else was asked for."""
     said = []
+    compared = [s["vss"] for s in summary["scenarios"] if "vss" in s and not s["vss"]["same_plan"]]
+    if any(vss["executed_pct"] is not None for vss in compared):
+        said.append(VSS_PCT)
+    alike = all("vss" in s and s["vss"]["same_plan"] for s in summary["scenarios"])
+    if 1 < summary["rollouts"] < FEW and not alike:
+        said.append(f"Caution: the intervals rest on only {summary['rollouts']} noise draws; more of them "
+                    "(--rollouts) would make them surer.")
     asked = summary.get("precision")
     if asked is not None:
         reached = "no interval" if asked["reached_pct"] is None else f"{asked['reached_pct']:.2g} %"
@@ -85,6 +106,16 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
     return said
 
 
+def over_few_maps(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A word of caution for the VSS over few maps; nothing where there are enough."""
+    fewest = min((row["maps"] for row in rows), default=FEW)
+    if fewest >= FEW:
+        return ""
+    if fewest == 1:
+        return "From one map there is no interval over maps, however many seeds it has: nothing tells how maps differ."
+    return f"Student's t interval over {fewest} maps: with few maps it is wide, even where the VSS of each is positive."
+
+
 def assumption_rows(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """Scenario, failures executed, plan, what it was made for, expected, executed, loss; one row a plan."""
     return [[s["name"], row["executed_under"], row["planner"], row["planned_for"] or "no failures",
@@ -96,7 +127,9 @@ ASSUMPTION_HEAD = ("scenario", "executed under", "plan", "made for", "expected",
 
 
 def verdict(difference: Mapping[str, Any]) -> str:
-    """A difference with its interval, or that there is none to speak of."""
+    """A difference with its interval, or that there is none to speak of: two equal plans, or within the noise."""
+    if difference.get("same_plan", False):
+        return "the same plan"
     if difference["ci95"] is None:
         return f"{difference['mean']:.1f}, no interval"
     return with_interval(difference) if difference["distinguishable"] else "not distinguishable from zero"
@@ -105,14 +138,15 @@ def verdict(difference: Mapping[str, Any]) -> str:
 def vss_verdict(scenario: Mapping[str, Any]) -> str:
     """The executed VSS of a scenario with its interval, or that there is none to speak of."""
     vss = scenario["vss"]
-    return verdict(vss["executed"] | {"distinguishable": vss["distinguishable"]})
+    return verdict({**vss["executed"], "distinguishable": vss["distinguishable"], "same_plan": vss["same_plan"]})
 
 
-def with_interval(estimate: Mapping[str, Any], digits: int = 1) -> str:
-    """``39.0 [36.1, 41.9]``."""
+def with_interval(estimate: Mapping[str, Any], digits: int = 1, unit: str = "") -> str:
+    """``39.0 [36.1, 41.9]``; ``9.5 (1 map)`` where it is over other maps than the rest of its row."""
     interval = estimate["ci95"]
-    return f"{estimate['mean']:.{digits}f}" + (
-        "" if interval is None else f" [{interval[0]:.{digits}f}, {interval[1]:.{digits}f}]")
+    return f"{estimate['mean']:.{digits}f}{unit}" + (
+        "" if interval is None else f" [{interval[0]:.{digits}f}, {interval[1]:.{digits}f}]") + (
+        f" ({number(estimate['maps'], 'map')})" if "maps" in estimate else "")
 
 
 def per_cent(figure: float | None) -> str:

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+from collections.abc import Mapping, Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from sva_bench.analysis import charts
 from sva_bench.analysis.report import write_batch_report
-from sva_bench.analysis.wording import answer, finding, with_interval
-from sva_bench.batch.aggregates import aggregate
+from sva_bench.analysis.wording import answer, finding, over_few_maps, remarks, vss_verdict, with_interval
+from sva_bench.batch.aggregates import aggregate, maps
 from sva_bench.bench import Run, run
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.planning import Options
@@ -73,7 +75,7 @@ def test_a_page_loads_nothing_and_every_reference_in_it_is_met(finished: Run) ->
 
 
 def test_page_terminal_and_summary_say_the_same(finished: Run) -> None:
-    text = html.unescape((finished.folder / "report.html").read_text())
+    text = html.unescape((finished.folder / "report.html").read_text()).replace("\u00a0", " ")
     assert answer(finished.summary) in text
     for scenario in finished.summary["scenarios"]:
         assert finding(scenario) in text
@@ -93,7 +95,8 @@ answer:document.querySelector('.answer').getBoundingClientRect().bottom})}</scri
 def test_a_browser_shows_every_picture_and_the_answer_in_the_first_screenful(
         finished: Run, width: int, height: int, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    page.write_text((finished.folder / "report.html").read_text().replace("</body>", _PROBE))
+    text = (finished.folder / "report.html").read_text()
+    page.write_text(text.replace("<h1>", f"<h1>{'unbreakable' * 9}").replace("</body>", _PROBE))
     done = subprocess.run(
         [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--window-size={width},{height}",
          f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", page.as_uri()],
@@ -175,8 +178,55 @@ def test_tables_say_their_units_and_open_as_csv(folder: Path) -> None:
 def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> None:
     units = [{**finished.summary, "variant": ""}]
     write_batch_report(tmp_path / "report.html", {
-        "trials": 40, "fidelity": "kinematic", "worlds": ["small"], "seeds": [0], "units": units,
-        "failed": [], "aggregate": aggregate(units)})
+        "trials": 40, "fidelity": "kinematic", "worlds": ["small"], "seeds": [0], "variants": [""], "units": units,
+        "failed": [], "maps": maps(units), "aggregate": aggregate(units)})
     text = (tmp_path / "report.html").read_text()
     assert "over 1 map<" in text
     assert "<svg" in text
+    assert "From one map there is no interval over maps" in text
+    assert ">variant<" not in text  # nothing was varied
+
+
+def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
+        finished: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: dict[str, Sequence[float]] = {}
+
+    def watched(groups: Mapping[str, Sequence[float]], title: str, unit: str, draw: Any = charts.boxes_of) -> str:
+        drawn.update(groups)
+        return str(draw(groups, title, unit))
+
+    monkeypatch.setattr(charts, "boxes_of", watched)
+    units = [{**finished.summary, "variant": variant, "world": name, "seed": seed} for variant in ("x=1", "x=2")
+             for name in ("a", "b") for seed in (0, 1, 2)]
+    write_batch_report(tmp_path / "report.html", {
+        "trials": 40, "fidelity": "kinematic", "worlds": ["a", "b"], "seeds": [0, 1, 2], "variants": ["x=1", "x=2"],
+        "units": units, "failed": [], "maps": maps(units), "aggregate": aggregate(units)})
+    text = (tmp_path / "report.html").read_text()
+    assert ">variant<" in text
+    assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
+    assert "interval over 2 maps" in text
+    assert {label: len(points) for label, points in drawn.items()} == {
+        f"{name} (x={x})": 2 for name in ("half", "safe") for x in (1, 2)}
+
+
+def test_two_equal_plans_are_called_the_same_and_not_a_matter_of_luck(finished: Run) -> None:
+    half, safe = sorted(finished.summary["scenarios"], key=lambda s: str(s["name"]))
+    assert (half["vss"]["same_plan"], safe["vss"]["same_plan"]) == (False, True)
+    assert safe["vss"]["verdict"] == vss_verdict(safe) == "the same plan"
+    assert "same plan" in finding(safe)
+    assert answer(finished.summary).endswith("In safe both plans are the same.")
+    alone = {**finished.summary, "scenarios": [safe]}
+    assert answer(alone) == "Planning for failures changes nothing here: both plans are the same."
+    assert remarks(alone) == []
+
+
+def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished: Run) -> None:
+    assert any("only 4 noise draws" in said for said in remarks(finished.summary))
+    assert not any("noise draws" in said for said in remarks({**finished.summary, "rollouts": 5}))
+    assert over_few_maps([{"maps": 5}]) == ""
+    assert "over 4 maps" in over_few_maps([{"maps": 5}, {"maps": 4}])
+
+
+def test_a_percentage_over_fewer_maps_says_over_how_many() -> None:
+    assert with_interval({"mean": 9.5, "ci95": None, "maps": 1}) == "9.5 (1 map)"
+    assert with_interval({"mean": 9.5, "ci95": [1.0, 18.0], "maps": 2}, unit=" %") == "9.5 % [1.0, 18.0] (2 maps)"
