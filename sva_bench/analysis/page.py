@@ -24,7 +24,7 @@ figcaption{color:#444;font-size:.92rem}.pair{display:flex;flex-wrap:wrap;gap:1re
 .note{color:#444;font-size:.92rem}code{background:#f3f3f3;padding:.1rem .3rem;overflow-wrap:anywhere}
 pre{background:#f3f3f3;padding:.6rem;white-space:pre-wrap}pre code{padding:0}
 @media(max-width:40rem){body{font-size:15px}th,td{padding:.25rem .45rem}}
-@media print{body{font-size:10pt;max-width:none;padding:0}.wide{overflow:visible}h2{break-after:avoid}
+@media print{html,body{font-size:10pt}body{max-width:none;padding:0}.wide{overflow:visible}h2{break-after:avoid}
 tr{break-inside:avoid}figure.rows{break-inside:auto}
 th,td,td.text{white-space:normal;padding:.15rem .35rem}td.long{min-width:0}a{color:inherit}}
 """
@@ -88,7 +88,7 @@ _LONG = 40  # letters from which on a name or a route may go on in a second line
 
 def _unbroken(cell: str) -> str:
     """Figures that break nowhere but before an interval or a remark: ``39.0 [36.1, 41.9] (1 map)``."""
-    return re.sub(r"(?<=[0-9,]) (?![\[(])", "\u00a0", cell)
+    return re.sub(r"(?<=[0-9]) (?![\[(])|(?<=[0-9],) ", "\u00a0", cell)
 
 
 def figure(picture: str, caption: str) -> str:
@@ -103,7 +103,12 @@ def heading(words: str) -> str:
 
 def note(words: str) -> str:
     """A remark in smaller print."""
-    return f"<p class=note>{text(words)}</p>"
+    return f"<p class=note>{sentence(words)}</p>"
+
+
+def sentence(words: str) -> str:
+    """As it stands in a paragraph: a line never begins with a per cent sign."""
+    return text(re.sub(r"(?<=[0-9]) %", "\u00a0%", words))
 
 
 def text(value: object) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.page import figure, heading, note, table, text, write_page
+from sva_bench.analysis.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.analysis.wording import (
     ASSUMPTION_HEAD,
     VSS_PCT,
@@ -90,13 +90,13 @@ def _answer(summary: Mapping[str, Any]) -> list[str]:
             doubtful = ", ".join(f"{robot} {per_cent(100 * p)}" for robot, p in scenario["availability"].items()
                                  if p < 1)
             known = f"availability: {doubtful}" if doubtful else "all available"
-            lines.append(f"<li><b>{text(scenario['name'])}</b> ({text(known)}): "
-                         f"{text(finding(scenario))}</li>")
+            lines.append(f"<li><b>{text(scenario['name'])}</b> ({sentence(known)}): "
+                         f"{sentence(finding(scenario))}</li>")
         elif scenario["comparisons"]:
             lines.append(f"<li><b>{text(scenario['name'])}</b>: {text(ranked(scenario))}</li>")
     unproved = "" if summary["reproducible"] else note(
         "A solve met its limit: these plans may differ on another machine.")
-    return [f"<div class=answer><p>{text(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
+    return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
             *(note(said) for said in remarks(summary)), unproved, "</div>"]
 
 
@@ -271,7 +271,7 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
     caution = over_few_maps(rows)
     parts = [
         f"<h1>Value of the stochastic solution over {number(len(summary['worlds']), 'map')}</h1>",
-        f"<div class=answer><p>{text(_over_maps(rows))}</p>{note(VSS_PCT)}</div>",
+        f"<div class=answer><p>{sentence(_over_maps(rows))}</p>{note(VSS_PCT)}</div>",
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
