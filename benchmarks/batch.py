@@ -63,7 +63,7 @@ def main() -> None:
         print(f"overhead per unit: {(cut[0] - few[0]) / units * 1e3:.1f} ms, processor "
               f"{(cut[1] - few[1]) / units * 1e3:.1f} ms; target 50 ms")
 
-        physics = ("--fidelity", "physics", "--scenario", "S2", "--rollouts", 2, "--trials", 2, "--unit-trials", 1)
+        physics = ("--fidelity", "physics", "--scenario", "S2", "--rollouts", 2, "--trials", 10, "--unit-trials", 1)
         one = batch("one", *physics, "--workers", 1)
         two = batch("two", *physics, "--workers", 2)
         print(f"physics: one worker {one[0]:.0f} s, two {two[0]:.0f} s: {one[0] / two[0]:.2f} times; target 1.7; "

@@ -13,7 +13,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from sva_bench.analysis.wording import verdict, with_interval
+from sva_bench.analysis.wording import over_few_maps, verdict, with_interval
 from sva_bench.batch.estimates import Estimate
 from sva_bench.batch.run import Progress
 from sva_bench.terminal import messages, results
@@ -115,6 +115,8 @@ def print_batch(summary: Any, console: Console | None = None) -> None:
         before = this
     console.print(table)
     console.print(over_maps(summary["aggregate"], "VSS over maps"))
+    if said := over_few_maps(summary["aggregate"]):
+        console.print(said, highlight=False)
     print_failed(summary["failed"], console)
 
 
