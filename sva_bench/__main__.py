@@ -42,6 +42,7 @@ def run_command_line(arguments: Sequence[str]) -> int:
         messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return int(error.exit_code)
     except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
+        error.message = error.message.replace("Value error, ", "").replace("Input should be", "it should be")
         getattr(error, "show", error.format_message)()
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):

@@ -48,11 +48,17 @@ def check_world(
         console.print(f"{cost.times.model.name}: {cost.pairs} travel times of up to {longest:.1f} s, "
                       f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
                       highlight=False)
-    for robot, pois in out_of_reach(loaded, costs).items():
+    lost = out_of_reach(loaded, costs)
+    for robot, pois in lost.items():
         console.print(f"{robot} reaches none of {', '.join(pois)} within its fuel and limit, and will never be sent "
                       "there", highlight=False)
-    console.print(f"{loaded.name} is a good world: {len(loaded.stations)} stations, {len(loaded.pois)} POIs, "
-                  f"{len(loaded.robots)} robots, {len(loaded.scenarios)} scenarios", highlight=False)
+    useless = all(len(lost.get(robot.name, ())) == len(loaded.pois) for robot in loaded.robots)
+    verdict = "can be read, but no robot reaches any POI: give them more fuel or time" if useless \
+        else "is a good world"
+    counts = {"station": len(loaded.stations), "POI": len(loaded.pois), "robot": len(loaded.robots),
+              "scenario": len(loaded.scenarios)}
+    console.print(f"{loaded.name} {verdict}: "
+                  + ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items()), highlight=False)
 
 
 @world_app.command("random")

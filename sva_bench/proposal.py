@@ -37,7 +37,8 @@ _COLLECTED = 0.8  # share of all incentives that a team of available robots coll
 _PROOF = 0.2  # gap to which that is proved: 0.8 x 1.2 is still less than everything
 _PAYS = 1.05  # worth of the certain robots' best plan where all others fail, in what they collect otherwise
 _DRAWS = 8  # draws of incentives tried until that is so
-_STEP_S = 5.0  # capacities and limits are multiples of it
+_STEP_S = 5.0  # capacities and limits are multiples of it, or of its doubles where missions are long
+_STEPS = 50  # ... so that about so many make the way to the remotest POI and back
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -134,7 +135,9 @@ def _limited(free: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> Propo
     """The proposal with the longest mission limit in which not too much is collected, and a capacity to go with it."""
     alone = _instance(free, sites, fuel_s)
     there_and_back = max(_alone_s(alone, math.inf))
-    step = _STEP_S if there_and_back >= 4 * _STEP_S else 1.0
+    step = 1.0 if there_and_back < 4 * _STEP_S else _STEP_S
+    while there_and_back > _STEPS * step:
+        step *= 2
     least_capacity = next(step * k for k in itertools.count(1) if math.isfinite(max(_alone_s(alone, step * k))))
     everything = float(_weights(alone).max(axis=0).sum())
 
@@ -219,7 +222,8 @@ def _weights(instance: Instance) -> FloatArray:
 def _good_orders(instance: Instance, weights: FloatArray, stop: Callable[[float], bool]) -> Orders:
     """A good plan; any one whose worth is enough to stop."""
     robots = len(weights)
-    return search(tables_of(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), stop=stop).orders
+    return search(tables_of(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), starts=1,
+                  stop=stop).orders
 
 
 def _worth(weights: FloatArray, orders: Orders) -> float:

@@ -79,8 +79,11 @@ def write_beside(path: Path, name: str, content: bytes) -> None:
 
 def set_up_logging(verbose: bool) -> None:
     """Send warnings to standard error, and everything of ours where the user wants to know more."""
-    logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,
-                        handlers=[RichHandler(console=messages, show_time=False, show_path=False)])
+    if messages.is_terminal:
+        logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,
+                            handlers=[RichHandler(console=messages, show_time=False, show_path=False)])
+    else:  # a line each, whatever reads them
+        logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s", force=True)
     logging.getLogger("sva_bench").setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 

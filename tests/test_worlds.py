@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import get_args
 
@@ -126,7 +127,13 @@ def test_the_command_writes_a_file_that_check_calls_good(tmp_path: Path) -> None
     assert done.stdout == ""
     checked = sva_bench("world", "check", "maze.yaml", cwd=tmp_path)
     assert checked.returncode == 0, checked.stderr
-    assert "maze-12m-k2-n5-m2-s7 is a good world" in checked.stdout
+    assert "maze-12m-k2-n5-m2-s7 is a good world: 2 stations, 5 POIs, 2 robots, 4 scenarios" in checked.stdout
+    world = (tmp_path / "maze.yaml").read_text(encoding="utf-8")
+    (tmp_path / "dry.yaml").write_text(re.sub(r"fuel_capacity_s: [0-9.]+", "fuel_capacity_s: 0.5", world))
+    checked = sva_bench("world", "check", "dry.yaml", cwd=tmp_path)
+    assert checked.returncode == 0, checked.stderr
+    assert "good world" not in checked.stdout
+    assert "no robot reaches any POI" in " ".join(checked.stdout.split())
 
 
 @pytest.mark.parametrize(("arguments", "said"), [

@@ -56,6 +56,7 @@ _SETTINGS: dict[Any, Any] = {
     "axes.linewidth": 0.6, "path.simplify": False}
 _PER_LINE = 4  # incentives on a line of a label
 _MOST_MINDED = 300  # paths that labels try to leave free; more leave no room anyway
+_LEADER = 9.0  # pixels between a marker and its label from which on a line joins them
 _MANY = 2000  # boxes, or edges, from which on an SVG holds them as an image
 
 
@@ -267,9 +268,10 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
     if len(overlays.paths) <= _MOST_MINDED:
         drawn += [_every(to_pixels(path), 16.0) for path in overlays.paths]
     x0, y0, x1, y1 = _shown(world).tolist()
+    sizes = np.array([[max(box.width for box in group), sum(box.height for box in group)] for group in boxes])
+    radii = np.array([_MARKERS[site.kind][2] for site in world.sites]) * DPI / 72 / 2
     centres = place_labels(
-        at, np.array([[max(box.width for box in group), sum(box.height for box in group)] for group in boxes]),
-        radii=np.array([_MARKERS[site.kind][2] for site in world.sites]) * DPI / 72 / 2,
+        at, sizes, radii=radii,
         frame=np.concatenate([to_pixels((x0, y0)), to_pixels((x1, y1))]),
         lines=np.concatenate(drawn) if drawn else np.empty((0, 2)), solid=to_pixels(_within(world)))
     back = axes.transData.inverted().transform
@@ -278,6 +280,11 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
         for line, box in zip(lines, group, strict=True):
             line.set_position(tuple(back((x, top - box.height / 2)).tolist()))
             top -= box.height
+    nearest = np.clip(at, centres - sizes / 2, centres + sizes / 2)
+    for place, here, apart in zip(at, nearest, np.hypot(*(nearest - at).T) - radii, strict=True):
+        if apart > _LEADER:
+            ends = back(np.stack([place, here]))
+            axes.plot(ends[:, 0], ends[:, 1], color="black", linewidth=0.6, zorder=6, path_effects=[_HALO])
 
 
 def _earned(world: World, poi: str) -> list[str]:

@@ -9,7 +9,9 @@ from sva_bench.arrays import FloatArray
 _DIRECTIONS = 16
 _GAPS = (4.0, 12.0, 24.0)  # between a marker and its label, in pixels of 1/200 inch
 _PASSES = 4  # over all labels; later passes know where all others are
-_COSTS = {"frame": 50.0, "label": 20.0, "marker": 20.0, "line": 3.0, "solid": 1.0, "far": 0.02}
+_COSTS = {"frame": 50.0, "label": 20.0, "marker": 20.0, "line": 3.0, "solid": 1.0, "far": 0.1, "astray": 12.0}
+_MOST_POINTS = {"line": 3, "solid": 8}  # more under a label make it no harder to read
+_PLAINLY = 10.0  # nearer to its own marker by so much, a label is no other's
 
 
 def place_labels(
@@ -48,7 +50,11 @@ def place_labels(
         others = np.delete(np.arange(n), k)
         markers = np.concatenate([at[others] - radii[others, None], at[others] + radii[others, None]], axis=1)
         cost = cost + _COSTS["marker"] * _overlap(boxes, markers).sum(axis=1) / np.prod(sizes[k]) * 10
-        cost = cost + _COSTS["line"] * _inside(boxes, lines) + _COSTS["solid"] * np.minimum(_inside(boxes, solid), 8)
+        nearest = distances(boxes, at[others]).min(axis=1, initial=np.inf)
+        own = distances(boxes, at[k:k + 1])[:, 0]
+        cost = cost + _COSTS["astray"] * np.clip((own + _PLAINLY - nearest) / _PLAINLY, 0.0, 1.0)
+        for kind, points in (("line", lines), ("solid", solid)):
+            cost = cost + _COSTS[kind] * np.minimum(_inside(boxes, points), _MOST_POINTS[kind])
         options.append(places)
         fixed.append(cost)
     chosen = np.full(n, -1)
@@ -63,6 +69,12 @@ def place_labels(
                 cost = cost + _COSTS["label"] * 10 * _overlap(boxes, taken).sum(axis=1) / np.prod(sizes[k])
             chosen[k] = int(np.argmin(np.round(cost, 6)))
     return np.array([options[k][chosen[k]] for k in range(n)]).reshape(n, 2)
+
+
+def distances(boxes: FloatArray, points: FloatArray) -> FloatArray:
+    """Distance of each point from each box (x0, y0, x1, y1), shape (len(boxes), len(points)); 0 inside."""
+    outside = np.maximum(np.maximum(boxes[:, None, :2] - points[None], points[None] - boxes[:, None, 2:]), 0.0)
+    return np.hypot(outside[..., 0], outside[..., 1])
 
 
 def _neighbours(at: FloatArray) -> FloatArray:

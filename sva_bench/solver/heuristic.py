@@ -45,7 +45,7 @@ class Found:
 
 
 def search(
-    tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, seed: int = 0,
+    tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, seed: int = 0, starts: int = STARTS,
     stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
 ) -> Found:
     """A plan worth at least as much as the one it starts from.
@@ -57,6 +57,7 @@ def search(
             indifferent.
         start: A feasible plan.
         seed: Seed of the random choices.
+        starts: How often to start, the first time from the given plan and then from nothing.
         stop: Whether to stop, given the best value so far.
     """
     vehicles, n = weights.shape
@@ -70,7 +71,7 @@ def search(
     detour = _DETOUR * float(np.median(legs)) if len(legs) else _DETOUR
     ordered = bool((survival < 1).any())
     rounds = int(ROUNDS * min(1.0, (_LARGE / n) ** 1.5)) + 1
-    for number in range(STARTS):
+    for number in range(starts):
         if number and stop(value_of(weights, survival, best)):
             break
         rng = np.random.default_rng((seed, number))

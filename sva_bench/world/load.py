@@ -89,7 +89,7 @@ def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSo
             cells, files = read_movingai_map(root, section.movingai.file, section.movingai.cell_m)
     except BadFile as error:
         if error.path == entry["file"]:  # said of a name, not of a file: the world's to mend
-            raise document.error(("map", kind, "file"), error.problem) from None
+            raise document.error(("map", kind, "file"), f"{error.path}: {error.problem}") from None
         raise
     try:
         boxes = boxes_of(cells)
@@ -163,9 +163,8 @@ def _stations_and_pois(document: Document, sites: Sites, obstacles: Obstacles, w
         if error.kind == "base":
             raise document.error(("sites", "base", "at_m"), "there is too little room about the base to place sites "
                                  "that are reached from it: move it to where there is more") from None
-        raise document.error(("sites", error.kind), f"{error}; choose fewer, or "
-                             f"{'a smaller min_spacing_m' if drawn else 'a base with more free ground about it'}"
-                             ) from None
+        otherwise = "a smaller min_spacing_m" if error.kind == "pois" else "a base with more free ground about it"
+        raise document.error(("sites", error.kind), f"{error}; choose fewer, or {otherwise}") from None
     if spread is not None:
         stations = [("station", f"r{k}", SiteEntry(at_m=list(at), stop_s=spread.stop_s), ("sites", "stations"))
                     for k, at in enumerate(places.stations, start=1)]

@@ -11,6 +11,7 @@ import logging
 import math
 import os
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
@@ -67,9 +68,6 @@ def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[
     document = read_yaml(path)
     if not isinstance(document.data, dict):
         raise document.error((), "expected a map's keys: image, resolution, origin, ...")
-    odd = [key for key in document.data if key not in _KEYS]
-    if odd:
-        _log.warning("%s: not used: %s", path, ", ".join(map(repr, odd)))
     image_name = _image_name(document, name)
     cell_m = _number(document, "resolution", 1e-4, 100.0)
     origin = _origin(document)
@@ -81,7 +79,7 @@ def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[
     try:
         image_path = locate(root, image_name)
     except BadFile as error:
-        raise document.error(("image",), error.problem) from None
+        raise document.error(("image",), f"{error.path}: {error.problem}") from None
     try:
         content = _content(image_path)
         image = grey_image(content)
@@ -95,6 +93,8 @@ def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[
     if max(rows, columns) * cell_m > WIDEST_M:
         raise document.error(("resolution",), f"{columns} x {rows} cells of {cell_m} m; a world may be at most "
                              f"{WIDEST_M:g} m wide")
+    if odd := [key for key in document.data if key not in _KEYS]:
+        _log.warning("%s: not used: %s", path, ", ".join(map(repr, odd)))
     cells = Cells(occupied=solid[::-1], cell_m=cell_m, origin=np.array(origin),
                   unknown=(solid & (value < 100 * occupied))[::-1])
     return cells, (MapFile(name=_normal(name), content=_content(path)), MapFile(name=image_name, content=content))
@@ -198,8 +198,8 @@ def locate(root: Path, name: str) -> Path:
     if not name or "\0" in name:
         raise BadFile(root, None, "", "expected the name of a file")
     if name.startswith(("/", "~")) or "\\" in name:
-        raise BadFile(shown, None, "", f"{shown} is no name relative to the world's folder, with slashes; put the file "
-                      "there, and name it so")
+        raise BadFile(shown, None, "", "no name relative to the world's folder, with slashes; put the file there, and "
+                      "name it so")
     path = Path(root, _normal(name))
     try:
         inside = path.resolve().is_relative_to(root.resolve())
@@ -209,8 +209,8 @@ def locate(root: Path, name: str) -> Path:
     except (OSError, RuntimeError, ValueError):  # a name too long, links in a circle
         inside, there = True, False
     if not inside:
-        raise BadFile(shown, None, "", f"{shown} lies outside the world's folder; copy the file there")
-    raise BadFile(shown, None, "", f"{shown}: {'not a file' if there else 'no such file'} in {root}")
+        raise BadFile(shown, None, "", "lies outside the world's folder; copy the file there")
+    raise BadFile(shown, None, "", f"{'not a file' if there else 'no such file'} in {root}")
 
 
 def _normal(name: str) -> str:
@@ -239,6 +239,9 @@ def _image_name(document: Document, yaml_name: str) -> str:
 
 def _value(document: Document, key: str) -> object:
     if document.data.get(key) is None:
+        for odd in document.data:
+            if odd not in _KEYS and get_close_matches(str(odd)[:200], [key], cutoff=0.7):
+                raise document.error((odd,), f"unknown key {odd!r}; did you mean {key!r}?")
         raise document.error((key,), f"the key {key!r} is missing; add it, as map_server writes it")
     value: object = document.data[key]
     return value

@@ -96,6 +96,7 @@ def find_places(
         radius_m: Radius of the robot.
         stations, pois: How many.
         spacing_m: Least distance from one POI to the next and to all other sites; ``None`` = as wide as it easily goes.
+            Stations keep no more than the usual distance from what was there before them.
         seed: Seed of the POIs.
         others: Sites that stand already, beside the base.
 
@@ -117,7 +118,8 @@ def find_places(
         area = float(region.sum()) * (field.cells.cell_m / 2) ** 2
         widest = _LOOSE * math.sqrt(area / (1 + stations + pois + len(others)))
         try:
-            spread = _spread(field, region, stations, [here, *others], _CLOSEST_M if spacing_m is None else spacing_m)
+            spread = _spread(field, region, stations, [here, *others],
+                             _CLOSEST_M if spacing_m is None else min(spacing_m, APART_M))
             candidates = np.argwhere(region)
             candidates = candidates[rng_for(seed, Stream.DRAWN_PLACES).permutation(len(candidates))]
             for spacing in _spacings(widest) if spacing_m is None else [spacing_m]:

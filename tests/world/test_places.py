@@ -15,6 +15,7 @@ from sva_bench.errors import BadFile
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.cells import Cells, distance_field
 from sva_bench.world.maps import read_ros_map
+from sva_bench.world.model import Obstacles
 from sva_bench.world.near import clearances
 from sva_bench.world.places import NoRoom, Point, field_of, find_places
 from tests.oracles.worlds import random_obstacles
@@ -152,9 +153,17 @@ def test_placed_sites_keep_away_from_those_that_the_file_names(tmp_path: Path) -
     assert min(math.dist((depot.x_m, depot.y_m), (s.x_m, s.y_m)) for s in world.pois) >= 0.8
 
 
+def test_more_stations_than_fit_are_refused() -> None:
+    room = Obstacles(bounds_m=np.array([0.0, 0.0, 3.0, 3.0]), boxes=np.empty((0, 5)), cylinders=np.empty((0, 3)))
+    with pytest.raises(NoRoom, match=r"stations that a robot reaches .* keep 0\.5 m") as caught:
+        find_places(field_of(room), base=(1.5, 1.5), radius_m=0.2, stations=100, pois=0, spacing_m=0.8, seed=0)
+    assert 4 < caught.value.found < 100
+
+
 @pytest.mark.parametrize(("old", "new", "key", "says"), [
     ("random: 4", "random: 400", "sites.pois", "POIs that a robot reaches from the base and that keep 0.8 m"),
-    ("spread: 2", "spread: 100", "sites.stations", "stations that a robot reaches"),
+    # Stations keep their own distance: what is asked of POIs is no matter of theirs.
+    ("min_spacing_m: 0.8", "min_spacing_m: 6", "sites.pois", "no POIs .* keep 6 m .* a smaller min_spacing_m"),
     ("random: 4, seed: 7", "random: 4", "sites.pois.seed", "the key 'seed' is missing"),
     ("random: 4", "random: many", "sites.pois.random", "expected a whole number"),
     ("random: 4", "random: 4, spacing: 1", "sites.pois.spacing", "unknown key 'spacing'; did you mean 'min_spacing_m'"),
