@@ -49,6 +49,7 @@ DaskOption = Annotated[str | None, typer.Option("--dask", metavar="ADDRESS", hel
                                                 "scheduler, or of this scheduler file.", show_default="here")]
 UnitTimeLimit = Annotated[float, typer.Option("--unit-time-limit", metavar="S", min=0.1, callback=finite,
                                               help="A unit that takes longer is tried again, twice, then given up.")]
+TablesAsCsv = Annotated[bool, typer.Option("--csv", help="Write the tables map by map and over maps as CSV too.")]
 MemoryMb = Annotated[int, typer.Option("--memory-mb", min=0, help="Memory that a unit may take; 0 = any.")]
 
 
@@ -90,6 +91,7 @@ def over(
     memory_mb: MemoryMb = 4096,
     cache: CacheOption = None,
     as_json: AsJson = False,
+    as_csv: TablesAsCsv = False,
     verbose: Verbose = False,
 ) -> None:
     """Monte Carlo over many worlds, seeds and variants: shards of outcomes, and the VSS over maps.
@@ -111,7 +113,7 @@ def over(
     if dry_run:
         _list(grid, folder, cache, as_json)
         return
-    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, resume=resume)
+    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=resume)
 
 
 @batch_app.command()
@@ -123,6 +125,7 @@ def retry(
     memory_mb: MemoryMb = 4096,
     cache: CacheOption = None,
     as_json: AsJson = False,
+    as_csv: TablesAsCsv = False,
     verbose: Verbose = False,
 ) -> None:
     """Take up again what failed or was not done; worlds and settings are those in the folder."""
@@ -133,7 +136,7 @@ def retry(
 
     _existing(folder)
     grid = grid_of(settings_in(folder), folder / "manifest.json")
-    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, resume=True, again=True)
+    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True)
 
 
 @batch_app.command()
@@ -187,7 +190,7 @@ def _existing(folder: Path) -> None:
 
 def _run(
     grid: Grid, folder: Path, workers: int | None, dask: str | None, unit_time_limit_s: float, memory_mb: int,
-    cache: Path | None, as_json: bool, *, resume: bool, again: bool = False,
+    cache: Path | None, as_json: bool, as_csv: bool, *, resume: bool, again: bool = False,
 ) -> None:
     with holding_back_ctrl_c():
         from sva_bench.batch.answers import Caps
@@ -195,6 +198,7 @@ def _run(
         from sva_bench.batch.engines import LocalProcesses
         from sva_bench.batch.folder import units_in
         from sva_bench.batch.run import run_batch
+        from sva_bench.batch.tables import write_tables
         from sva_bench.live import print_batch, watching
         from sva_bench.workers import count_of
 
@@ -225,6 +229,8 @@ def _run(
         done = len(units_in(folder) & set(grid.units()))
         raise Interrupted(f"interrupted: {done} of {len(grid.units())} units are done and kept in {folder}; the same "
                           "command goes on with --resume") from None
+    if as_csv:
+        write_tables(folder, summary)
     if as_json:
         print_json(summary)
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import fcntl
 import json
 import os
@@ -197,7 +198,7 @@ def test_shards_have_the_columns_of_a_run_and_their_world_seed_and_variant(tmp_p
     world = posted(tmp_path, "small", 1)
     done = sva_bench("batch", world, "--set", "robots.uv2.fuel_capacity_s=50,60", "--seed", "3-4", "--trials", 10,
                      "--scenario", "half", "--fidelity", "kinematic", "--workers", 1, "--cache", cache, "--out", "out",
-                     "--json", cwd=tmp_path)
+                     "--json", "--csv", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["variants"] == ["robots.uv2.fuel_capacity_s=50", "robots.uv2.fuel_capacity_s=60"]
@@ -210,6 +211,12 @@ def test_shards_have_the_columns_of_a_run_and_their_world_seed_and_variant(tmp_p
         "end", "end_time_s", "fuel_used_s", "fidelity", "world", "seed", "variant"]
     assert set(table["seed"].to_pylist()) < {3, 4}
     assert table.schema.field("end_time_s").metadata == {b"unit": b"s"}
+    with (tmp_path / "out" / "maps.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["world"], row["variant"], row["scenario"], float(row["vss"])) for row in rows] == [
+        (row["world"], row["variant"], row["scenario"], row["vss"]["mean"]) for row in summary["maps"]]
+    with (tmp_path / "out" / "aggregate.csv").open(newline="", encoding="utf-8") as file:
+        assert [(int(row["maps"]), row["vss_low"]) for row in csv.DictReader(file)] == [(1, ""), (1, "")]
 
 
 @pytest.mark.long
