@@ -42,7 +42,10 @@ def run_command_line(arguments: Sequence[str]) -> int:
         messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return int(error.exit_code)
     except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
-        error.message = error.message.replace("Value error, ", "").replace("Input should be", "it should be")
+        if error.__cause__ is not None and type(error.__cause__).__name__ == "ValidationError":
+            from sva_bench.complaints import of_an_option
+
+            error.message = of_an_option(error.__cause__)  # type: ignore[arg-type]
         getattr(error, "show", error.format_message)()
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):

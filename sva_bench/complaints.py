@@ -34,13 +34,30 @@ def first_complaint(data: Any, schema: type[BaseModel], error: ValidationError) 
     if detail["type"] == "string_pattern_mismatch":
         name = shown(detail["input"])
         return loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit"
-    message = _PLAINLY.get(detail["type"], detail["msg"]).removeprefix("Value error, ").format(
-        **detail.get("ctx", {}) if detail["type"] in _PLAINLY else {})
+    message = _plainly(detail)
     found = detail["input"]
     also = f", found {shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
     if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
         also = f", found the text {shown(found)}" + (": take the quotes away" if _numeric(found) else "")
     return loc, message[:1].lower() + message[1:] + also
+
+
+def of_an_option(error: ValidationError) -> str:
+    """What is wrong with the value of an option, and the value."""
+    detail = error.errors()[0]
+    message = _plainly(detail)
+    found = str(detail["input"])
+    if detail["type"] == "value_error":  # ours or typer's, which say the value
+        return message
+    return f"{message}, found {found if found.isalnum() else shown(found)}"
+
+
+def _plainly(detail: Any) -> str:
+    kind = detail["type"]
+    if kind in _PLAINLY:
+        return _PLAINLY[kind].format(**detail.get("ctx", {}))
+    said: str = detail["msg"]
+    return said.removeprefix("Value error, ")
 
 
 def _numeric(text: str) -> bool:
@@ -58,6 +75,8 @@ _PLAINLY = {  # what pydantic says of its own types, said of the file
     "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
     "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",
     "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
+    "float_parsing": "expected a number", "int_parsing": "expected a whole number",
+    "int_from_float": "expected a whole number",
 }
 
 

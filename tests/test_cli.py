@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -14,6 +15,8 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from sva_bench.__main__ import run_command_line
+from sva_bench.terminal import set_up_logging
 from tests.worlds_for_tests import SMALL
 
 QUIET = SMALL.replace("wheel_gain_sd: 0.01", "wheel_gain_sd: 0.0")
@@ -286,3 +289,22 @@ def test_ctrl_c_ends_a_run_with_130_and_leaves_nothing_half_written(after_s: flo
     assert "Traceback" not in said
     assert "interrupted" in said
     assert not list(tmp_path.glob("runs/*"))
+
+
+@pytest.mark.parametrize(("arguments", "says"), [
+    (("run", "w.yaml", "--planner", "rrtstar"), "'--planner': 'rrtstar' is not one of 'prmstar'"),
+    (("world", "random", "--pois", "0"), "'--pois': expected at least 4, found 0"),
+    (("world", "random", "--pois", "many"), "'--pois': expected a whole number, found many"),
+    (("world", "random", "--density", "2"), "'--density': expected at most 1.0, found 2"),
+])
+def test_what_is_wrong_with_an_option_is_said_with_its_value(
+    arguments: tuple[str, ...], says: str, capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run_command_line(arguments) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_warnings_are_one_line_each_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:
+    set_up_logging(verbose=False)
+    logging.getLogger("sva_bench.test").warning("a %s warning", "long " * 40)
+    assert capsys.readouterr().err == f"WARNING a {'long ' * 40} warning\n"

@@ -281,10 +281,12 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
             line.set_position(tuple(back((x, top - box.height / 2)).tolist()))
             top -= box.height
     nearest = np.clip(at, centres - sizes / 2, centres + sizes / 2)
-    for place, here, apart in zip(at, nearest, np.hypot(*(nearest - at).T) - radii, strict=True):
+    apart_px = np.hypot(*(nearest - at).T) - radii
+    for site, place, here, apart in zip(world.sites, at, nearest, apart_px, strict=True):
         if apart > _LEADER:
             ends = back(np.stack([place, here]))
-            axes.plot(ends[:, 0], ends[:, 1], color="black", linewidth=0.6, zorder=6, path_effects=[_HALO])
+            axes.plot(ends[:, 0], ends[:, 1], color="black", linewidth=0.6, zorder=6, path_effects=[_HALO],
+                      gid=f"leader-{site.name}")
 
 
 def _earned(world: World, poi: str) -> list[str]:

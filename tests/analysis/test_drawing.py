@@ -161,6 +161,26 @@ def test_labels_stay_inside_the_frame_in_a_corner() -> None:
     assert (centres - [20, 10] >= 0).all()
 
 
+def test_a_label_does_not_end_beside_the_marker_of_another() -> None:
+    # Between two markers there is just room for the label of the first, above or below there is plenty.
+    nothing = np.empty((0, 2))
+    at, sizes = np.array([[100.0, 100.0], [200.0, 100.0]]), np.array([[70.0, 20.0], [20.0, 10.0]])
+    centres = place_labels(at, sizes, radii=np.array([5.0, 5.0]), frame=np.array([60.0, 0.0, 300.0, 200.0]),
+                           lines=nothing, solid=nothing)
+    own, other = np.hypot(*(np.clip(at, centres[0] - sizes[0] / 2, centres[0] + sizes[0] / 2) - at).T)
+    assert own < other
+
+
+def test_a_label_that_had_to_go_away_is_joined_to_its_marker_by_a_line(small: World) -> None:
+    # A path around the only site, where a label beside it would begin: farther off there is room.
+    angles = np.linspace(0, 2 * np.pi, 60)
+    around = np.array([1.5, 1.5]) + 0.15 * np.column_stack([np.cos(angles), np.sin(angles)])
+    alone = replace(small, sites=(replace(small.sites[0], x_m=1.5, y_m=1.5),), obstacles=Obstacles(
+        bounds_m=small.obstacles.bounds_m, boxes=np.empty((0, 5)), cylinders=np.empty((0, 3))))
+    assert b'id="leader-' not in draw_world(alone, "svg", Overlays())
+    assert b'id="leader-base"' in draw_world(alone, "svg", Overlays(paths=(around,)))
+
+
 def test_the_command_draws_a_plan_and_leaves_nothing_half_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str],
 ) -> None:
