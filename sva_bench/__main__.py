@@ -42,10 +42,12 @@ def run_command_line(arguments: Sequence[str]) -> int:
         messages.print(f"[bold red]error:[/bold red] {escape(str(error))}", highlight=False, soft_wrap=True)
         return int(error.exit_code)
     except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
-        if error.__cause__ is not None and type(error.__cause__).__name__ == "ValidationError":
-            from sva_bench.complaints import of_an_option
+        from pydantic import ValidationError  # --help should not wait for it
 
-            error.message = of_an_option(error.__cause__)  # type: ignore[arg-type]
+        from sva_bench.complaints import of_an_option
+
+        if isinstance(error.__cause__, ValidationError):
+            error.message = of_an_option(error.__cause__)
         getattr(error, "show", error.format_message)()
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):

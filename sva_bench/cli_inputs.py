@@ -126,6 +126,7 @@ def make_world_from_map(
         raise BadInput("--cell-m belongs to MovingAI maps; a ROS map says its resolution")
     if base is not None and not all(map(math.isfinite, base)):
         raise BadInput("--base: expected two finite numbers")
+    check_output(output, source)
     with progress_bars() as progress:
         text, files = world_from_map(
             source, output, base=base, pois=pois, stations=stations, robots=robots, seed=seed, spacing_m=min_spacing,

@@ -116,27 +116,27 @@ def plan(
             from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
 
         progress("solving", 0, 1)
-        limits = SolveLimits(time_limit_s=time_limit, gap=gap)
+        limits, cuts_used = SolveLimits(time_limit_s=time_limit, gap=gap), cuts or "single"
         if risk is not None:
+            told = {"weight": weight, "beta": beta, "target": target}
             made = plan_averse(instance, RiskMeasure(
-                kind=risk, weight=1.0 if weight is None else weight, beta=0.9 if beta is None else beta,
-                target=target or 0.0), limits)
+                kind=risk, **{name: value for name, value in told.items() if value is not None}), limits)
         elif objective == "stochastic":
-            made = plan_stochastic(instance, limits, method=method, cuts=cuts or "single")
+            made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
         else:
             stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
-                                         cuts=cuts or "single")
-            made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts or "single").plan
+                                         cuts=cuts_used)
+            made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
         progress("solving", 1, 1)
     write_result(output, pretty_json(plan_as_dict(made)))
     assert made.value is not None
     assert made.bound is not None
     gap_left = (made.bound - made.value) / max(1.0, abs(made.value))  # as --gap counts it
-    told = (f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, relative gap {gap_left:.2g}, "
-            f"{made.runtime_s:.2f} s")
+    outcome = (f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, relative gap {gap_left:.2g}, "
+               f"{made.runtime_s:.2f} s")
     if made.status == "interrupted":
-        raise Interrupted(told)
-    messages.print(told, highlight=False)
+        raise Interrupted(outcome)
+    messages.print(outcome, highlight=False)
 
 
 def certify(

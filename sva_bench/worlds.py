@@ -99,10 +99,6 @@ def world_from_map(
     name = target.stem
     if source.suffix.lower() not in (".yaml", ".yml", ".map"):
         raise BadInput(f"{source}: a map is the YAML file of a ROS map, or a MovingAI map whose name ends in .map")
-    if source.resolve() == target.resolve():
-        raise BadInput(f"{target}: this is the map itself; choose another name with -o")
-    if not target.parent.is_dir():
-        raise BadInput(f"{target}: there is no such folder; choose another place with -o")
     if not re.fullmatch(NAME, name):
         raise BadInput(f"{target}: the world is named after its file, and {name!r} is no valid name; use up to 64 "
                        "letters, digits, '_', '.', '-', the first a letter or digit")

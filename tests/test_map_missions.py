@@ -75,7 +75,7 @@ def test_the_base_may_be_chosen(tmp_path: Path) -> None:
     (("map.yaml", "--base", "0.1", "0.1", "-o", "w.yaml"), "there is no room at the base"),
     (("gone.yaml", "-o", "w.yaml"), "no such file"),
     (("map.pgm", "-o", "w.yaml"), "a map is the YAML file of a ROS map"),
-    (("map.yaml", "-o", "map.yaml"), "this is the map itself"),
+    (("map.yaml", "-o", "map.yaml"), "this is what is read"),
     (("map.yaml", "-o", "gone/w.yaml"), "there is no such folder"),
     (("map.yaml", "-o", "a b.yaml"), "the world is named after its file"),
     (("map.yaml", "--cell-m", "2", "-o", "w.yaml"), "--cell-m belongs to MovingAI maps"),

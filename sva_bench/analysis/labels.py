@@ -50,8 +50,8 @@ def place_labels(
         others = np.delete(np.arange(n), k)
         markers = np.concatenate([at[others] - radii[others, None], at[others] + radii[others, None]], axis=1)
         cost = cost + _COSTS["marker"] * _overlap(boxes, markers).sum(axis=1) / np.prod(sizes[k]) * 10
-        nearest = distances(boxes, at[others]).min(axis=1, initial=np.inf)
-        own = distances(boxes, at[k:k + 1])[:, 0]
+        nearest = _distances(boxes, at[others]).min(axis=1, initial=np.inf)
+        own = _distances(boxes, at[k:k + 1])[:, 0]
         cost = cost + _COSTS["astray"] * np.clip((own + _PLAINLY - nearest) / _PLAINLY, 0.0, 1.0)
         for kind, points in (("line", lines), ("solid", solid)):
             cost = cost + _COSTS[kind] * np.minimum(_inside(boxes, points), _MOST_POINTS[kind])
@@ -71,7 +71,7 @@ def place_labels(
     return np.array([options[k][chosen[k]] for k in range(n)]).reshape(n, 2)
 
 
-def distances(boxes: FloatArray, points: FloatArray) -> FloatArray:
+def _distances(boxes: FloatArray, points: FloatArray) -> FloatArray:
     """Distance of each point from each box (x0, y0, x1, y1), shape (len(boxes), len(points)); 0 inside."""
     outside = np.maximum(np.maximum(boxes[:, None, :2] - points[None], points[None] - boxes[:, None, 2:]), 0.0)
     return np.hypot(outside[..., 0], outside[..., 1])

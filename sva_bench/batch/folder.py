@@ -74,7 +74,8 @@ def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
     try:
         held = [path for path in folder.iterdir() if path.suffix != ".tmp"]
         manifest = folder / "manifest.json"
-        if not resume and held == [manifest] and settings_in(folder):
+        if not resume and manifest in held and not units_in(folder) and settings_in(folder) \
+                and not any((folder / name).exists() for name in ("failures.json", "summary.json")):
             held = []  # begun, but nothing was done
         if held and not resume:
             raise BadInput(f"{folder}: the folder isn't empty; go on with --resume, or choose another with --out")

@@ -16,7 +16,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from sva_bench.batch.folder import begin, settings_in, shard_path
+from sva_bench.batch.folder import begin, settings_in, shard_path, write_maps
 from sva_bench.errors import BadFile, BadInput
 from tests.test_batch import rows_of
 from tests.test_cli import sva_bench
@@ -97,6 +97,7 @@ def test_worlds_that_crash_or_hang_the_physics_are_named_and_the_rest_goes_on(
 
 def test_a_batch_that_did_nothing_yet_is_in_nobodys_way(tmp_path: Path) -> None:
     begin(tmp_path, {"trials": 10}, resume=False)
+    write_maps(tmp_path, {"maps-0/map.pgm": b"P5"})
     with pytest.raises(BadFile, match=r"settings\.trials"):
         begin(tmp_path, {"trials": 20}, resume=True)
     begin(tmp_path, {"trials": 20}, resume=False)
