@@ -93,4 +93,5 @@ def head(world: World, options: Options, settings: Settings, costs: Mapping[str,
 
 
 def by_stem(executed: list[Executed]) -> dict[str, Executed]:
+    """What was executed, by ``<scenario>-<planner>``, as plans and recordings are named."""
     return {f"{run.case.scenario.name}-{run.case.planner}": run for run in executed}
