@@ -7,8 +7,8 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sva_bench.analysis.figures import difference_figure, value_figure
 from sva_bench.analysis.statistics import estimate
-from sva_bench.analysis.summary import totals
 from sva_bench.execution.execute import Case, Drives, Settings, execute
 from sva_bench.mission.failures import FailureProcess
 from sva_bench.mission.instance import Instance
@@ -52,16 +52,16 @@ def cross_table(
         for scenario in world.scenarios:
             mine = plans[scenario.name]
             runs = {name: next(executed) for name, _, _ in _named(mine)}
-            right = totals(runs[f"stochastic for {process}"])
+            right = runs[f"stochastic for {process}"]
             truth = replace(mine.instance, failure=process)
             best = expected_value(truth, mine.stochastic[process])
             for name, made_for, plan in _named(mine):
                 run, noisy = runs[name], not world.noise.silent
-                loss = estimate(right - totals(run), run.rollout, noisy=noisy)
+                loss = estimate(difference_figure(right, run, noisy=noisy))
                 expected = expected_value(truth, plan)
                 rows[scenario.name].append({
                     "executed_under": process, "planner": name.split()[0], "planned_for": made_for,
-                    "expected": expected + 0.0, "executed": estimate(totals(run), run.rollout, noisy=noisy).as_dict(),
+                    "expected": expected + 0.0, "executed": estimate(value_figure(run, noisy=noisy)).as_dict(),
                     "loss_modelled": best - expected + 0.0,
                     "loss": {**loss.as_dict(), "distinguishable": loss.distinguishable,
                              "same_plan": plan.drives_like(mine.stochastic[process])}})

@@ -84,10 +84,12 @@ def put_together(parts: Sequence[Executed], robots: Sequence[str]) -> Executed:
     ends: IntArray = pick("end").astype(np.int64)
     available: BoolArray = there
     return Executed(
-        case=Case(scenario=first.case.scenario, planner=INFORMED, plan=first.case.plan), rollout=first.rollout,
-        available=available, incentive=pick("incentive"), pois_reached=pick("pois_reached").astype(np.int64),
-        stops_reached=pick("stops_reached").astype(np.int64), end=ends, end_time_s=pick("end_time_s"),
+        case=Case(scenario=first.case.scenario, planner=INFORMED, plan=first.case.plan), robots=first.robots,
+        rollout=first.rollout, available=available, incentive=pick("incentive"),
+        pois_reached=pick("pois_reached").astype(np.int64), stops_reached=pick("stops_reached").astype(np.int64),
+        end=ends, end_time_s=pick("end_time_s"),
         fuel_used_s=pick("fuel_used_s"), planned_incentive=planned, drawn_incentive=pick("drawn_incentive"),
+        margins=tuple({(margin.robot, margin.route): margin for part in parts for margin in part.margins}.values()),
         legs=tuple(dict.fromkeys(leg for k in sorted(set(chosen.tolist())) for leg in parts[k].legs)),
         traces=first.traces)
 

@@ -108,9 +108,8 @@ def print_batch(summary: Any, console: Console | None = None) -> None:
             table.add_section()
         name = [row["world"], *([Text(row["variant"])] if varied else [])]
         plans = means[row["variant"], row["world"], row["scenario"]]
-        told = row["vss"] if row["seeds"] == 1 else row["vss"] | {"distinguishable": True}
         table.add_row(*(name if this != before else [""] * len(name)), row["scenario"],
-                      *(f"{mean:.1f}" for mean in plans), verdict(_distinguished(told)),
+                      *(f"{mean:.1f}" for mean in plans), verdict(_distinguished(row["vss"])),
                       "" if row["vss_pct"] is None else f"{row['vss_pct']:.1f}")
         before = this
     console.print(table)

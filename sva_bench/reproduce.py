@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.statistics import estimate
+from sva_bench.analysis.figures import difference_figure
+from sva_bench.analysis.statistics import estimate, sample_mean
 from sva_bench.analysis.summary import totals
 from sva_bench.analysis.wording import per_cent, verdict, with_interval
 from sva_bench.errors import BadInput
@@ -136,7 +137,7 @@ def simulation(
                                 lambda done, of: progress("driving routes", done, of), drives))
             for scenario in world.scenarios:
                 s, d = next(runs), next(runs)
-                vss = estimate(totals(s) - totals(d), s.rollout, noisy=not world.noise.silent)
+                vss = estimate(difference_figure(s, d, noisy=not world.noise.silent))
                 mean = float(totals(s).mean())
                 found[scenario.name][process] = {
                     "stochastic": mean, "deterministic": float(totals(d).mean()),
@@ -189,7 +190,7 @@ def simulation_page(rows: Sequence[Mapping[str, Any]], settings: Settings) -> st
 def _over_maps(shares: Sequence[float]) -> str:
     if not shares:
         return ""
-    return with_interval(estimate(np.array(shares), np.arange(len(shares)), noisy=False).as_dict())
+    return with_interval(sample_mean(shares).as_dict())
 
 
 def runtimes(run: Callable[..., Any] = subprocess.run) -> int:

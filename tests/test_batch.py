@@ -75,7 +75,8 @@ def test_worlds_of_one_name_are_refused(tmp_path: Path) -> None:
 
 def test_vss_over_maps_takes_maps_as_the_sample() -> None:
     def unit(world: str, mean: float) -> dict[str, Any]:
-        return {"world": world, "scenarios": [{"name": "S", "vss": {"executed": {"mean": mean}, "executed_pct": None}}]}
+        return {"world": world, "scenarios": [{"name": "S", "availability": {"uv1": 0.5},
+                                               "vss": {"executed": {"mean": mean}, "executed_pct": None}}]}
 
     # Map a: mean of its seeds 1 and 3 is 2; map b: 6. Over maps: 4, sd sqrt(8), half-width 12.706 sqrt(8) / sqrt(2).
     (row,) = aggregate([unit("a", 1.0), unit("a", 3.0), unit("b", 6.0)])
@@ -86,13 +87,16 @@ def test_vss_over_maps_takes_maps_as_the_sample() -> None:
 
 
 def test_percentages_say_over_how_many_maps_they_are_where_one_collects_nothing() -> None:
-    def unit(world: str, share: float | None) -> dict[str, Any]:
-        return {"world": world, "scenarios": [{"name": "S", "vss": {"executed": {"mean": 1.0}, "executed_pct": share}}]}
+    def unit(world: str, share: float | None, availability: float = 0.5) -> dict[str, Any]:
+        return {"world": world, "scenarios": [{"name": "S", "availability": {"uv1": availability},
+                                               "vss": {"executed": {"mean": 1.0}, "executed_pct": share}}]}
 
     (row,) = aggregate([unit("a", 9.5), unit("b", None)])
     assert (row["maps"], row["vss_pct"]) == (2, {"mean": 9.5, "ci95": None, "maps": 1})
     (row,) = aggregate([unit("a", 9.5), unit("b", 9.5)])
-    assert row["vss_pct"] == {"mean": 9.5, "ci95": [9.5, 9.5]}
+    assert row["vss_pct"] == {"mean": 9.5, "ci95": None}  # maps that agree don't tell how maps differ
+    (row,) = aggregate([unit("a", 0.0, 1.0), unit("b", 0.0, 1.0)])
+    assert row["vss_pct"] == {"mean": 0.0, "ci95": [0.0, 0.0]}  # no robot fails: both plans are the same anywhere
 
 
 def plan_file(folder: Path, name: str, routes: dict[str, list[str]]) -> Path:

@@ -293,11 +293,11 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
 
 def _over_maps(rows: Sequence[Mapping[str, Any]]) -> str:
     """What a batch comes to, in one sentence."""
-    if rows and all(row["vss"]["ci95"] is None for row in rows):
+    if rows and all(row["maps"] == 1 for row in rows):
         return "One map can't tell what planning for failures is worth over maps; below is its worth on this one."
+    # The interval that is shown is the one that the verdict rests on.
     sure = [row for row in rows if row["vss"]["ci95"] is not None and row["vss"]["ci95"][0] > 0]
-    pays = [_labelled(row["scenario"], row["variant"]) + (
-        "" if row["vss_pct"]["mean"] is None else f" (VSS {with_interval(row['vss_pct'], unit=' %')})") for row in sure]
+    pays = [f"{_labelled(row['scenario'], row['variant'])} (VSS {with_interval(row['vss'])})" for row in sure]
     return f"Over these maps planning for failures pays in {listed(pays)}." if pays else \
         "Over these maps no scenario shows a value of planning for failures beyond doubt."
 

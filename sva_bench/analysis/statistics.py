@@ -1,20 +1,24 @@
-"""Means, shares and tails with intervals, paired and clustered by rollout."""
+"""Means, shares and tails with intervals: exact where outcomes are rare, paired, and clustered by noise draw."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import beta
 from scipy.stats import t as student_t
 
-from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.analysis.moments import Bounds, Figure
+from sva_bench.arrays import FloatArray
 
 CONFIDENCE = 0.95
 WORST = 0.1
 """Share of the trials whose mean is reported as the tail (CVaR)."""
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_SPREADLESS = 1e-12  # relative to the bounds: rounding of sums, not spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,92 +43,134 @@ class Estimate:
         return {"mean": self.mean + 0.0, "ci95": None if self.interval is None else [x + 0.0 for x in self.interval]}
 
 
-def estimate(values: FloatArray, rollout: IntArray, *, noisy: bool, comparisons: int = 1) -> Estimate:
+def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
     """Mean of trials that share noise draws, with its interval.
 
-    Trials of one rollout share its noise, so the rollouts are the sample: the interval has K - 1 degrees of freedom.
-    Without noise the trials are independent and are the sample themselves.
+    Failures vary from trial to trial and noise from draw to draw, so each part has an interval of its own sample, and
+    the two are put together: as far as the drawn part may be below its mean and noise may have taken more than it did,
+    the mean may be too high.
 
     Args:
-        values: One figure per trial, or a difference of two plans that met the same failures, shape (trials,).
-        rollout: Noise draw of each trial, shape (trials,).
-        noisy: Whether rollouts differ.
+        figure: The figure, or a difference of two plans that met the same failures.
         comparisons: How many intervals are to hold together with 95 %; each is widened accordingly.
 
     Source:
-        Cluster-robust variance of a mean: Cameron & Miller (2015), A Practitioner's Guide to Cluster-Robust
-        Inference, with the factor K / (K - 1). Several at a time: Bonferroni's inequality, whatever they share.
+        Two parts together: Zou & Donner (2008), Construction of Confidence Limits about Effect Measures (MOVER).
+        Several intervals at a time: Bonferroni's inequality, whatever they share.
     """
-    mean = float(np.mean(values))
-    variance, count = _variance(values, rollout, noisy=noisy)
-    if count < 2:
-        return Estimate(mean=mean, interval=None)
-    half = _quantile(count - 1, comparisons) * math.sqrt(variance)
-    return Estimate(mean=mean, interval=(mean - half, mean + half))
+    drawn, taken = _drawn_interval(figure, comparisons), _taken_interval(figure, comparisons)
+    if drawn is None or taken is None:
+        return Estimate(mean=figure.mean, interval=None)
+    middle, lost = figure.drawn.mean, figure.mean_taken
+    below = math.hypot(middle - drawn[0], max(taken[1] - lost, 0.0))
+    above = math.hypot(drawn[1] - middle, max(lost - taken[0], 0.0))
+    return Estimate(mean=figure.mean, interval=(figure.mean - below, figure.mean + above))
 
 
-def controlled(
-    values: FloatArray, control: FloatArray, expected: float, rollout: IntArray, *, noisy: bool,
-) -> Estimate:
-    """Mean of trials, told apart from the luck of the draw by a figure whose expectation is known.
+def controlled(figure: Figure, expected: float) -> Estimate:
+    """Mean of trials, free of the luck of the draw: what the failures leave has a closed form, what noise took is left.
 
-    The control is what the failures drawn would have left had nothing else gone wrong; its expectation is a plan's
-    closed form. What the trials owe to draws better or worse than that is taken out by a fitted slope, which costs
-    one degree of freedom. Where everything went as drawn, the closed form itself is left, with no interval to speak of.
+    Without noise all is as the rules have it, and what a robot loses to them is a matter of the draw: then only the
+    plain mean is known, and is given.
 
     Args:
-        values: One figure per trial, shape (trials,).
-        control: The control of each trial, shape (trials,).
-        expected: Its expectation.
-        rollout: Noise draw of each trial, shape (trials,).
-        noisy: Whether rollouts differ.
+        figure: The figure.
+        expected: The expectation of its drawn part.
 
     Source:
-        Control variates with a fitted coefficient: Lavenberg & Welch (1981), A Perspective on the Use of Control
-        Variables; the bias of the fit is of the order of 1 / trials.
+        A control variate with the slope of 1, which is right where noise takes nothing: Lavenberg & Welch (1981).
     """
-    about = control - np.mean(control)
-    spread = float(about @ about)
-    scale = max(1.0, float(np.abs(control).max(initial=0.0)))
-    if spread <= (1e-9 * scale) ** 2 * len(values):  # nothing drawn, nothing to take out: the slope is that of luck
-        slope, freedom = 1.0, 1
-    else:
-        slope, freedom = float(about @ (values - np.mean(values))) / spread, 2
-    adjusted = values - slope * (control - expected)
-    mean = float(np.mean(adjusted))
-    variance, count = _variance(adjusted, rollout, noisy=noisy)
-    if count <= freedom:
+    taken = _taken_interval(figure, 1)
+    if not len(figure.taken.counts):
+        return estimate(figure)
+    mean = expected - figure.mean_taken
+    if taken is None:
         return Estimate(mean=mean, interval=None)
-    half = _quantile(count - freedom) * math.sqrt(variance)
-    return Estimate(mean=mean, interval=(mean - half, mean + half))
+    return Estimate(mean=mean, interval=(min(mean, expected - taken[1]), max(mean, expected - taken[0])))
 
 
-def share(happened: FloatArray, rollout: IntArray, *, noisy: bool) -> Estimate:
-    """Share of trials in which something happened, with Wilson's interval.
+def _drawn_interval(figure: Figure, comparisons: int) -> tuple[float, float] | None:
+    drawn = figure.drawn
+    if drawn.count < 2:
+        return None
+    return bounded_mean(drawn.count, drawn.mean, drawn.squares, figure.drawn_bounds, comparisons=comparisons)
 
-    Trials that share their noise count for less: the sample size is that at which independent trials would vary as
-    much as these do. Where all trials agree that can't be seen, and the rollouts are taken as the sample.
+
+def _taken_interval(figure: Figure, comparisons: int) -> tuple[float, float] | None:
+    """Interval of what noise takes on average: its sample are the draws."""
+    if not len(figure.taken.counts):
+        return 0.0, 0.0
+    means = figure.taken.means
+    if len(means) < 2:
+        return None
+    mean = float(np.mean(means))
+    return bounded_mean(len(means), mean, float(np.sum((means - mean) ** 2)), figure.taken_bounds,
+                        comparisons=comparisons, seen=(float(means.min()), float(means.max())))
+
+
+def bounded_mean(
+    count: int, mean: float, squares: float, bounds: Bounds, *, comparisons: int = 1, seen: Bounds | None = None,
+) -> tuple[float, float]:
+    """Interval of the mean of independent observations that can't lie outside known bounds.
+
+    To each side, one more observation is put on the bound, and the observations are weighted at random as a Bayesian
+    bootstrap does; the weighted mean's distribution is that of a beta with its moments. For a share it is exactly
+    Clopper and Pearson's interval, so what was not seen in ``n`` observations may have a share of about 3 / n; for many
+    observations it is the normal interval.
 
     Args:
-        happened: 1 where it happened, else 0, shape (trials,).
-        rollout: Noise draw of each trial, shape (trials,).
-        noisy: Whether rollouts differ.
+        count: Number of observations, at least 1.
+        mean: Their mean.
+        squares: Sum of their squares about it.
+        bounds: The least and the greatest that one can be.
+        comparisons: How many intervals are to hold together.
+        seen: The least and the greatest observation, where the bounds might be too tight for them.
 
     Source:
-        Wilson (1927); for clusters with their effective sample size and t: Dean & Pagano (2015), Evaluating
-        Confidence Interval Methods for Binomial Proportions in Clustered Surveys.
+        Gaffke (2005), Three test statistics for a nonparametric one-sided hypothesis on the mean of a nonnegative
+        variable; Phan, Thomas & Learned-Miller (2021), Towards Practical Mean Bounds for Small Samples; Clopper &
+        Pearson (1934).
     """
-    p = float(np.mean(happened))
-    variance, count = _variance(happened, rollout, noisy=noisy)
-    if count < 2:
-        return Estimate(mean=p, interval=None)
-    trials = float(len(happened))
-    size = float(count) if p in (0.0, 1.0) else min(trials, p * (1 - p) / variance if variance > 0 else trials)
-    z2 = _quantile(count - 1) ** 2
-    middle = (p + z2 / (2 * size)) / (1 + z2 / size)
-    half = math.sqrt(z2 * (p * (1 - p) + z2 / (4 * size)) / size) / (1 + z2 / size)
-    return Estimate(mean=p, interval=(0.0 if p == 0 else max(0.0, middle - half),
-                                      1.0 if p == 1 else min(1.0, middle + half)))
+    low, high = bounds if seen is None else (min(bounds[0], seen[0]), max(bounds[1], seen[1]))
+    low, high = min(low, mean), max(high, mean)
+    if high - low <= _SPREADLESS * max(abs(low), abs(high)):
+        return mean, mean
+    tail = (1 - CONFIDENCE) / (2 * comparisons)
+    share = (mean - low) / (high - low)
+    spread = min(squares / (high - low) ** 2, count * share * (1 - share))  # no more fits between the bounds
+    upper = _upper(count, share, spread, tail)
+    lower = 1 - _upper(count, 1 - share, spread, tail)
+    return low + (high - low) * lower, low + (high - low) * upper
+
+
+def _upper(count: int, mean: float, squares: float, tail: float) -> float:
+    """Upper limit of a mean of observations between 0 and 1."""
+    total, second = count * mean, squares + count * mean**2
+    middle = (total + 1) / (count + 1)
+    variance = ((second + 1) / (count + 1) - middle**2) / (count + 2)
+    if middle >= 1 or variance <= 0:
+        return 1.0
+    size = middle * (1 - middle) / variance - 1
+    return float(beta.ppf(1 - tail, middle * size, (1 - middle) * size))
+
+
+def sample_mean(values: Sequence[float]) -> Estimate:
+    """Mean of a sample of anything, such as maps, with its interval; none from fewer than two, or if all are alike.
+
+    Student's t is too narrow where most maps show nothing and a few show much, so the interval is widened to that of
+    observations which could lie beyond those met by their range over the square root of their number.
+    """
+    if not len(values):
+        raise ValueError("no sample, no mean")
+    sample = np.asarray(values, dtype=np.float64)
+    mean, count = float(np.mean(sample)), len(sample)
+    beyond = float(np.ptp(sample)) / math.sqrt(count)
+    if count < 2 or beyond <= _SPREADLESS * abs(mean):
+        return Estimate(mean=mean, interval=None)
+    squares = float(np.sum((sample - mean) ** 2))
+    half = float(student_t.ppf(0.5 + CONFIDENCE / 2, count - 1)) * math.sqrt(squares / (count - 1) / count)
+    low, high = bounded_mean(count, mean, squares, (float(sample.min()) - beyond, float(sample.max()) + beyond))
+    return Estimate(mean=mean, interval=(min(low, mean - half), max(high, mean + half)))
 
 
 def distribution(values: FloatArray) -> dict[str, float]:
@@ -147,19 +193,3 @@ def tail_mean(values: FloatArray, worst: float) -> float:
     ordered = np.sort(values)
     weights = np.clip(worst * len(values) - np.arange(len(values)), 0.0, 1.0)
     return float(weights @ ordered / weights.sum()) + 0.0
-
-
-def _variance(values: FloatArray, rollout: IntArray, *, noisy: bool) -> tuple[float, int]:
-    """Variance of the mean, and the number of clusters behind it; nothing to speak of for one."""
-    if not noisy:
-        count = len(values)
-        return (float(np.var(values, ddof=1)) / count if count > 1 else math.inf), count
-    count = len(np.unique(rollout))
-    if count < 2:
-        return math.inf, count
-    sums = np.bincount(rollout, weights=values - np.mean(values))
-    return count / (count - 1) * float(sums @ sums) / len(values) ** 2, count
-
-
-def _quantile(freedom: int, comparisons: int = 1) -> float:
-    return float(student_t.ppf(1 - (1 - CONFIDENCE) / (2 * comparisons), freedom))

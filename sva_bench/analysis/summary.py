@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.statistics import Estimate, controlled, distribution, estimate, share
-from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.analysis.figures import difference_figure, end_figures, value_figure
+from sva_bench.analysis.moments import Figure
+from sva_bench.analysis.statistics import Estimate, controlled, distribution, estimate
+from sva_bench.analysis.unseen import UNHAPPY
+from sva_bench.arrays import FloatArray
 from sva_bench.execution.execute import Executed
-from sva_bench.execution.outcome import ENDS, End
+from sva_bench.execution.outcome import ENDS
 from sva_bench.mission.plan import Plan
-
-UNHAPPY: tuple[End, ...] = ("out_of_fuel", "late", "stuck")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,12 +61,10 @@ class ScenarioResult:
 def scenario_summary(result: ScenarioResult, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
     """One entry of ``scenarios`` in ``summary.json``."""
     s, d = result.stochastic, result.deterministic
-    scenario, rollout = s.executed.case.scenario, s.executed.rollout
-    earned = totals(s.executed)
-    difference = estimate(earned - totals(d.executed), rollout, noisy=noisy)
-    sharper = controlled(earned - totals(d.executed), _drawn(s.executed) - _drawn(d.executed), s.expected - d.expected,
-                         rollout, noisy=noisy)
-    ends = [difference.mean, *([float(np.mean(earned - totals(result.worst)))] if result.worst else [])]
+    scenario = s.executed.case.scenario
+    beyond = difference_figure(s.executed, d.executed, noisy=noisy)
+    difference, sharper = estimate(beyond), controlled(beyond, s.expected - d.expected)
+    ends = [difference.mean, *([float(np.mean(totals(s.executed) - totals(result.worst)))] if result.worst else [])]
     entry = scenario_entry(
         scenario.name, {name: scenario.availability[name] for name in robots},
         {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy)
@@ -123,7 +122,7 @@ def scenario_entry(
 
 def _beyond(informed: Judged, stochastic: Judged, *, noisy: bool) -> dict[str, Any]:
     """What knowing beforehand was worth, in the same trials."""
-    found = estimate(totals(informed.executed) - totals(stochastic.executed), stochastic.executed.rollout, noisy=noisy)
+    found = estimate(difference_figure(informed.executed, stochastic.executed, noisy=noisy))
     return {**found.as_dict(), "distinguishable": found.distinguishable,
             "verdict": verdict_of(found, "informed", "stochastic")}
 
@@ -148,9 +147,8 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
     comparisons = []
     pairs = list(combinations(plans, 2))
     for a, b in pairs:
-        trials = totals(a.executed) - totals(b.executed)
-        difference = estimate(trials, a.executed.rollout, noisy=noisy)
-        together = estimate(trials, a.executed.rollout, noisy=noisy, comparisons=len(pairs))
+        beyond = difference_figure(a.executed, b.executed, noisy=noisy)
+        difference, together = estimate(beyond), estimate(beyond, comparisons=len(pairs))
         names = a.executed.case.planner, b.executed.case.planner
         same = a.executed.case.plan.drives_like(b.executed.case.plan)
         comparisons.append({"a": names[0], "b": names[1], **difference.as_dict(),
@@ -178,15 +176,15 @@ def ranking(means: Mapping[str, float], comparisons: Sequence[Mapping[str, Any]]
 def plan_summary(judged: Judged, robots: Sequence[str], *, noisy: bool) -> dict[str, Any]:
     """What one plan promised and what came of it."""
     run = judged.executed
-    earned = totals(run)
+    figure = value_figure(run, noisy=noisy)
     counts: dict[str, int] = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
     sharper = {
-        "executed_controlled": controlled(earned, _drawn(run), judged.expected, run.rollout, noisy=noisy).as_dict(),
-        "distribution": distribution(earned),
-        "end_shares": {name: {end: _share(run.end[:, k] == ENDS.index(end), run, noisy=noisy) for end in ENDS
+        "executed_controlled": controlled(figure, judged.expected).as_dict(),
+        "distribution": distribution(totals(run)),
+        "end_shares": {name: {end: _share(figure) for end, figure in end_figures(run, k, noisy=noisy).items()
                               if (run.end[:, k] == ENDS.index(end)).any()} for k, name in enumerate(robots)},
     }
-    return plan_entry(promise_of(run.case.plan, judged.expected), estimate(earned, run.rollout, noisy=noisy),
+    return plan_entry(promise_of(run.case.plan, judged.expected), estimate(figure),
                       {name: float(run.incentive[:, k].mean()) for k, name in enumerate(robots)}, counts,
                       {end: lost / len(run.end) for end, lost in charges(run).items()}, sharper)
 
@@ -257,14 +255,10 @@ def totals(run: Executed) -> FloatArray:
     return collected
 
 
-def _drawn(run: Executed) -> FloatArray:
-    drawn: FloatArray = run.drawn_incentive.sum(axis=1)
-    return drawn
-
-
-def _share(happened: BoolArray, run: Executed, *, noisy: bool) -> dict[str, Any]:
-    found = share(happened.astype(np.float64), run.rollout, noisy=noisy).as_dict()
-    return {"share": found["mean"], "ci95": found["ci95"]}
+def _share(figure: Figure) -> dict[str, Any]:
+    found = estimate(figure)
+    interval = None if found.interval is None else [min(max(x, 0.0), 1.0) for x in found.interval]
+    return {"share": found.mean, "ci95": interval}
 
 
 def _percent(part: float, whole: float) -> float | None:

@@ -45,8 +45,10 @@ def _share(scenario: Mapping[str, Any]) -> str:
 
 
 _MOST_NAMED = 6
-FEW = 5
-"""Samples (noise draws, maps) below which an interval wants a word of caution: Student's t is wide and shaky there."""
+FEW_MAPS = 5
+"""Maps below which an interval over them wants a word of caution: Student's t is wide and shaky there."""
+FEW_DRAWS = 16
+"""Noise draws below which an interval is mostly about draws that were not met."""
 VSS_PCT = "VSS in %: how much more the stochastic plan collects than the deterministic one, in per cent of the former."
 
 
@@ -89,9 +91,9 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
     if any(vss["executed_pct"] is not None for vss in compared):
         said.append(VSS_PCT)
     alike = all("vss" in s and s["vss"]["same_plan"] for s in summary["scenarios"])
-    if 1 < summary["rollouts"] < FEW and not alike:
-        said.append(f"Caution: the intervals rest on only {summary['rollouts']} noise draws; more of them "
-                    "(--rollouts) would make them surer.")
+    if 1 < summary["rollouts"] < FEW_DRAWS and not alike:
+        said.append(f"Caution: the intervals rest on only {summary['rollouts']} noise draws, and are wide where robots "
+                    "run short of fuel or time; more draws (--rollouts) make them narrower.")
     asked = summary.get("precision")
     if asked is not None:
         reached = "no interval" if asked["reached_pct"] is None else f"{asked['reached_pct']:.2g} %"
@@ -108,8 +110,8 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
 
 def over_few_maps(rows: Sequence[Mapping[str, Any]]) -> str:
     """A word of caution for the VSS over few maps; nothing where there are enough."""
-    fewest = min((row["maps"] for row in rows), default=FEW)
-    if fewest >= FEW:
+    fewest = min((row["maps"] for row in rows), default=FEW_MAPS)
+    if fewest >= FEW_MAPS:
         return ""
     if fewest == 1:
         return "From one map there is no interval over maps, however many seeds it has: nothing tells how maps differ."

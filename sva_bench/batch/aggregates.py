@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student_t
 
-from sva_bench.analysis.statistics import CONFIDENCE
+from sva_bench.analysis.moments import Figure, pooled
+from sva_bench.analysis.statistics import Estimate, estimate, sample_mean
 from sva_bench.batch.folder import Failure, shard_path
 from sva_bench.batch.grid import Grid
 from sva_bench.batch.shards import Note, read_note
@@ -24,19 +24,20 @@ def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failur
 
     Shards are joined in the order of the grid, whatever the order they were written in, so the sums are the same.
     """
-    entries = list(_entries(grid, folder, done))
+    notes = list(_notes(grid, folder, done))
+    entries = [entry_of(note) for note in notes]
     return {
         "format": KIND, "trials": grid.options.trials, "fidelity": grid.options.fidelity,
         "worlds": list(dict.fromkeys(point.world.name for point in grid.points)), "seeds": list(grid.seeds),
         "variants": list(dict.fromkeys(point.variant for point in grid.points)),
-        "units": entries, "maps": maps(entries), "aggregate": aggregate(entries),
+        "units": entries, "maps": maps(entries, over_seeds(notes)), "aggregate": aggregate(entries),
         "failed": [{"unit": f.unit, "world": f.world, "seed": f.seed, "reason": f.reason, "attempts": f.attempts}
                    for f in failures],
     }
 
 
-def _entries(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterator[dict[str, Any]]:
-    """A summary for each point and seed of which some trials are done."""
+def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterator[Note]:
+    """What is known of each point and seed of which some trials are done."""
     ranges = grid.ranges()
     for point, seed in grid.strands():
         together: Note | None = None
@@ -46,7 +47,7 @@ def _entries(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Itera
                 note = read_note(shard_path(folder, unit))
                 together = note if together is None else joined(together, note)
         if together is not None:
-            yield entry_of(together)
+            yield together
 
 
 def joined(a: Note, b: Note) -> Note:
@@ -67,31 +68,55 @@ def aggregate(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
     The interval is that of a mean over maps, each map's figure being the mean over its seeds. A map where the
     stochastic plan collects nothing has no percentage: then those are over fewer maps, and say over how many.
+    Where every robot is sure to be there, both plans are the same on any map; elsewhere maps that agree leave open
+    how maps differ, and there is no interval.
     """
+    sure = {(e.get("variant", ""), s["name"]) for e in entries for s in e["scenarios"]}
+    sure -= {(e.get("variant", ""), s["name"]) for e in entries for s in e["scenarios"]
+             if any(p < 1 for p in s["availability"].values())}
     rows = []
     for (variant, scenario), by_map in _figures(entries).items():
+        certain = (variant, scenario) in sure
         vss = [float(np.mean([mean for mean, _ in figures])) for figures in by_map.values()]
         shares = [[pct for _, pct in figures if pct is not None] for figures in by_map.values()]
         pcts = [float(np.mean(pct)) for pct in shares if pct]
-        rows.append({"variant": variant, "scenario": scenario, "maps": len(by_map), "vss": over(vss),
-                     "vss_pct": over(pcts) | ({} if len(pcts) == len(by_map) else {"maps": len(pcts)})})
+        rows.append({"variant": variant, "scenario": scenario, "maps": len(by_map),
+                     "vss": over(vss, sure=certain),
+                     "vss_pct": over(pcts, sure=certain) | ({} if len(pcts) == len(by_map) else {"maps": len(pcts)})})
     return rows
 
 
-def maps(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """VSS map by map: over its seeds where there are several, else over its trials."""
-    within = {(e.get("variant", ""), s["name"], e["world"]): s["vss"] for e in entries for s in e["scenarios"]}
+Key = tuple[str, str, str]
+"""A variant, a scenario, and a map's name."""
+
+
+def over_seeds(notes: Sequence[Note]) -> dict[Key, Estimate]:
+    """Executed VSS of each map over the trials of all its seeds: each has failures and noise draws of its own."""
+    together: dict[Key, Figure] = {}
+    for note in notes:
+        for scenario, tally in note.tallies.items():
+            key = note.variant, scenario, note.facts["world"]
+            together[key] = pooled(together[key], tally.difference) if key in together else tally.difference
+    return {key: estimate(figure) for key, figure in together.items()}
+
+
+def maps(entries: Sequence[Mapping[str, Any]], executed: Mapping[Key, Estimate]) -> list[dict[str, Any]]:
+    """VSS map by map.
+
+    Args:
+        entries: Summaries, a map and seed at a time.
+        executed: As ``over_seeds`` gives it.
+    """
     differing = {(e.get("variant", ""), s["name"], e["world"]) for e in entries for s in e["scenarios"]
                  if not s["vss"]["same_plan"]}
     rows = []
     for (variant, scenario), by_map in _figures(entries).items():
         for world, figures in by_map.items():
             key = variant, scenario, world
-            vss = dict(within[key]["executed"]) if len(figures) == 1 else over([mean for mean, _ in figures])
             pct = [share for _, share in figures if share is not None]
             rows.append({
                 "variant": variant, "world": world, "scenario": scenario, "seeds": len(figures),
-                "vss": vss | {"same_plan": key not in differing},
+                "vss": executed[key].as_dict() | {"same_plan": key not in differing},
                 "vss_pct": float(np.mean(pct)) if pct else None})
     order = {world: number for number, world in enumerate(dict.fromkeys(e["world"] for e in entries))}
     return sorted(rows, key=lambda row: (order[row["world"]], row["variant"]))
@@ -111,12 +136,10 @@ def _figures(entries: Sequence[Mapping[str, Any]]) -> Figures:
     return found
 
 
-def over(figures: Sequence[float]) -> dict[str, Any]:
-    """Mean of a sample, with its interval by Student's t."""
+def over(figures: Sequence[float], *, sure: bool) -> dict[str, Any]:
+    """Mean of a sample of maps, with its interval; ``sure`` where no map could have another figure."""
     if not figures:
         return {"mean": None, "ci95": None}
-    mean, n = float(np.mean(figures)), len(figures)
-    if n < 2:
-        return {"mean": mean + 0.0, "ci95": None}
-    half = float(student_t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * float(np.std(figures, ddof=1)) / n**0.5
-    return {"mean": mean + 0.0, "ci95": [mean - half, mean + half]}
+    found = sample_mean(figures).as_dict()
+    alike = sure and len(figures) > 1 and len(set(figures)) == 1
+    return {**found, "ci95": [found["mean"]] * 2} if alike else found

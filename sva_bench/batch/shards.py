@@ -61,9 +61,8 @@ def shard_of(world: World, variant: str, executed: Sequence[Executed], settings:
     """Rows and tally of trials, ready to be written."""
     robots = [robot.name for robot in world.robots]
     runs = {(run.case.scenario.name, run.case.planner): run for run in executed}
-    rollouts = 0 if world.noise.silent else settings.rollouts
     note = Note(facts=facts, variant=variant, robots=robots, first=settings.first, trials=settings.trials, tallies={
-        s.name: tally_of(runs[s.name, "stochastic"], runs[s.name, "deterministic"], rollouts)
+        s.name: tally_of(runs[s.name, "stochastic"], runs[s.name, "deterministic"], noisy=not world.noise.silent)
         for s in world.scenarios})
     words = {"facts": facts, "variant": variant, "robots": robots, "first": note.first, "trials": note.trials,
              "tallies": {name: tally_as_dict(tally) for name, tally in note.tallies.items()}}

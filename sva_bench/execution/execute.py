@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.outcome import ENDS, Assignment, Driven, Outcome, Trace, settle, trace_of
 from sva_bench.execution.simulator import Simulator, downsampled
 from sva_bench.mission.failures import NEVER, draw_failures
@@ -79,6 +80,7 @@ class Executed:
 
     Attributes:
         case: Plan and scenario.
+        robots: Names of the robots, in order.
         rollout: Noise draw of each trial, shape (trials,).
         available: Whether the robot was never drawn to fail.
         incentive: What it collected.
@@ -87,11 +89,13 @@ class Executed:
         end_time_s, fuel_used_s: When it ended, and on how much.
         planned_incentive: What each robot's route holds, shape (robots,).
         drawn_incentive: What the failures drawn would have left of that, had nothing else gone wrong.
+        margins: What fuel and time each route left under the draws that were driven; none of robots that stay home.
         legs: Every leg that was driven; none unless recorded.
         traces: The first trial over time, a trace for each robot; none unless recorded.
     """
 
     case: Case
+    robots: tuple[str, ...]
     rollout: IntArray
     available: BoolArray
     incentive: FloatArray
@@ -102,6 +106,7 @@ class Executed:
     fuel_used_s: FloatArray
     planned_incentive: FloatArray
     drawn_incentive: FloatArray
+    margins: tuple[Margins, ...]
     legs: tuple[LegTime, ...]
     traces: tuple[Trace, ...]
 
@@ -370,10 +375,12 @@ def _settle_all(
             traces.append(_trace(world, costs[world.robots[number].model.name], order, _drive_of(drives, key),
                                  outcomes[kind[0]]))
     return Executed(
-        case=case, rollout=rollout, available=fails == NEVER, incentive=incentive, pois_reached=pois,
-        stops_reached=stops, end=end, end_time_s=end_time, fuel_used_s=fuel,
+        case=case, robots=tuple(robot.name for robot in world.robots), rollout=rollout,
+        available=fails == NEVER, incentive=incentive, pois_reached=pois, stops_reached=stops, end=end,
+        end_time_s=end_time, fuel_used_s=fuel,
         planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
         drawn_incentive=np.column_stack([_left_by_draws(o, fails[:, k]) for k, o in enumerate(orders)]),
+        margins=margins_of_team(orders, drives),
         legs=tuple(_leg_times(world, costs, mine)) if settings.recorded else (), traces=tuple(traces))
 
 

@@ -17,7 +17,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.analysis import charts
+from sva_bench.analysis.report import _over_maps as over_maps_said
 from sva_bench.analysis.report import write_batch_report
+from sva_bench.analysis.statistics import Estimate
 from sva_bench.analysis.wording import answer, finding, over_few_maps, remarks, vss_verdict, with_interval
 from sva_bench.batch.aggregates import aggregate, maps
 from sva_bench.bench import Run, run
@@ -175,11 +177,28 @@ def test_tables_say_their_units_and_open_as_csv(folder: Path) -> None:
     assert len(lines) == 1 + 2 * 2 * 40 * 2  # scenarios, plans, trials, robots
 
 
+def over_trials(units: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str, str], Estimate]:
+    """The executed VSS of each map, as its last seed has it."""
+    return {(unit["variant"], s["name"], unit["world"]): Estimate(
+            mean=s["vss"]["executed"]["mean"], interval=(0.0, 9.0)) for unit in units for s in unit["scenarios"]}
+
+
+def test_a_batchs_verdict_and_figure_rest_on_the_same_interval() -> None:
+    # Large maps with a surely positive VSS, and a small one that makes its percentage anybody's guess.
+    def row(interval: list[float], share: list[float]) -> dict[str, Any]:
+        return {"scenario": "S3", "variant": "", "maps": 5, "vss": {"mean": sum(interval) / 2, "ci95": interval},
+                "vss_pct": {"mean": sum(share) / 2, "ci95": share}}
+
+    assert over_maps_said([row([2.0, 8.0], [-1.0, 9.0])]) == (
+        "Over these maps planning for failures pays in S3 (VSS 5.0 [2.0, 8.0]).")
+    assert "no scenario shows a value" in over_maps_said([row([-2.0, 8.0], [1.0, 9.0])])
+
+
 def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> None:
     units = [{**finished.summary, "variant": ""}]
     write_batch_report(tmp_path / "report.html", {
         "trials": 40, "fidelity": "kinematic", "worlds": ["small"], "seeds": [0], "variants": [""], "units": units,
-        "failed": [], "maps": maps(units), "aggregate": aggregate(units)})
+        "failed": [], "maps": maps(units, over_trials(units)), "aggregate": aggregate(units)})
     text = (tmp_path / "report.html").read_text()
     assert "over 1 map<" in text
     assert "<svg" in text
@@ -200,7 +219,7 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
              for name in ("a", "b") for seed in (0, 1, 2)]
     write_batch_report(tmp_path / "report.html", {
         "trials": 40, "fidelity": "kinematic", "worlds": ["a", "b"], "seeds": [0, 1, 2], "variants": ["x=1", "x=2"],
-        "units": units, "failed": [], "maps": maps(units), "aggregate": aggregate(units)})
+        "units": units, "failed": [], "maps": maps(units, over_trials(units)), "aggregate": aggregate(units)})
     text = (tmp_path / "report.html").read_text()
     assert ">variant<" in text
     assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
@@ -222,7 +241,7 @@ def test_two_equal_plans_are_called_the_same_and_not_a_matter_of_luck(finished: 
 
 def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished: Run) -> None:
     assert any("only 4 noise draws" in said for said in remarks(finished.summary))
-    assert not any("noise draws" in said for said in remarks({**finished.summary, "rollouts": 5}))
+    assert not any("noise draws" in said for said in remarks({**finished.summary, "rollouts": 16}))
     assert over_few_maps([{"maps": 5}]) == ""
     assert "over 4 maps" in over_few_maps([{"maps": 5}, {"maps": 4}])
 

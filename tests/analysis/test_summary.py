@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.stats import beta
 
+from sva_bench.analysis.statistics import bounded_mean
 from sva_bench.analysis.summary import (
     Judged,
     ScenarioResult,
@@ -20,6 +22,7 @@ from sva_bench.analysis.summary import (
     scenario_summary,
 )
 from sva_bench.execution.execute import Case, Executed
+from sva_bench.execution.margins import Margins
 from sva_bench.execution.outcome import ENDS, End
 from sva_bench.mission.plan import Plan
 from sva_bench.world.model import Scenario
@@ -29,23 +32,33 @@ SCENARIO = Scenario(name="S2", availability={"uv1": 1.0, "uv2": 0.5})
 
 
 def executed(incentive: list[list[float]], ends: list[list[End]], planned: list[float], *, promised: float | None,
-             planner: str = "stochastic", rollouts: int = 2) -> Executed:
+             planner: str = "stochastic", rollouts: int = 2, near: bool = True) -> Executed:
     earned = np.array(incentive)
     end = np.array([[ENDS.index(e) for e in row] for row in ends], dtype=np.int64)
     zeros = np.zeros(earned.shape, dtype=np.int64)
     plan = Plan(routes={"uv1": ("base", f"by-{planner}", "base")}, value=promised, bound=promised, status="optimal")
     return Executed(
-        case=Case(scenario=SCENARIO, planner=planner, plan=plan), rollout=np.arange(len(earned)) % rollouts,
-        available=end != ENDS.index("failed"), incentive=earned, pois_reached=zeros, stops_reached=zeros, end=end,
-        end_time_s=np.zeros(earned.shape), fuel_used_s=np.zeros(earned.shape), planned_incentive=np.array(planned),
+        case=Case(scenario=SCENARIO, planner=planner, plan=plan), robots=ROBOTS,
+        rollout=np.arange(len(earned)) % rollouts, available=end != ENDS.index("failed"), incentive=earned,
+        pois_reached=zeros, stops_reached=zeros, end=end, end_time_s=np.zeros(earned.shape),
+        fuel_used_s=np.zeros(earned.shape), planned_incentive=np.array(planned),
         drawn_incentive=np.where(end == ENDS.index("failed"), 0.0, np.array(planned)),
+        margins=tuple(route_of(m, f"{planner}-p{m}", worth, rollouts, near=near) for m, worth in enumerate(planned)),
         legs=(), traces=())
 
 
+def route_of(robot: int, poi: str, worth: float, draws: int, *, near: bool) -> Margins:
+    """A route of one POI; ``near`` running dry, so that noise may take all of it."""
+    left = np.tile(np.linspace(0.0, 1e-3, draws)[:, None], (1, 2)) + (0 if near else 100)
+    return Margins(robot=robot, route=("base", poi, "base"), is_poi=np.array([True, False]),
+                   fills=np.array([False, False]), worth=np.array([worth, 0.0]), leg_s=np.ones((draws, 2)), fuel_s=left,
+                   time_s=np.full((draws, 2), np.inf))
+
+
 # Plans of 100 for uv1 and 60 for uv2, available in half of the missions: 130 expected, 140 promised by an optimist.
-MIXED = executed([[100, 60], [100, 0], [70, 20], [40, 60]],
-                 [["home", "home"], ["home", "failed"], ["late", "out_of_fuel"], ["stuck", "home"]],
-                 [100.0, 60.0], promised=140.0)
+ENDED: list[list[End]] = [["home", "home"], ["home", "failed"], ["late", "out_of_fuel"], ["stuck", "home"]]
+MIXED = executed([[100, 60], [100, 0], [70, 20], [40, 60]], ENDED, [100.0, 60.0], promised=140.0)
+CLEAR = executed([[100, 60], [100, 0], [70, 20], [40, 60]], ENDED, [100.0, 60.0], promised=140.0, near=False)
 
 
 def test_a_ledger_charges_each_loss_to_the_end_of_the_robot_that_planned_it() -> None:
@@ -96,20 +109,26 @@ def test_a_plans_summary_by_hand() -> None:
     assert summary["by_robot"] == {"uv1": 77.5, "uv2": 35.0}
     assert summary["ends"] == {"home": 4, "failed": 1, "out_of_fuel": 1, "late": 1, "stuck": 1}
     assert summary["status"] == "optimal"
-    # Rollouts hold trials 0, 2 (160, 90) and 1, 3 (100, 100): means 125 and 100, one degree of freedom.
-    half = 12.706204736174698 * 12.5
-    assert summary["executed"]["ci95"] == pytest.approx([112.5 - half, 112.5 + half])
+    # Draws left 160, 100, 160, 160 of the team, of 100 to 160: as shares of 60 they are 1, 0, 1, 1, and what is drawn
+    # lies between B(0.025; 3, 2) and B(0.975; 4, 1). Noise took 0, 70 and 0, 60 of it: 35 and 30 under its two draws,
+    # of at most 100 + 60 / 2 = 130.
+    drawn = [100 + 60 * beta.ppf(0.025, 3, 2), 100 + 60 * beta.ppf(0.975, 4, 1)]
+    taken = bounded_mean(2, 32.5, 12.5, (0.0, 130.0))
+    low, high = 145 - drawn[0], drawn[1] - 145
+    # Of the slack of 1e-3 s that the margins have, some thousandths of it are left.
+    assert summary["executed"]["ci95"] == pytest.approx([112.5 - np.hypot(low, taken[1] - 32.5),
+                                                         112.5 + np.hypot(high, 32.5 - taken[0])], rel=1e-4)
 
 
 def test_the_value_of_the_stochastic_solution_is_the_difference_of_paired_trials() -> None:
-    other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], [["home", "home"]] * 4, [90, 60], promised=150.0,
-                     planner="deterministic")
+    other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], ENDED, [90, 60], promised=150.0, planner="deterministic",
+                     near=False)
     result = ScenarioResult(
-        stochastic=Judged(expected=130.0, executed=MIXED), deterministic=Judged(expected=120.0, executed=other),
+        stochastic=Judged(expected=130.0, executed=CLEAR), deterministic=Judged(expected=120.0, executed=other),
         modelled_range=(10.0, 25.0), vss_mean_value=0.0, ws=None, evpi=None,
         value_of_process=None)
     summary = scenario_summary(result, ROBOTS, noisy=True)
-    # Each trial is 10 better, whatever the failures: the difference has no spread.
+    # Each trial is 10 better, whatever failures and noise do, and no draw came near to doing more: no spread.
     assert summary["vss"]["executed"] == {"mean": 10.0, "ci95": [10.0, 10.0]}
     assert summary["vss"]["distinguishable"]
     assert summary["vss"]["modelled"] == 10.0
@@ -135,11 +154,11 @@ def test_equal_plans_are_not_distinguishable_and_per_cent_of_nothing_is_none() -
 
 
 def test_the_executed_range_goes_to_the_least_fortunate_of_the_tied_plans() -> None:
-    other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], [["home", "home"]] * 4, [90, 60], promised=150.0,
-                     planner="deterministic")
+    other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], ENDED, [90, 60], promised=150.0, planner="deterministic",
+                     near=False)
     worst = replace(other, incentive=other.incentive - [5.0, 0.0])
     summary = scenario_summary(ScenarioResult(
-        stochastic=Judged(expected=130.0, executed=MIXED), deterministic=Judged(expected=120.0, executed=other),
+        stochastic=Judged(expected=130.0, executed=CLEAR), deterministic=Judged(expected=120.0, executed=other),
         worst=worst, modelled_range=(10.0, 15.0), vss_mean_value=0.0, ws=140.0, evpi=10.0, value_of_process=None),
         ROBOTS, noisy=True)
     assert summary["vss"]["executed_range"] == pytest.approx([10.0, 15.0])
@@ -167,22 +186,23 @@ def test_one_trial_has_figures_and_no_intervals() -> None:
 
 
 def test_pairs_are_told_apart_by_intervals_adjusted_for_their_number() -> None:
-    def plan(name: str, figures: list[float]) -> Judged:
-        trials = executed([[x, 0] for x in figures], [["home", "home"]] * 4, [100, 0], promised=100.0, planner=name)
-        return Judged(expected=100.0, executed=trials)
+    def plan(name: str, worth: float) -> Judged:
+        ends: list[list[End]] = [["home", "home" if there else "failed"] for there in (True, False) * 6]
+        trials = executed([[10, worth if there else 0] for there in (True, False) * 6], ends, [10, worth],
+                          promised=worth, planner=name)
+        return Judged(expected=10 + worth / 2, executed=trials)
 
-    # Differences a - b: 3, 3, 5, 5 over trials without noise: mean 4, half-width t(0.975, 3) x sqrt(4 / 3 / 4) = 1.84,
-    # for three pairs t(1 - 0.05 / 6, 3) = 4.857 makes 2.80. c is a twin of b.
-    a, b, c = plan("a", [13, 23, 15, 25]), plan("b", [10, 20, 10, 20]), plan("c", [10, 20, 10, 20])
-    summary = comparison_summary([b, a, c], ROBOTS, noisy=False)
+    # Half of twelve trials differ by 20: 20 times a share of 6 in 12, B(0.025; 6, 7) to B(0.975; 7, 6), for three pairs
+    # with 0.05 / 6 to each side. c is worth as much as b.
+    summary = comparison_summary([plan("b", 30), plan("a", 50), plan("c", 30)], ROBOTS, noisy=False)
     first = summary["comparisons"][0]
-    assert (first["a"], first["b"], first["mean"]) == ("b", "a", -4.0)
-    assert first["ci95"] == pytest.approx([-4 - 1.8374, -4 + 1.8374], abs=1e-3)
-    assert first["ci95_adjusted"] == pytest.approx([-4 - 2.8042, -4 + 2.8042], abs=1e-3)
+    assert (first["a"], first["b"], first["mean"]) == ("b", "a", -10.0)
+    assert first["ci95"] == pytest.approx([-20 * beta.ppf(0.975, 7, 6), -20 * beta.ppf(0.025, 6, 7)])
+    assert first["ci95_adjusted"] == pytest.approx([-20 * beta.ppf(1 - 0.05 / 6, 7, 6), -20 * beta.ppf(0.05 / 6, 6, 7)])
     assert [pair["verdict"] for pair in summary["comparisons"]] == [
         "a is worth more", "not distinguishable from zero", "a is worth more"]
-    assert summary["ranking"] == [{"rank": 1, "plan": "a", "mean": 19.0}, {"rank": 2, "plan": "b", "mean": 15.0},
-                                  {"rank": 2, "plan": "c", "mean": 15.0}]
+    assert summary["ranking"] == [{"rank": 1, "plan": "a", "mean": 35.0}, {"rank": 2, "plan": "b", "mean": 25.0},
+                                  {"rank": 2, "plan": "c", "mean": 25.0}]
 
 
 def test_plans_of_the_same_routes_are_one_plan_whatever_their_trials() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from sva_bench.analysis.figures import value_figure
 from sva_bench.analysis.statistics import estimate
 from sva_bench.execution.execute import Case, Executed, Fidelity, Settings, execute, wheel_gains
 from sva_bench.execution.outcome import ENDS
@@ -183,7 +184,7 @@ def test_the_executed_mean_is_the_closed_form(small: Planned, process: FailurePr
     # Four standard errors rather than the 95 % interval, which misses one seed in twenty.
     half = 4 * totals.std() / np.sqrt(len(totals))
     assert totals.mean() == pytest.approx(expected, abs=half)
-    found = estimate(totals, done.rollout, noisy=False)
+    found = estimate(value_figure(done, noisy=False))
     assert found.interval is not None
     assert found.interval[0] < expected < found.interval[1]  # holds for this seed
 
