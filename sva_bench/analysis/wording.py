@@ -45,7 +45,7 @@ def _share(scenario: Mapping[str, Any]) -> str:
 
 
 _MOST_NAMED = 6
-FEW_MAPS = 5
+FEW_MAPS = 10
 """Maps below which an interval over them wants a word of caution: Student's t is wide and shaky there."""
 FEW_DRAWS = 16
 """Noise draws below which an interval is mostly about draws that were not met."""
