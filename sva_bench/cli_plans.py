@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -131,7 +132,9 @@ def plan(
     write_result(output, pretty_json(plan_as_dict(made)))
     assert made.value is not None
     assert made.bound is not None
-    gap_left = (made.bound - made.value) / max(1.0, abs(made.value))  # as --gap counts it
+    gap_left = made.bound - made.value
+    if gap_left > 0:
+        gap_left = gap_left / abs(made.value) if made.value else math.inf  # as --gap counts it
     outcome = (f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, relative gap {gap_left:.2g}, "
                f"{made.runtime_s:.2f} s")
     if made.status == "interrupted":

@@ -57,7 +57,7 @@ def best_packing(
     ranked = np.argsort(-relaxed.reduced, kind="stable")[:MOST_COLUMNS]
     good = tuple((columns[k][0], columns[k][3]) for k in np.sort(ranked[:MOST_GOOD]))
     room = relaxed.objective - float(objective @ start)
-    if room <= _EPSILON * max(1.0, relaxed.objective):
+    if room <= _EPSILON * relaxed.objective:
         return incumbent, good
     kept = [int(k) for k in np.sort(ranked) if relaxed.reduced[k] >= -room - 1e-6 or start[k]]
     kept = sorted({*kept, *np.flatnonzero(start).tolist()})
