@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from sva_bench.errors import BadInput, ExitCode, Interrupted
-from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.interrupts import deferring_ctrl_c, holding_back_ctrl_c
 from sva_bench.options import (
     AsJson,
     Cuts,
@@ -118,18 +118,19 @@ def plan(
 
         progress("solving", 0, 1)
         limits, cuts_used = SolveLimits(time_limit_s=time_limit, gap=gap), cuts or "single"
-        if risk is not None:
-            told = {"weight": weight, "beta": beta, "target": target}
-            made = plan_averse(instance, RiskMeasure(
-                kind=risk, **{name: value for name, value in told.items() if value is not None}), limits)
-        elif objective == "stochastic":
-            made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
-        else:
-            stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
-                                         cuts=cuts_used)
-            made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
+        with deferring_ctrl_c():  # the solver hears it; from there on the plan is written
+            if risk is not None:
+                told = {"weight": weight, "beta": beta, "target": target}
+                made = plan_averse(instance, RiskMeasure(
+                    kind=risk, **{name: value for name, value in told.items() if value is not None}), limits)
+            elif objective == "stochastic":
+                made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
+            else:
+                stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
+                                             cuts=cuts_used)
+                made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
+            write_result(output, pretty_json(plan_as_dict(made)))
         progress("solving", 1, 1)
-    write_result(output, pretty_json(plan_as_dict(made)))
     assert made.value is not None
     assert made.bound is not None
     gap_left = made.bound - made.value

@@ -137,9 +137,12 @@ class BranchAndPrice:
             outcome = master.solve_whole(self.left_s())
             _log.debug("listed %d routes: %s, %.6g of %.6g, %d nodes", len(master.entries), outcome.status,
                        outcome.objective, outcome.bound, outcome.nodes)
-            if outcome.values is not None and master.missed(outcome.values) <= _MISSED:
+            kept = outcome.values is not None and master.missed(outcome.values) <= _MISSED
+            if kept and outcome.values is not None:
                 self._offer_columns(master.share(outcome.values))
-            elif outcome.status == "optimal" and outcome.bound > self.generation.cutoff():
+            if outcome.status == "interrupted":
+                raise KeyboardInterrupt
+            if not kept and outcome.status == "optimal" and outcome.bound > self.generation.cutoff():
                 penalty *= 10.0
                 continue
             return max(min(outcome.bound, made.bound), self.generation.cutoff())

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.columns import Class, Column, Master, Prices, Side, Unit
 from sva_bench.solver.enumeration import routes_above
@@ -69,6 +70,7 @@ class ColumnGeneration:
         survival: Chance of each vehicle to get to its next POI, shape (M,).
         cutoff: Bound at or below which a node holds nothing of interest.
         out: Whether to stop.
+        left_s: Time left [s].
         classes: Vehicles that are alike.
         graphs: What each class may drive.
         penalty: What it costs to miss a required visit, or a floor by its size, unless a node wants more.
@@ -85,6 +87,7 @@ class ColumnGeneration:
     survival: FloatArray
     cutoff: Callable[[], float]
     out: Callable[[], bool]
+    left_s: Callable[[], float]
     classes: list[Class] = field(init=False, default_factory=list)
     graphs: list[Graph] = field(init=False, default_factory=list)
     penalty: float = field(init=False)
@@ -230,10 +233,11 @@ class ColumnGeneration:
         """Routes of a unit worth more than a threshold."""
         graph, reward = self.graphs[unit.kind], self._reward(unit, prices)
         self.calls["exact" if exact else "heuristic"] += 1
-        priced = best_routes(
-            graph, reward, prices.visit, self.goal.driving, self.memory[unit.kind], threshold=threshold, exact=exact,
-            most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS,
-            tolls=tolls_of(self.cuts, prices.cut, unit.kind, self._n))
+        tolls = tolls_of(self.cuts, prices.cut, unit.kind, self._n)
+        with deferring_ctrl_c():
+            priced = best_routes(
+                graph, reward, prices.visit, self.goal.driving, self.memory[unit.kind], threshold=threshold,
+                exact=exact, most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS, tolls=tolls, left_s=self.left_s())
         self.calls["labels"] += priced.labels
         return priced
 
@@ -245,10 +249,11 @@ class ColumnGeneration:
             return None
         found: list[tuple[tuple[int, ...], ...]] = []
         for number, unit in enumerate(side.units):
-            routes = routes_above(
-                self.graphs[unit.kind], self._reward(unit, made.prices), made.prices.visit, self.goal.driving,
-                tolls_of(self.cuts, made.prices.cut, unit.kind, self._n),
-                best=float(made.most[number]), loss=room + self.tolerance)
+            with deferring_ctrl_c():
+                routes = routes_above(
+                    self.graphs[unit.kind], self._reward(unit, made.prices), made.prices.visit, self.goal.driving,
+                    tolls_of(self.cuts, made.prices.cut, unit.kind, self._n),
+                    best=float(made.most[number]), loss=room + self.tolerance, left_s=self.left_s())
             _log.debug("unit %d: %s routes within %.6g", number, routes and len(routes), room)
             if routes is None or len(routes) + sum(map(len, found)) > MOST_ENUMERATED:
                 self._too_many = room
@@ -285,7 +290,8 @@ class ColumnGeneration:
         """How often each cut counts a route, shape (cuts,)."""
         key = (column.kind, column.route)
         if key not in self._counts:
-            self._counts[key] = self._counter.of(*key)
+            with deferring_ctrl_c():
+                self._counts[key] = self._counter.of(*key)
         return self._counts[key]
 
     def cut(self, used: Sequence[tuple[int, Column, float]]) -> bool:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.interrupts import hear_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Status
 from sva_bench.solver.cuts import Cut
@@ -61,7 +62,8 @@ class Clock:
         return time.monotonic() - self.started
 
     def out(self) -> bool:
-        """Whether no time is left."""
+        """Whether no time is left; Ctrl-C is heard here at the latest."""
+        hear_ctrl_c()
         return time.monotonic() >= self.deadline
 
 

@@ -64,6 +64,8 @@ def best_packing(
     columns = [columns[k] for k in kept]
     outcome = maximise(_program(columns, objective[kept], vehicles, n), Rows.none(), gap=1e-9, absolute_gap=0.0,
                        time_limit_s=np.inf, start=start[kept], most_nodes=_NODES)
+    if outcome.status == "interrupted":
+        raise KeyboardInterrupt
     if outcome.values is None:
         return incumbent, good
     plan: list[tuple[int, ...]] = [()] * vehicles

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.interrupts import deferring_ctrl_c, hearing_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.branch_and_cut import FlowModel, prove_by_cuts
 from sva_bench.solver.branch_and_price import BranchAndPrice
@@ -68,6 +69,14 @@ def solve(
     Raises:
         ValueError: If the goal has floors and no known plan reaches them.
     """
+    with deferring_ctrl_c():
+        return _solve(instance, goal, known, clock, gap, method, recourse, cuts)
+
+
+def _solve(
+    instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method,
+    recourse: Outcomes | None, cuts: Cuts,
+) -> Solution:
     start = best_known(goal, known)
     if start is None:
         raise ValueError("no known plan reaches the floors of the goal")
@@ -81,8 +90,9 @@ def solve(
     if method == "auto":
         method = choice(instance, scopes, goal)
     try:
-        _search_and_prove(instance, scopes, goal, known, clock, gap, method,
-                          None if recourse is None else recourse.times(factor), cuts, progress)
+        with hearing_ctrl_c():
+            _search_and_prove(instance, scopes, goal, known, clock, gap, method,
+                              None if recourse is None else recourse.times(factor), cuts, progress)
     except KeyboardInterrupt:
         progress.status = "interrupted"
     if progress.bound - progress.value <= progress.rounding:
@@ -111,7 +121,8 @@ def _search_and_prove(
         found = search(
             known.tables, _searched(goal), goal.chances(), progress.orders,
             stop=lambda value: clock.out() or (
-                goal.risk is None and progress.bound - value <= gap * abs(value)))
+                goal.risk is None and progress.bound - value <= gap * abs(value)),
+            offer=lambda orders: adopt(progress, goal, known, orders))
         adopt(progress, goal, known, found.orders)
         routes = found.routes
         progress.seconds["heuristic"] = clock.used_s() - began
@@ -182,7 +193,7 @@ def _prove_by_columns(
         adopt(progress, goal, known, orders)
 
     generation = ColumnGeneration(instance=instance, goal=goal, scopes=scopes, survival=goal.chances(), cutoff=cutoff,
-                                  out=clock.out)
+                                  out=clock.out, left_s=clock.left_s)
     for m, order in (*enumerate(progress.orders), *routes):
         generation.add_route(m, drive(known.roads[m], order))
     search_tree = BranchAndPrice(generation=generation, offer=offer, left_s=clock.left_s, tell=progress.tighten)
