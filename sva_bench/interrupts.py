@@ -26,6 +26,7 @@ from types import FrameType, TracebackType
 from typing import Any
 
 _NOT, _PRESSED, _HEARD = 0, 1, 2
+_AGAIN_S = 0.05
 _flag = bytearray(1)  # shared with compiled code, so it stays one and the same object
 _blocks: list[bool] = []  # whether Ctrl-C is heard; the innermost last
 _before: Callable[[int, FrameType | None], Any] | None = None
@@ -129,12 +130,24 @@ def _on_ctrl_c(signum: int, frame: FrameType | None) -> None:
         return
     if _flag[0] == _NOT:
         _flag[0] = _PRESSED
-    if _blocks[-1] or (len(_blocks) > 1 and _blocks[-2] and _compiling(frame)):
+    if _blocks[-1]:
         raise KeyboardInterrupt
+    if len(_blocks) > 1 and _blocks[-2] and _compiling(frame):
+        if frame is not None and "llvmlite" in frame.f_code.co_filename:  # a callback would swallow it: once more soon
+            again = threading.Timer(_AGAIN_S, _once_more)
+            again.daemon = True
+            again.start()
+        else:
+            raise KeyboardInterrupt
+
+
+def _once_more() -> None:
+    if _flag[0] == _PRESSED:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _compiling(frame: FrameType | None) -> bool:
-    """Whether numba is compiling, which is plain Python but for callbacks; those swallow it, and the flag remains."""
+    """Whether numba is compiling, which is plain Python but for callbacks of llvmlite."""
     while frame is not None:
         if frame.f_code.co_name == "_compile_for_args":
             return True

@@ -113,7 +113,7 @@ class Relaxation:
         """The optimum over whole values of some columns, proved but for rounding; the relaxation is lost."""
         _set_whole(self._solver, columns)
         return _branch_and_bound(self._solver, gap=0.0, absolute_gap=1e-6, time_limit_s=time_limit_s, most_nodes=None,
-                                 heuristics=0.05)
+                                 heuristics=0.05, whole=len(columns) > 0)
 
 
 def maximise(
@@ -142,7 +142,7 @@ def maximise(
         solution.col_value = start.tolist()
         _check(solver.setSolution(solution), "setSolution")
     return _branch_and_bound(solver, gap=gap, absolute_gap=absolute_gap, time_limit_s=time_limit_s,
-                             most_nodes=most_nodes, heuristics=heuristics)
+                             most_nodes=most_nodes, heuristics=heuristics, whole=bool(model.integer.any()))
 
 
 def _set_whole(solver: Any, columns: IntArray) -> None:
@@ -152,6 +152,7 @@ def _set_whole(solver: Any, columns: IntArray) -> None:
 
 def _branch_and_bound(
     solver: Any, *, gap: float, absolute_gap: float, time_limit_s: float, most_nodes: int | None, heuristics: float,
+    whole: bool,
 ) -> Outcome:
     _option(solver, "mip_rel_gap", gap)
     _option(solver, "mip_abs_gap", absolute_gap)
@@ -166,7 +167,8 @@ def _branch_and_bound(
     status: SolveStatus = "interrupted" if interrupted else _status(solver)
     info = solver.getInfo()
     found = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
-    bound = float(info.mip_dual_bound)
+    # Without integer columns, as where no route is left to choose, HiGHS solves a linear program and states no bound.
+    bound = float(info.mip_dual_bound if whole else info.objective_function_value)
     if not math.isfinite(bound) or status == "infeasible":
         bound = -math.inf if status == "infeasible" else math.inf
     return Outcome(
