@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,7 @@ from typing import Annotated
 import typer
 
 from sva_bench.errors import BadInput, ExitCode, Interrupted
-from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.interrupts import deferring_ctrl_c, holding_back_ctrl_c
 from sva_bench.options import (
     AsJson,
     Cuts,
@@ -117,21 +118,24 @@ def plan(
 
         progress("solving", 0, 1)
         limits, cuts_used = SolveLimits(time_limit_s=time_limit, gap=gap), cuts or "single"
-        if risk is not None:
-            told = {"weight": weight, "beta": beta, "target": target}
-            made = plan_averse(instance, RiskMeasure(
-                kind=risk, **{name: value for name, value in told.items() if value is not None}), limits)
-        elif objective == "stochastic":
-            made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
-        else:
-            stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
-                                         cuts=cuts_used)
-            made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
+        with deferring_ctrl_c():  # the solver hears it; from there on the plan is written
+            if risk is not None:
+                told = {"weight": weight, "beta": beta, "target": target}
+                made = plan_averse(instance, RiskMeasure(
+                    kind=risk, **{name: value for name, value in told.items() if value is not None}), limits)
+            elif objective == "stochastic":
+                made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
+            else:
+                stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
+                                             cuts=cuts_used)
+                made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
+            write_result(output, pretty_json(plan_as_dict(made)))
         progress("solving", 1, 1)
-    write_result(output, pretty_json(plan_as_dict(made)))
     assert made.value is not None
     assert made.bound is not None
-    gap_left = (made.bound - made.value) / max(1.0, abs(made.value))  # as --gap counts it
+    gap_left = made.bound - made.value
+    if gap_left > 0:
+        gap_left = gap_left / abs(made.value) if made.value else math.inf  # as --gap counts it
     outcome = (f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, relative gap {gap_left:.2g}, "
                f"{made.runtime_s:.2f} s")
     if made.status == "interrupted":

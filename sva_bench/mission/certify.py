@@ -115,7 +115,7 @@ def _wrong_claims(plan: Plan, expected: float, nominal: float, fuel: dict[str, f
     claims = []
     worth = nominal if plan.objective == "deterministic" else expected
     if plan.value is not None and plan.objective in ("stochastic", "deterministic") and \
-            abs(plan.value - worth) > VALUE_TOLERANCE * max(1.0, abs(worth)):
+            abs(plan.value - worth) > VALUE_TOLERANCE * abs(worth):
         claims.append(f"the plan claims a value of {plan.value:.6g}; it is worth {worth:.6g}")
     claims += [f"{name}: the plan claims {claimed:.3f} s of fuel; it burns {fuel[name]:.3f} s"
                for name, claimed in plan.fuel_s.items() if name in fuel and abs(claimed - fuel[name]) > TOLERANCE_S]

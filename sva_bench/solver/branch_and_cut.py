@@ -21,6 +21,7 @@ from sva_bench.solver.heuristic import Orders
 from sva_bench.solver.highs import Outcome, Relaxation, maximise
 from sva_bench.solver.knowledge import Clock, Knowledge, Progress, adopt, without_idle_stops
 from sva_bench.solver.refuelling import quickest
+from sva_bench.solver.units import LARGEST
 
 _log = logging.getLogger(__name__)
 
@@ -28,6 +29,7 @@ ROOT_ROUNDS = 60
 _STALL = 1e-4  # relative gain of the bound below which a round counts as idle
 _IDLE_ROUNDS = 4
 _FIXING = 1e-6  # relative; columns are dropped only if they are worse by more
+_INTEGERS = 1e4  # largest integer that is worth having in an objective
 
 
 class FlowModel(Protocol):
@@ -53,8 +55,8 @@ def prove_by_cuts(
 ) -> None:
     """Prove the plan of ``progress``, or a better one, within the gap."""
     largest = float(np.abs(flow.model.objective).max(initial=0.0))
-    # Whole incentives stay whole: HiGHS then rounds its bounds.
-    size = 1.0 if largest == 0 or 1 <= largest <= 1e4 else largest
+    # Multiples of one number become integers, if not too large: HiGHS then rounds its bounds.
+    size = progress.grain if 0 < largest <= _INTEGERS * progress.grain else largest / LARGEST or 1.0
     model = replace(flow.model, objective=flow.model.objective / size)
     began = clock.used_s()
     cuts, model = _root(flow, instance, known, clock, gap, progress, model, size)
@@ -91,7 +93,8 @@ def _root(
         activity = relaxed.activity
         progress.tighten(relaxed.objective * size)
         # A column whose reduced cost eats up the gap is in no better plan. Only ours are integer.
-        worse = (relaxed.objective + relaxed.reduced) * size < progress.value - _FIXING * max(1.0, abs(progress.value))
+        least = progress.value - _FIXING * max(abs(progress.value), LARGEST)
+        worse = (relaxed.objective + relaxed.reduced) * size < least
         upper[model.integer & worse] = 0.0
         idle = idle + 1 if last - relaxed.objective < _STALL * max(abs(relaxed.objective), 1e-9) else 0
         last = relaxed.objective
@@ -120,10 +123,9 @@ def _branch(
             progress.status = "time_limit"
             return
         progress.cuts = len(cuts)
-        slack = max(gap / 2 * max(1.0, abs(progress.value)), 0.99 * progress.grain)  # below the grain there is no plan
         outcome = maximise(
-            model, flow.rows(cuts), gap=gap / 2, absolute_gap=slack / size, time_limit_s=clock.left_s(),
-            start=flow.point(progress.orders))
+            model, flow.rows(cuts), gap=gap / 2, absolute_gap=progress.slack(gap / 2) / size,
+            time_limit_s=clock.left_s(), start=flow.point(progress.orders))
         progress.rounds += 1
         progress.nodes += outcome.nodes
         progress.tighten(progress.value if outcome.status == "infeasible" else outcome.bound * size)

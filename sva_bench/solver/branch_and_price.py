@@ -79,8 +79,9 @@ class BranchAndPrice:
         """Solve a node; its children, ``None`` if time ran out or labels overflowed, and its bound."""
         generation, cutoff = self.generation, self.generation.cutoff
         centre, best, slack, before, dived = node.prices, node.bound, _COARSE, math.inf, False
+        penalty = generation.penalty
         while True:
-            master = generation.master(node.side, centre)
+            master = generation.master(node.side, centre, penalty=penalty)
             made = generation.generate(master, node.side, centre, known=best, slack=slack,
                                        tell=self.tell if self.nodes == 1 else None)
             solved, centre = made.relaxed, made.prices
@@ -98,9 +99,12 @@ class BranchAndPrice:
             if slack == _COARSE:
                 slack = _SLACK
                 continue
-            if whole and master.missed(solved.values) > _MISSED:
-                generation.penalty *= 10.0  # missing a floor by a little cost less than any plan that reaches it
+            if master.missed(solved.values) > _MISSED:
+                # Missing what is required cost less than any plan that keeps it. Branching would decide the same again;
+                # a dearer miss ends in a point that keeps it, or if there is none in a bound below every plan.
+                penalty *= 10.0
                 continue
+            generation.penalty = penalty
             if whole:
                 self._offer_columns(used)
                 if best <= cutoff() or slack == 0.0:
@@ -125,18 +129,21 @@ class BranchAndPrice:
 
     def _enumerate(self, side: Side, made: Generated) -> float | None:
         """Choose among all routes that count, if they are few; an upper bound on the node then."""
-        entries = self.generation.enumerate(side, made)
+        entries, penalty = self.generation.enumerate(side, made), self.generation.penalty
         if entries is None:
             return None
         while True:
-            master = self.generation.master(side, None, entries)
+            master = self.generation.master(side, None, entries, penalty)
             outcome = master.solve_whole(self.left_s())
             _log.debug("listed %d routes: %s, %.6g of %.6g, %d nodes", len(master.entries), outcome.status,
                        outcome.objective, outcome.bound, outcome.nodes)
-            if outcome.values is not None and master.missed(outcome.values) <= _MISSED:
+            kept = outcome.values is not None and master.missed(outcome.values) <= _MISSED
+            if kept and outcome.values is not None:
                 self._offer_columns(master.share(outcome.values))
-            elif outcome.status == "optimal" and outcome.bound > self.generation.cutoff():
-                self.generation.penalty *= 10.0
+            if outcome.status == "interrupted":
+                raise KeyboardInterrupt
+            if not kept and outcome.status == "optimal" and outcome.bound > self.generation.cutoff():
+                penalty *= 10.0
                 continue
             return max(min(outcome.bound, made.bound), self.generation.cutoff())
 
@@ -195,7 +202,8 @@ class BranchAndPrice:
         for number, column, share in used:
             each[number] += share * column.visits
         total = each.sum(axis=0)
-        found = [(abs(total[j] - 0.5), j, -1) for j in self.generation.rows if 1e-6 < total[j] < 1 - 1e-6]
+        found = [(abs(total[j] - 0.5), j, -1) for j in self.generation.rows
+                 if j not in side.required and 1e-6 < total[j] < 1 - 1e-6]
         if not found:
             found = [(abs(each[u, j] - 0.5), j, u) for u in range(len(side.units)) for j in self.generation.rows
                      if 1e-6 < each[u, j] < 1 - 1e-6]

@@ -16,10 +16,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.columns import Class, Column, Master, Prices, Side, Unit
 from sva_bench.solver.enumeration import routes_above
-from sva_bench.solver.formulation import Goal
+from sva_bench.solver.formulation import Goal, sizes_of
 from sva_bench.solver.graph import NG_MOST, Graph, allowed, graph_of, neighbours
 from sva_bench.solver.highs import Relaxed
 from sva_bench.solver.preprocess import Scope
@@ -69,9 +70,10 @@ class ColumnGeneration:
         survival: Chance of each vehicle to get to its next POI, shape (M,).
         cutoff: Bound at or below which a node holds nothing of interest.
         out: Whether to stop.
+        left_s: Time left [s].
         classes: Vehicles that are alike.
         graphs: What each class may drive.
-        penalty: What it costs to miss a required visit, or a floor by its size.
+        penalty: What it costs to miss a required visit, or a floor by its size, unless a node wants more.
         calls: Pricing runs and labels.
         rows: POIs that can be visited.
         memory: POIs that each site remembers (ng-sets), bit by bit, for each class, shape (n, words).
@@ -85,6 +87,7 @@ class ColumnGeneration:
     survival: FloatArray
     cutoff: Callable[[], float]
     out: Callable[[], bool]
+    left_s: Callable[[], float]
     classes: list[Class] = field(init=False, default_factory=list)
     graphs: list[Graph] = field(init=False, default_factory=list)
     penalty: float = field(init=False)
@@ -115,9 +118,13 @@ class ColumnGeneration:
         self.cuts: tuple[SubsetRow, ...] = ()
         self._counter = Counter((), n)
         self._counts: dict[tuple[int, tuple[int, ...]], FloatArray] = {}
-        total = float(np.abs(self.goal.weights).max(axis=0, initial=0.0).sum())
+        rates = np.abs(self.goal.weights)  # the most that a visit can earn; of a measure of risk no more than all of it
+        if self.goal.risk is not None:
+            rates = rates + self.goal.risk.measure.weight * self.goal.risk.outcomes.incentives
+        self._most = float(rates.max(initial=0.0))
         longest = sum(graph.limit_s for graph in self.graphs)
-        self.penalty = 10.0 * (total + self.goal.driving * longest + 1.0)
+        self.penalty = 10.0 * (float(rates.max(axis=0, initial=0.0).sum()) + self.goal.driving * longest) or 1.0
+        self._sizes = sizes_of(self.goal.floors)
 
     @property
     def priced(self) -> int:
@@ -130,10 +137,14 @@ class ColumnGeneration:
             kind = next(k for k, c in enumerate(self.classes) if vehicle in c.vehicles)
             self._column(kind, route)
 
-    def master(self, side: Side, prices: Prices | None, entries: Sequence[Sequence[Column]] | None = None) -> Master:
+    def master(
+        self, side: Side, prices: Prices | None, entries: Sequence[Sequence[Column]] | None = None,
+        penalty: float | None = None,
+    ) -> Master:
         """The program at a node, with columns that are good at some prices, or with those given of each unit."""
-        master = Master(side=side, pois=self.rows, n=self._n, floors=self._floors, cuts=len(self.cuts),
-                        counted=self._counted, penalty=self.penalty, risk=self.goal.risk)
+        master = Master(side=side, pois=self.rows, n=self._n, floors=self._floors, sizes=self._sizes,
+                        cuts=len(self.cuts), counted=self._counted, penalty=penalty or self.penalty,
+                        risk=self.goal.risk)
         if entries is not None:
             for number, columns in enumerate(entries):
                 master.add(number, columns)
@@ -194,11 +205,11 @@ class ColumnGeneration:
             if not complete:
                 return Generated(relaxed=solved, bound=best, prices=centre, most=limits, complete=False)
             bound = master.bound(at, most)
-            if bound < best - 1e-12 or centre is None:
+            if bound < best or centre is None:
                 best, centre, limits = min(bound, best), at, most
                 if tell:
                     tell(max(best, self.cutoff()))
-            room = slack * (best - self.cutoff()) + 1e-9 * max(1.0, abs(best))
+            room = slack * (best - self.cutoff()) + 1e-9 * max(self._most, abs(best))
             if min(best, known) <= self.cutoff() or best <= solved.objective + room:
                 return Generated(relaxed=solved, bound=best, prices=centre, most=limits, complete=True)
             if not added:
@@ -222,10 +233,11 @@ class ColumnGeneration:
         """Routes of a unit worth more than a threshold."""
         graph, reward = self.graphs[unit.kind], self._reward(unit, prices)
         self.calls["exact" if exact else "heuristic"] += 1
-        priced = best_routes(
-            graph, reward, prices.visit, self.goal.driving, self.memory[unit.kind], threshold=threshold, exact=exact,
-            most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS,
-            tolls=tolls_of(self.cuts, prices.cut, unit.kind, self._n))
+        tolls = tolls_of(self.cuts, prices.cut, unit.kind, self._n)
+        with deferring_ctrl_c():
+            priced = best_routes(
+                graph, reward, prices.visit, self.goal.driving, self.memory[unit.kind], threshold=threshold,
+                exact=exact, most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS, tolls=tolls, left_s=self.left_s())
         self.calls["labels"] += priced.labels
         return priced
 
@@ -237,10 +249,11 @@ class ColumnGeneration:
             return None
         found: list[tuple[tuple[int, ...], ...]] = []
         for number, unit in enumerate(side.units):
-            routes = routes_above(
-                self.graphs[unit.kind], self._reward(unit, made.prices), made.prices.visit, self.goal.driving,
-                tolls_of(self.cuts, made.prices.cut, unit.kind, self._n),
-                best=float(made.most[number]), loss=room + self.tolerance)
+            with deferring_ctrl_c():
+                routes = routes_above(
+                    self.graphs[unit.kind], self._reward(unit, made.prices), made.prices.visit, self.goal.driving,
+                    tolls_of(self.cuts, made.prices.cut, unit.kind, self._n),
+                    best=float(made.most[number]), loss=room + self.tolerance, left_s=self.left_s())
             _log.debug("unit %d: %s routes within %.6g", number, routes and len(routes), room)
             if routes is None or len(routes) + sum(map(len, found)) > MOST_ENUMERATED:
                 self._too_many = room
@@ -277,7 +290,8 @@ class ColumnGeneration:
         """How often each cut counts a route, shape (cuts,)."""
         key = (column.kind, column.route)
         if key not in self._counts:
-            self._counts[key] = self._counter.of(*key)
+            with deferring_ctrl_c():
+                self._counts[key] = self._counter.of(*key)
         return self._counts[key]
 
     def cut(self, used: Sequence[tuple[int, Column, float]]) -> bool:
@@ -295,7 +309,7 @@ class ColumnGeneration:
     @property
     def tolerance(self) -> float:
         """What a route must be worth more than its price to count as new."""
-        return _EPSILON * max(1.0, float(np.abs(self.goal.weights).max(initial=0.0)))
+        return _EPSILON * (self._most or 1.0)  # else seconds are all that counts
 
     def remember(self, used: Sequence[Column], *, ignore_most: bool) -> bool:
         """Make sites remember the POIs that routes in use visit again, and drop routes that forget; whether any did."""

@@ -111,6 +111,7 @@ class Master:
         side: The decisions.
         pois: POIs with a row.
         floors: Least sum of each floor.
+        sizes: Size of each floor's row, shape (floors,).
         cuts: How many cuts there are; of the routes a cut counts, one is in use at most.
         counted: How often each cut counts a route, shape (cuts,).
         penalty: What a unit of a required visit, or of a floor in units of its size, costs if it is missed.
@@ -122,6 +123,7 @@ class Master:
     pois: tuple[int, ...]
     n: int
     floors: FloatArray
+    sizes: FloatArray
     cuts: int
     counted: Callable[[Column], FloatArray]
     penalty: float
@@ -132,7 +134,6 @@ class Master:
         self._row = {j: k for k, j in enumerate(self.pois)}
         first = len(self.pois) + len(self.side.units)
         rows = first + len(self.floors)
-        self._size = np.maximum(np.abs(self.floors), 1.0)
         # What is required may be missed, at a price; under a risk measure the floors have columns of their own instead.
         missed = [self._row[j] for j in sorted(self.side.required)]
         missed += [] if self.risk else list(range(first, rows))
@@ -146,10 +147,10 @@ class Master:
             build.add([], [], -np.inf, float(unit.count))
         for k, floor in enumerate(self.floors):
             used = np.flatnonzero(entries[k])
-            columns, values = self.penalties + used, entries[k][used] / self._size[k]
+            columns, values = self.penalties + used, entries[k][used] / self.sizes[k]
             if not self.risk:
                 columns, values = np.array([own[first + k]]), np.ones(1)
-            build.add(columns, values, float(floor / self._size[k]), np.inf)
+            build.add(columns, values, float(floor / self.sizes[k]), np.inf)
         for _ in range(self.cuts):
             build.add([], [], -np.inf, 1.0)
         self._program = Relaxation(LinearModel(
@@ -168,7 +169,7 @@ class Master:
         counted = np.array([self.counted(c) for c in new]).reshape(len(new), self.cuts)
         levels = np.array([c.floors for c in new]).reshape(len(new), floors)
         values = np.array([c.value for c in new])
-        matrix = np.hstack([visits[:, list(self.pois)], np.zeros((len(new), units)), levels / self._size, counted])
+        matrix = np.hstack([visits[:, list(self.pois)], np.zeros((len(new), units)), levels / self.sizes, counted])
         matrix[:, len(self.pois) + unit] = 1.0
         column, row = np.nonzero(matrix)
         self._program.add_columns(values, np.searchsorted(column, np.arange(len(new) + 1)), row, matrix[column, row])
@@ -196,7 +197,7 @@ class Master:
         visit[list(self.pois)] = solved.duals[:len(self.pois)]
         unit, floor, cut = np.split(solved.duals[len(self.pois):],
                                     np.cumsum([len(self.side.units), len(self.floors)]))
-        return Prices(visit=visit, unit=unit, floor=floor / self._size, cut=np.maximum(cut, 0.0))
+        return Prices(visit=visit, unit=unit, floor=floor / self.sizes, cut=np.maximum(cut, 0.0))
 
     def bound(self, prices: Prices, best: FloatArray) -> float:
         """Upper bound on the program over all columns, from any prices of the right signs.

@@ -7,11 +7,14 @@ Source:
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.solver.graph import Graph
 from sva_bench.solver.listing import ways
+from sva_bench.solver.looking import stop_mark
 from sva_bench.solver.pricing import Local, bounds_of, local_of
 from sva_bench.solver.subset_row import Tolls
 
@@ -20,6 +23,7 @@ MOST_PARTIAL = 400_000  # ways from the base that are looked at, of one vehicle
 
 def routes_above(
     graph: Graph, reward: FloatArray, dual: FloatArray, charge: float, tolls: Tolls, *, best: float, loss: float,
+    left_s: float = math.inf,
 ) -> tuple[tuple[int, ...], ...] | None:
     """For each set of POIs the best route over it, if it is nearly the best of all; ``None`` if too many are possible.
 
@@ -33,6 +37,7 @@ def routes_above(
         tolls: What cuts charge; here routes forget nothing.
         best: Reduced value that no route exceeds.
         loss: Routes that fall behind it by so much are of no use.
+        left_s: Time after which they count as too many [s].
     """
     local = local_of(graph, reward, dual, tolls, loss=loss)
     step, bound, _ = bounds_of(graph, local, charge)
@@ -42,7 +47,7 @@ def routes_above(
     site, parent, ends, overflow = ways(
         local.legs, local.time_s, local.fuel_s, local.bit, local.words, local.reward - local.dual, charge, local.base,
         graph.capacity_s, graph.limit_s, bound, step, best - loss, MOST_PARTIAL, local.touch, everything, tolls.once,
-        tolls.price)
+        tolls.price, stop_mark(), left_s)
     if overflow:
         return None
     return tuple(_route(local, site, parent, int(label)) for label in ends)

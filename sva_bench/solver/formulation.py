@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -122,12 +122,34 @@ class Goal:
         """``survival``, or ones."""
         return np.ones(len(self.weights)) if self.survival is None else self.survival
 
+    def times(self, factor: float) -> Goal:
+        """The same goal with incentives, and what is compared with them, in another unit."""
+        return replace(
+            self, weights=self.weights * factor, driving=self.driving * factor,
+            floors=tuple((weights * factor, floor * factor) for weights, floor in self.floors),
+            risk=None if self.risk is None else self.risk.times(factor))
+
+    def within(self, reach: BoolArray) -> Goal:
+        """The same goal without the rewards of visits that can't be made.
+
+        Args:
+            reach: Whether vehicle m can visit site j, shape (M, n).
+        """
+        risk = self.risk and replace(self.risk, outcomes=replace(
+            self.risk.outcomes, incentives=np.where(reach, self.risk.outcomes.incentives, 0.0)))
+        return replace(self, weights=np.where(reach, self.weights, 0.0), risk=risk)
+
     def rewarded(self) -> BoolArray:
         """Whether the visit of vehicle m to site j counts anywhere, shape (M, n)."""
         counts: BoolArray = self.weights != 0
         for weights, _ in self.floors:
             counts = counts | (weights != 0)
         return counts
+
+
+def sizes_of(floors: Sequence[tuple[FloatArray, float]]) -> FloatArray:
+    """By what to divide each floor's row so that a solver's absolute tolerance is a relative one, shape (floors,)."""
+    return np.array([max(abs(floor), float(np.abs(weights).max(initial=0.0))) or 1.0 for weights, floor in floors])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -225,10 +247,9 @@ def formulate(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> tuple[
         entering = np.flatnonzero(legs.destination == poi)
         if len(entering):
             build.add(entering, np.ones(len(entering)), -np.inf, 1.0)
-    for weights, floor in goal.floors:
+    for (weights, floor), size in zip(goal.floors, sizes_of(goal.floors), strict=True):
         values = weights[legs.vehicle, legs.destination]
         counted = np.flatnonzero(values)
-        size = max(1.0, abs(floor))  # rows near 1, so that the solver's absolute tolerance is a relative one
         build.add(counted, values[counted] / size, floor / size, np.inf)
     return LinearModel(objective=objective, upper=upper, integer=integer, rows=build.rows()), legs
 

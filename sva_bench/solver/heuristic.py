@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.interrupts import deferring_ctrl_c
+from sva_bench.solver.looking import stop_mark
 from sva_bench.solver.packing import Route, best_packing
 from sva_bench.solver.routes import FRONT, Tables
 from sva_bench.solver.ruin_recreate import rounds as run_rounds
@@ -47,6 +49,7 @@ class Found:
 def search(
     tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, seed: int = 0, starts: int = STARTS,
     stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
+    offer: Callable[[Orders], None] = lambda orders: None,  # noqa: ARG005
 ) -> Found:
     """A plan worth at least as much as the one it starts from.
 
@@ -59,6 +62,7 @@ def search(
         seed: Seed of the random choices.
         starts: How often to start, the first time from the given plan and then from nothing.
         stop: Whether to stop, given the best value so far.
+        offer: Takes every better plan, for Ctrl-C ends the search.
     """
     vehicles, n = weights.shape
     best = start
@@ -82,14 +86,16 @@ def search(
         size = 0
         looks = (0, *range(1, rounds, -(-rounds // _LOOKS)), rounds)  # a first plan at once
         for done, until in itertools.pairwise(looks):
-            size = run_rounds(
-                rng, until - done, done, _CYCLE, _HEAT, tables.kind, tables.base, tables.fuel_s,
-                tables.time_s, tables.quickest_s, tables.first, tables.last, tables.hops, tables.capacity_s,
-                tables.limit_s, near, weights, survival, detour, current, current_length, incumbent, incumbent_length,
-                pool, length, kind, size, table, keys, ordered)
-            found = _as_orders(incumbent, incumbent_length)
-            if value_of(weights, survival, found) > value_of(weights, survival, best):
-                best = found
+            with deferring_ctrl_c():
+                size = run_rounds(
+                    rng, until - done, done, _CYCLE, _HEAT, tables.kind, tables.base, tables.fuel_s,
+                    tables.time_s, tables.quickest_s, tables.first, tables.last, tables.hops, tables.capacity_s,
+                    tables.limit_s, near, weights, survival, detour, current, current_length, incumbent,
+                    incumbent_length, pool, length, kind, size, table, keys, ordered, stop_mark())
+                found = _as_orders(incumbent, incumbent_length)
+                if value_of(weights, survival, found) > value_of(weights, survival, best):
+                    best = found
+                    offer(best)
             if stop(value_of(weights, survival, best)):
                 break
         routes.update(dict.fromkeys(
@@ -113,11 +119,12 @@ def shorten(tables: Tables, orders: Orders) -> Orders:
     n = tables.fuel_s.shape[1]
     array, length = _as_arrays(orders, n)
     spare, sums = np.zeros(n, np.int64), np.zeros((2, n + 2))
-    for m, k in enumerate(tables.kind):
-        if length[m]:
-            straighten(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
-                       tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
-                       np.zeros((4, FRONT)), spare, sums)
+    with deferring_ctrl_c():
+        for m, k in enumerate(tables.kind):
+            if length[m]:
+                straighten(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
+                           tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
+                           np.zeros((4, FRONT)), spare, sums)
     return _as_orders(array, length)
 
 

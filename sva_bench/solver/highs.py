@@ -11,7 +11,11 @@ import highspy
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.interrupts import deferring_ctrl_c, heard_ctrl_c, pressed
 from sva_bench.solver.formulation import LinearModel, Rows
+
+_LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
+_LOOK_S = 0.1  # between two looks whether Ctrl-C was pressed
 
 SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
 INTEGRALITY = 1e-9
@@ -63,9 +67,11 @@ class Relaxation:
 
     def __init__(self, model: LinearModel) -> None:
         self._solver = _open(model)
+        self._entries = len(model.rows.value)
 
     def add(self, rows: Rows) -> None:
         """Add rows; the next solve starts from the last basis."""
+        self._entries += len(rows.value)
         _check(self._solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1],
                                     rows.column, rows.value), "addRows")
 
@@ -77,13 +83,20 @@ class Relaxation:
     def add_columns(self, objective: FloatArray, start: IntArray, row: IntArray, value: FloatArray) -> None:
         """Add columns from 0 up without upper bound; the next solve starts from the last basis."""
         count = len(objective)
+        self._entries += len(value)
         _check(self._solver.addCols(count, objective, np.zeros(count), np.full(count, math.inf), len(value),
                                     start[:-1], row, value), "addCols")
 
     def solve(self, time_limit_s: float) -> Relaxed:
-        """The optimum over the rows and columns so far."""
+        """The optimum over the rows and columns so far; a large program is given up on Ctrl-C."""
         _option(self._solver, "time_limit", time_limit_s)
-        _check(self._solver.run(), "run")
+        if self._entries < _LARGE:
+            _check(self._solver.run(), "run")
+        else:
+            with deferring_ctrl_c():
+                interrupted = _run_interruptibly(self._solver)
+            if interrupted:
+                raise KeyboardInterrupt
         status = _status(self._solver)
         nothing = np.zeros(0)
         if status != "optimal":
@@ -100,7 +113,7 @@ class Relaxation:
         """The optimum over whole values of some columns, proved but for rounding; the relaxation is lost."""
         _set_whole(self._solver, columns)
         return _branch_and_bound(self._solver, gap=0.0, absolute_gap=1e-6, time_limit_s=time_limit_s, most_nodes=None,
-                                 heuristics=0.05)
+                                 heuristics=0.05, whole=len(columns) > 0)
 
 
 def maximise(
@@ -129,7 +142,7 @@ def maximise(
         solution.col_value = start.tolist()
         _check(solver.setSolution(solution), "setSolution")
     return _branch_and_bound(solver, gap=gap, absolute_gap=absolute_gap, time_limit_s=time_limit_s,
-                             most_nodes=most_nodes, heuristics=heuristics)
+                             most_nodes=most_nodes, heuristics=heuristics, whole=bool(model.integer.any()))
 
 
 def _set_whole(solver: Any, columns: IntArray) -> None:
@@ -139,6 +152,7 @@ def _set_whole(solver: Any, columns: IntArray) -> None:
 
 def _branch_and_bound(
     solver: Any, *, gap: float, absolute_gap: float, time_limit_s: float, most_nodes: int | None, heuristics: float,
+    whole: bool,
 ) -> Outcome:
     _option(solver, "mip_rel_gap", gap)
     _option(solver, "mip_abs_gap", absolute_gap)
@@ -148,11 +162,13 @@ def _branch_and_bound(
     _option(solver, "time_limit", time_limit_s)
     if most_nodes is not None:
         _option(solver, "mip_max_nodes", most_nodes)
-    interrupted = _run_interruptibly(solver)
+    with deferring_ctrl_c():
+        interrupted = _run_interruptibly(solver)
     status: SolveStatus = "interrupted" if interrupted else _status(solver)
     info = solver.getInfo()
     found = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
-    bound = float(info.mip_dual_bound)
+    # Without integer columns, as where no route is left to choose, HiGHS solves a linear program and states no bound.
+    bound = float(info.mip_dual_bound if whole else info.objective_function_value)
     if not math.isfinite(bound) or status == "infeasible":
         bound = -math.inf if status == "infeasible" else math.inf
     return Outcome(
@@ -185,7 +201,10 @@ def _open(model: LinearModel) -> Any:
 
 
 def _run_interruptibly(solver: Any) -> bool:
-    """Run in a thread, so that Ctrl-C reaches us at once and not after the solve; whether it did."""
+    """Run in a thread, so that Ctrl-C reaches us at once and not after the solve; whether it did.
+
+    It counts as heard: what the solver has by then is still to be taken up.
+    """
     solver.HandleUserInterrupt = True
     ended: list[Any] = []
     over = Event()  # not Thread.join: interrupted, it takes a running thread for a dead one (Python 3.11)
@@ -199,11 +218,9 @@ def _run_interruptibly(solver: Any) -> bool:
     thread = Thread(target=run, daemon=True)
     thread.start()
     interrupted = False
-    while True:
-        try:
-            if over.wait(0.2):
-                break
-        except KeyboardInterrupt:
+    while not over.wait(_LOOK_S):
+        if pressed():
+            heard_ctrl_c()
             interrupted = True
             solver.cancelSolve()
     thread.join()

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.interrupts import hear_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Status
 from sva_bench.solver.cuts import Cut
@@ -18,12 +19,10 @@ from sva_bench.solver.heuristic import Orders
 from sva_bench.solver.heuristic import value_of as rewards
 from sva_bench.solver.refuelling import Road, quickest, road_of
 from sva_bench.solver.routes import Tables, tables_of
+from sva_bench.solver.units import common_unit
 
 Routes = tuple[tuple[int, ...], ...]
 """Sites of each vehicle's route, from base to base; empty for one that stays home."""
-
-_DECIMALS = 1000  # incentives times probabilities are often whole in thousandths
-
 
 @dataclass(frozen=True, kw_only=True)
 class SolveLimits:
@@ -31,7 +30,7 @@ class SolveLimits:
 
     Attributes:
         time_limit_s: Wall-clock time for one plan [s]; ``None`` = none.
-        gap: Relative gap (absolute below a value of 1) at which a plan counts as optimal.
+        gap: Gap, relative to the value, at which a plan counts as optimal.
     """
 
     time_limit_s: float | None = None
@@ -63,7 +62,8 @@ class Clock:
         return time.monotonic() - self.started
 
     def out(self) -> bool:
-        """Whether no time is left."""
+        """Whether no time is left; Ctrl-C is heard here at the latest."""
+        hear_ctrl_c()
         return time.monotonic() >= self.deadline
 
 
@@ -156,16 +156,22 @@ class Progress:
     rounds: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     grain: float = 0.0  # every plan's value is a multiple of it; 0 = unknown
+    rounding: float = 0.0  # a bound that is above the value by no more is the value
 
     def tighten(self, bound: float) -> None:
         """Take up an upper bound, and round it down to a value that a plan can have."""
         if self.grain and math.isfinite(bound):
-            bound = math.floor(bound / self.grain + 1e-6) * self.grain
+            bound = math.floor((bound + self.rounding) / self.grain + 1e-6) * self.grain
         self.bound = min(self.bound, bound)
 
     def closed(self, gap: float) -> bool:
         """Whether nothing is left to prove."""
-        return self.bound - self.value <= gap * max(1.0, abs(self.value))
+        return self.bound - self.value <= max(gap * abs(self.value), self.rounding)
+
+    def slack(self, gap: float) -> float:
+        """By how much another plan must be worth more to be of interest: less is within the gap, or below the next
+        value that a plan can have, or rounding."""
+        return max(gap * abs(self.value), (1 - 1e-5) * self.grain, self.rounding / 2)
 
 
 def best_known(goal: Goal, known: Knowledge) -> Orders | None:
@@ -246,10 +252,6 @@ def trivial_bound(goal: Goal) -> float:
 
 def grain_of(goal: Goal) -> float:
     """The greatest number of which every plan's value is a multiple; 0 where none is plain to see."""
-    scaled = goal.weights * _DECIMALS
-    whole = np.rint(scaled)
     if goal.driving or goal.survival is not None or goal.risk is not None:
         return 0.0
-    if np.abs(scaled - whole).max(initial=0.0) > 1e-9 or np.abs(whole).max(initial=0.0) > 1e9:
-        return 0.0
-    return float(np.gcd.reduce(np.abs(whole).astype(np.int64), axis=None)) / _DECIMALS
+    return common_unit(goal.weights.ravel())

@@ -18,6 +18,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sva_bench.solver.looking import OFTEN, look, now_s
+
 CHUNK = 32  # labels of a site that are tested for dominance together
 KEYS = 5  # POIs by which a site's labels are told apart: only those with a subset of a label's can beat it
 BUCKETS = 256  # of time, by which labels are treated in order
@@ -25,7 +27,7 @@ _EPSILON = 1e-9
 
 
 @njit(cache=True)
-def completion(legs, time, gain, charge, bit, base, step, steps):
+def completion(legs, time, gain, charge, bit, base, step, steps, stop):
     """Most value that a way from a site to the base can add in so many steps of time, shape (steps + 1, n).
 
     Ways may repeat sites but not turn straight back to a POI, and need no fuel; legs take whole steps, rounded down.
@@ -34,6 +36,8 @@ def completion(legs, time, gain, charge, bit, base, step, steps):
     best, second = np.full((steps + 1, n), -np.inf), np.full((steps + 1, n), -np.inf)
     by = np.full((steps + 1, n), -1, np.int64)
     for t in range(steps + 1):
+        if look(stop):
+            break
         for i in range(n):
             if i == base:
                 continue
@@ -58,14 +62,14 @@ def completion(legs, time, gain, charge, bit, base, step, steps):
 
 @njit(cache=True)
 def grow(following, count, time, fuel, bit, memory, reward, dual, charge, survival, base, half, capacity, limit, bound,
-         step, threshold, exact, forwards, most, touch, recall, once, toll):
+         step, threshold, exact, forwards, most, touch, recall, once, toll, stop, left_s):
     """All labels from one end up to half the limit that no other one beats.
 
     Returns:
         Site, time, fuel, value, second value, memory, tolls ahead, parent, and labels by site, each site's by
-        decreasing value: first a table of where a site's begin. Then whether there were too many. The second value is
-        the chance to get so far forwards; backwards minus the price of the visits, which is what the rest is worth if
-        never reached.
+        decreasing value: first a table of where a site's begin. Then whether there were too many, or no time was left
+        for more. The second value is the chance to get so far forwards; backwards minus the price of the visits, which
+        is what the rest is worth if never reached.
     """
     n, words = memory.shape
     room = 4096
@@ -90,6 +94,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     c_mask, c_due = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
     c_least, c_most = np.zeros(chunks), np.zeros(chunks)
     used, overflow = 0, False
+    looked, end_s = 0, now_s() + left_s
     bounded = len(bound) > 0
     new = np.zeros(words, np.uint64)
     for bucket in range(BUCKETS + 1):
@@ -107,6 +112,10 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
             head[bucket] = -1
             for position in np.argsort(when):
                 label = batch[position]
+                looked += 1
+                if looked % OFTEN == 0 and (look(stop) or now_s() > end_s):
+                    overflow = True
+                    break
                 i = site[label]
                 # Does a standing label beat it?
                 beaten = False
@@ -288,7 +297,7 @@ def _taller(array, size):
 
 
 @njit(cache=True)
-def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, once, toll,
+def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, once, toll, stop,
          t, q, x, y, mask, due, of_site, t_b, q_b, x_b, y_b, mask_b, due_b, of_site_b):
     """For each label from the start the best rest of the route worth more than the threshold.
 
@@ -303,6 +312,8 @@ def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, disco
     found = 0
     for i in range(n):
         for k in range(begin[i], begin[i + 1]):
+            if k % OFTEN == 0 and look(stop):
+                return value[:0], left[:0], right[:0]
             label = by_site[k]
             best, partner = threshold, -2
             if legs[i, base] and t[label] + time[i, base] <= limit and q[label] + fuel[i, base] <= capacity:

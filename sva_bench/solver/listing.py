@@ -6,18 +6,19 @@ import numpy as np
 from numba import njit
 
 from sva_bench.solver.labelling import charged
+from sva_bench.solver.looking import OFTEN, look, now_s
 
 _EPSILON = 1e-9
 
 
 @njit(cache=True)
 def ways(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, bound, step, threshold, most, touch,
-          recall, once, toll):
+          recall, once, toll, stop, left_s):
     """Ways from the base, of those over the same POIs to the same site none that is later and emptier than another.
 
     Returns:
         Site and parent of each way's end; the ends of the best routes, one for each set of POIs; whether there were
-        too many.
+        too many, or no time was left for more.
     """
     n = len(gain)
     site, parent = np.zeros(most, np.int32), np.full(most, -1, np.int32)
@@ -32,8 +33,10 @@ def ways(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, boun
     best, worth = np.full(places, -1, np.int64), np.zeros(places)
     site[0], due[0], size = base, once, 1
     new = np.zeros(words, np.uint64)
-    label = 0
+    label, end_s = 0, now_s() + left_s
     while label < size:
+        if label % OFTEN == 0 and (look(stop) or now_s() > end_s):
+            return site[:size], parent[:size], np.zeros(0, np.int64), True
         i = site[label]
         if dead[label]:
             label += 1

@@ -29,12 +29,13 @@ from sva_bench.solver.knowledge import Clock, Knowledge, Progress, adopt, withou
 from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
 from sva_bench.solver.recourse import legs_out_of_pois, together
+from sva_bench.solver.units import LARGEST
 
 _log = logging.getLogger(__name__)
 
 Cuts = Literal["single", "multi", "pareto"]
 
-_TOLERANCE = 1e-7  # relative; a cut that is broken by less adds nothing
+_TOLERANCE = 1e-9  # relative; a cut that is broken by less adds nothing
 
 
 def prove_by_duals(
@@ -51,9 +52,9 @@ def prove_by_duals(
             progress.status = "time_limit"
             return
         iteration += 1
-        slack = max(gap / 2 * max(1.0, abs(progress.value)), 0.99 * progress.grain)
         outcome = maximise(master.model, together(master.rows(subtours), master.optimality_rows()), gap=gap / 2,
-                           absolute_gap=slack, time_limit_s=clock.left_s(), start=master.point(progress.orders))
+                           absolute_gap=progress.slack(gap / 2), time_limit_s=clock.left_s(),
+                           start=master.point(progress.orders))
         progress.rounds += 1
         progress.nodes += outcome.nodes
         progress.tighten(progress.value if outcome.status == "infeasible" else outcome.bound)
@@ -136,7 +137,7 @@ class _Master(DirectedModel):
         if self._kind == "single":
             found = [np.einsum("o,ok->k", self._recourse.probability, np.array(found))]
         broken = [(number, lost) for number, lost in enumerate(found)
-                  if float(lost @ driven) > eta[number] + _TOLERANCE * max(1.0, abs(float(eta[number])))]
+                  if float(lost @ driven) > eta[number] + _TOLERANCE * max(LARGEST, abs(float(eta[number])))]
         self.optimality += broken
         return len(broken)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,10 @@ class Outcomes:
     incentives: FloatArray
     probability: FloatArray
     available: FloatArray
+
+    def times(self, factor: float) -> Outcomes:
+        """The same outcomes with rewards in another unit."""
+        return replace(self, incentives=self.incentives * factor)
 
 
 def possible(instance: Instance) -> dict[frozenset[str], float]:

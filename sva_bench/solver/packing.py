@@ -57,13 +57,15 @@ def best_packing(
     ranked = np.argsort(-relaxed.reduced, kind="stable")[:MOST_COLUMNS]
     good = tuple((columns[k][0], columns[k][3]) for k in np.sort(ranked[:MOST_GOOD]))
     room = relaxed.objective - float(objective @ start)
-    if room <= _EPSILON * max(1.0, relaxed.objective):
+    if room <= _EPSILON * relaxed.objective:
         return incumbent, good
     kept = [int(k) for k in np.sort(ranked) if relaxed.reduced[k] >= -room - 1e-6 or start[k]]
     kept = sorted({*kept, *np.flatnonzero(start).tolist()})
     columns = [columns[k] for k in kept]
     outcome = maximise(_program(columns, objective[kept], vehicles, n), Rows.none(), gap=1e-9, absolute_gap=0.0,
                        time_limit_s=np.inf, start=start[kept], most_nodes=_NODES)
+    if outcome.status == "interrupted":
+        raise KeyboardInterrupt
     if outcome.values is None:
         return incumbent, good
     plan: list[tuple[int, ...]] = [()] * vehicles

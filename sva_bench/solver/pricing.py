@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.solver.graph import Graph
 from sva_bench.solver.labelling import completion, grow, join
+from sva_bench.solver.looking import stop_mark
 from sva_bench.solver.subset_row import Tolls
 
 STEPS = 500  # of time, for completion bounds
@@ -38,7 +39,7 @@ class Priced:
 
 def price(
     graph: Graph, reward: FloatArray, dual: FloatArray, charge: float, memory: NDArray[np.uint64], *, threshold: float,
-    exact: bool, most_routes: int, most_labels: int, tolls: Tolls,
+    exact: bool, most_routes: int, most_labels: int, tolls: Tolls, left_s: float = math.inf,
 ) -> Priced:
     """The routes of greatest reduced value.
 
@@ -53,6 +54,7 @@ def price(
         most_routes: How many to return.
         most_labels: Labels from one end after which an exact run gives up its proof.
         tolls: What cuts charge; none under failure along the route.
+        left_s: Time after which labels stop growing, which then prove nothing [s].
     """
     if len(tolls.price) and graph.survival < 1.0:
         raise ValueError("labels that are discounted can't be charged for cuts")
@@ -62,19 +64,20 @@ def price(
     none = np.zeros((0, len(legs)))
     step, ahead_bound, behind_bound = bounds_of(graph, local, charge) if exact else (1.0, none, none)
     following, count = _adjacent(legs)
+    stop = stop_mark()
     ahead = behind = grow(
         following, count, time, fuel, local.bit, memory, local.reward, local.dual, charge, graph.survival, base, half,
         graph.capacity_s, graph.limit_s, ahead_bound, step, threshold, exact, True, most_labels, local.touch,
-        local.recall, tolls.once, tolls.price)
+        local.recall, tolls.once, tolls.price, stop, left_s)
     if not graph.symmetric:
         following, count = _adjacent(legs.T)
         behind = grow(
             following, count, time.T.copy(), fuel.T.copy(), local.bit, memory, local.reward, local.dual, charge,
             graph.survival, base, half, graph.capacity_s, graph.limit_s, behind_bound, step, threshold, exact,
-            graph.survival == 1.0, most_labels, local.touch, local.recall, tolls.once, tolls.price)
+            graph.survival == 1.0, most_labels, local.touch, local.recall, tolls.once, tolls.price, stop, left_s)
     value, left, right = join(
         legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, graph.survival < 1.0,
-        tolls.once, tolls.price, *ahead[1:7], ahead[8], *behind[1:7], behind[8])
+        tolls.once, tolls.price, stop, *ahead[1:7], ahead[8], *behind[1:7], behind[8])
     order = np.argsort(-value, kind="stable")[:most_routes]
     routes = []
     for k in order:
@@ -141,11 +144,12 @@ def bounds_of(graph: Graph, local: Local, charge: float) -> tuple[float, FloatAr
     steps = STEPS if math.isinf(shortest) else max(STEPS, int(np.ceil(graph.limit_s / shortest)) + 1)
     step = graph.limit_s / steps
     gain = graph.survival * local.reward - local.dual
-    ahead = completion(local.legs, local.time_s, gain, charge, local.bit, local.base, step, steps)
+    stop = stop_mark()
+    ahead = completion(local.legs, local.time_s, gain, charge, local.bit, local.base, step, steps, stop)
     if graph.symmetric:
         return step, ahead, ahead
     return step, ahead, completion(local.legs.T.copy(), local.time_s.T.copy(), gain, charge, local.bit, local.base,
-                                   step, steps)
+                                   step, steps, stop)
 
 
 def _adjacent(legs: BoolArray) -> tuple[IntArray, IntArray]:

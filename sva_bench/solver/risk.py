@@ -14,7 +14,7 @@ Source:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -57,6 +57,11 @@ class Risk:
 
     measure: RiskMeasure
     outcomes: Outcomes
+
+    def times(self, factor: float) -> Risk:
+        """The same measure with incentives in another unit."""
+        return Risk(measure=replace(self.measure, target=self.measure.target * factor),
+                    outcomes=self.outcomes.times(factor))
 
     def of(self, sums: FloatArray) -> float:
         """Value of the measure, without its weight, for sums of incentives by vehicle, shape (M,)."""

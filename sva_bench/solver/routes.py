@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.formulation import SLACK_S
 from sva_bench.solver.preprocess import shortest_paths
@@ -71,7 +72,8 @@ def tables_of(instance: Instance) -> Tables:
         quickest[k] = np.where(fuel[k] <= capacity[k], time[k], np.inf)
         if len(stations) and vehicle.fuel_capacity_s < vehicle.mission_limit_s:
             chain = shortest_paths(quickest[k][np.ix_(stations, stations)], -1)
-            found, first[k], last[k] = _ways(fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k])
+            with deferring_ctrl_c():
+                found, first[k], last[k] = _ways(fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k])
             first[k] += offset
             last[k] += offset
             offset += len(found)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sva_bench.solver.looking import look
 from sva_bench.solver.routes import FRONT, fronts, route_time, time_with
 
 _SHORT = 8  # POIs up to which a longer way may be tried, for it may save a refuel
@@ -32,7 +33,7 @@ def worth(order, length, weights, survival):
 @njit(cache=True)
 def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, first, last, hops, capacity, limit, near,
            weights, survival, detour, current, current_length, best, best_length, pool, pool_length, pool_kind,
-           pool_size, pool_table, keys, ordered):
+           pool_size, pool_table, keys, ordered, stop):
     """So many rounds; works on ``current``, ``best`` and ``pool`` in place; the size of the pool.
 
     Args:
@@ -52,6 +53,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
         pool: Routes met, shape (most, n), with length, kind and a hash table of twice their number or more.
         keys: Random keys of the sites for hashing, shape (n,).
         ordered: Whether routes with the same POIs in another order are different ones.
+        stop: Not 0 once it should end.
     """
     vehicles, n = weights.shape
     orders, lengths = current.copy(), current_length.copy()
@@ -69,6 +71,8 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
         current_value += worth(current[m], current_length[m], weights[m], survival[m])
         best_value += worth(best[m], best_length[m], weights[m], survival[m])
     for number in range(done, done + count):
+        if look(stop):
+            break
         orders[:], lengths[:] = current, current_length
         if vehicles > 1 and rng.random() < _SWAP:
             _swap(rng, orders, lengths, weights, spare)

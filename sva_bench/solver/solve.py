@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.interrupts import deferring_ctrl_c, hearing_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.branch_and_cut import FlowModel, prove_by_cuts
 from sva_bench.solver.branch_and_price import BranchAndPrice
@@ -35,6 +36,7 @@ from sva_bench.solver.packing import Route
 from sva_bench.solver.preprocess import Scope, scope_of
 from sva_bench.solver.recourse import EquivalentModel
 from sva_bench.solver.undirected import UndirectedModel, serves
+from sva_bench.solver.units import ROUNDING, factor_of, most_of_a_visit
 
 Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
 TWO_STAGE: tuple[Method, ...] = ("dep", "relaxed", "lshaped")
@@ -67,38 +69,34 @@ def solve(
     Raises:
         ValueError: If the goal has floors and no known plan reaches them.
     """
-    known.check(instance)
+    with deferring_ctrl_c():
+        return _solve(instance, goal, known, clock, gap, method, recourse, cuts)
+
+
+def _solve(
+    instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method,
+    recourse: Outcomes | None, cuts: Cuts,
+) -> Solution:
     start = best_known(goal, known)
     if start is None:
         raise ValueError("no known plan reaches the floors of the goal")
+    rewarded = goal.rewarded()
+    scopes = [scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles)]
+    goal = goal.within(np.array([scope.legs.any(axis=0) for scope in scopes]).reshape(goal.weights.shape))
+    factor = factor_of(goal)
+    goal = goal.times(factor)
     progress = Progress(orders=start, value=value_of(goal, known.roads, start), bound=trivial_bound(goal),
-                        grain=grain_of(goal))
-    routes: Sequence[Route] = ()
+                        grain=grain_of(goal), rounding=ROUNDING * most_of_a_visit(goal))
+    if method == "auto":
+        method = choice(instance, scopes, goal)
     try:
-        rewarded = goal.rewarded()
-        scopes = [scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles)]
-        if method == "auto":
-            method = choice(instance, scopes, goal)
-        if (not goal.floors or goal.risk) and not goal.driving and bool((goal.weights >= 0).all()):
-            began = clock.used_s()
-            found = search(
-                known.tables, _searched(goal), goal.chances(), start,
-                stop=lambda value: clock.out() or (
-                    goal.risk is None and progress.bound - value <= gap * max(1.0, value)))
-            adopt(progress, goal, known, found.orders)
-            routes = found.routes
-            progress.seconds["heuristic"] = clock.used_s() - began
-        if not progress.closed(gap):
-            if method == "branch-and-price":
-                _prove_by_columns(instance, scopes, goal, known, clock, gap, progress, routes)
-            elif method == "lshaped" and recourse is not None:
-                prove_by_duals(instance, scopes, goal, recourse, cuts, known, clock, gap, progress)
-            else:
-                prove_by_cuts(_model(instance, scopes, goal, known, method, recourse), instance, goal, known, clock,
-                              gap, progress)
+        with hearing_ctrl_c():
+            _search_and_prove(instance, scopes, goal, known, clock, gap, method,
+                              None if recourse is None else recourse.times(factor), cuts, progress)
     except KeyboardInterrupt:
         progress.status = "interrupted"
-    progress.bound = max(progress.bound, progress.value)
+    if progress.bound - progress.value <= progress.rounding:
+        progress.bound = progress.value
     if progress.closed(gap):
         progress.status = "optimal"
     orders = progress.orders
@@ -107,9 +105,36 @@ def solve(
     known.orders[orders] = None
     return Solution(
         routes=tuple(drive(road, order) for road, order in zip(known.roads, orders, strict=True)), orders=orders,
-        value=progress.value, bound=progress.bound, status=progress.status, nodes=progress.nodes, cuts=progress.cuts,
-        optimality_cuts=progress.optimality_cuts, rounds=progress.rounds, seconds=progress.seconds,
+        value=progress.value / factor, bound=progress.bound / factor, status=progress.status, nodes=progress.nodes,
+        cuts=progress.cuts, optimality_cuts=progress.optimality_cuts, rounds=progress.rounds, seconds=progress.seconds,
         method=method)
+
+
+def _search_and_prove(
+    instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, clock: Clock, gap: float,
+    method: Method, recourse: Outcomes | None, cuts: Cuts, progress: Progress,
+) -> None:
+    """Find a good plan, and prove it or a better one, as far as time allows."""
+    routes: Sequence[Route] = ()
+    if (not goal.floors or goal.risk) and not goal.driving and bool((goal.weights >= 0).all()):
+        began = clock.used_s()
+        found = search(
+            known.tables, _searched(goal), goal.chances(), progress.orders,
+            stop=lambda value: clock.out() or (
+                goal.risk is None and progress.bound - value <= gap * abs(value)),
+            offer=lambda orders: adopt(progress, goal, known, orders))
+        adopt(progress, goal, known, found.orders)
+        routes = found.routes
+        progress.seconds["heuristic"] = clock.used_s() - began
+    if progress.closed(gap):
+        return
+    if method == "branch-and-price":
+        _prove_by_columns(instance, scopes, goal, known, clock, gap, progress, routes)
+    elif method == "lshaped" and recourse is not None:
+        prove_by_duals(instance, scopes, goal, recourse, cuts, known, clock, gap, progress)
+    else:
+        prove_by_cuts(_model(instance, scopes, goal, known, method, recourse), instance, goal, known, clock, gap,
+                      progress)
 
 
 def _searched(goal: Goal) -> FloatArray:
@@ -162,14 +187,13 @@ def _prove_by_columns(
 
     def cutoff() -> float:
         """Bounds up to here hold nothing better: too close, or below the next value that a plan can have."""
-        slack = max(_WITHIN * gap * max(1.0, abs(progress.value)), (1 - 1e-5) * progress.grain)
-        return progress.value + slack
+        return progress.value + progress.slack(_WITHIN * gap)
 
     def offer(orders: Orders) -> None:
         adopt(progress, goal, known, orders)
 
     generation = ColumnGeneration(instance=instance, goal=goal, scopes=scopes, survival=goal.chances(), cutoff=cutoff,
-                                  out=clock.out)
+                                  out=clock.out, left_s=clock.left_s)
     for m, order in (*enumerate(progress.orders), *routes):
         generation.add_route(m, drive(known.roads[m], order))
     search_tree = BranchAndPrice(generation=generation, offer=offer, left_s=clock.left_s, tell=progress.tighten)

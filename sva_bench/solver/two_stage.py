@@ -17,7 +17,8 @@ from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Objective, Plan, Status
 from sva_bench.solver.formulation import Goal
 from sva_bench.solver.heuristic import Orders
-from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of
+from sva_bench.solver.heuristic import value_of as rewards
+from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of, value_of
 from sva_bench.solver.lshaped import Cuts
 from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
@@ -25,6 +26,7 @@ from sva_bench.solver.recourse import refuse_free_legs
 from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.risk import Risk, RiskMeasure
 from sva_bench.solver.solve import TWO_STAGE, Method, solve
+from sva_bench.solver.units import in_own_units
 
 __all__ = [
     "DeterministicPlans",
@@ -45,6 +47,7 @@ TIE = 1e-6
 MOST_SUBSETS = 16
 """Subsets of uncertain vehicles up to which the value of perfect information is worked out unasked."""
 _FLOOR = 1e-8  # relative; keeps a known optimum feasible when its value becomes a constraint
+_ROUNDING = 1e-12  # relative; of sums of incentives
 _STATUSES: tuple[Status, ...] = ("optimal", "feasible", "time_limit", "interrupted")  # best first
 
 
@@ -101,22 +104,28 @@ def plan_averse(
     if instance.failure == "per_leg":
         raise BadInput(f"instance {instance.name}: measures of risk are over the outcomes of mission, the instance "
                        "fails per leg; set its failure to mission")
-    outcomes = outcomes_of(instance, possible(instance))
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
     known.check(instance)
     clock = limits.clock()
     warn_of_unreachable(instance)
-    risk = Risk(measure=measure, outcomes=outcomes)
-    goal = Goal(
-        weights=(1 - measure.weight) * _availability(instance)[:, None] * outcomes.incentives, risk=risk,
-        floors=tuple((there[:, None] * outcomes.incentives, risk.side) for there in outcomes.available)
-        if measure.weight > 0 else ())
+    own, unit = in_own_units(instance)
+    solution = solve(own, _averse(own, replace(measure, target=measure.target / unit)), known, clock, limits.gap)
+    value = value_of(_averse(instance, measure), known.roads, solution.orders)
+    return _finish(instance, measure.kind, solution.orders, known, value=value,
+                   bound=value + unit * (solution.bound - solution.value), status=solution.status,
+                   solutions=[solution], runtime_s=clock.used_s())
+
+
+def _averse(instance: Instance, measure: RiskMeasure) -> Goal:
+    """The goal of a measure of risk."""
+    outcomes = outcomes_of(instance, possible(instance))
+    weights = (1 - measure.weight) * _availability(instance)[:, None] * outcomes.incentives
     if measure.weight == 0:
-        goal = replace(goal, risk=None)
-    solution = solve(instance, goal, known, clock, limits.gap)
-    return _finish(instance, measure.kind, solution.orders, known, value=solution.value, bound=solution.bound,
-                   status=solution.status, solutions=[solution], runtime_s=clock.used_s())
+        return Goal(weights=weights)
+    risk = Risk(measure=measure, outcomes=outcomes)
+    return Goal(weights=weights, risk=risk, floors=tuple(
+        (there[:, None] * outcomes.incentives, risk.side) for there in outcomes.available))
 
 
 def plan_nominal(
@@ -152,6 +161,7 @@ def plan_deterministic(
     instance = replace(instance, failure="mission")
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
+    known.check(instance)
     clock = limits.clock()
     if nominal is None:
         nominal = plan_nominal(instance, limits, known=known, method=method, cuts=cuts)
@@ -159,26 +169,27 @@ def plan_deterministic(
         raise ValueError("the nominal plan must state its value, bound and status")
     nominal_orders, stochastic_orders = (_orders(instance, plan, known) for plan in (nominal, stochastic))
     known.orders.update(dict.fromkeys((nominal_orders, stochastic_orders)))
-    ties = _Ties(instance, nominal_orders, known, clock, limits.gap, "auto" if method in TWO_STAGE else method)
+    ties = _Ties(in_own_units(instance)[0], nominal_orders, known, clock, limits.gap,
+                 "auto" if method in TWO_STAGE else method)
     most, least, soonest = ties.solutions(nominal.status == "interrupted")
     best = soonest or most
     orders = best.orders if best else nominal_orders
-    expected, total = ties.expected(orders), _sum(_incentives(instance), orders)
+    expected, total = _expected(instance, orders), _sum(_incentives(instance), orders)
     solutions = [s for s in (most, least, soonest) if s is not None]
     plan = _finish(
-        instance, "deterministic", orders, known, value=total, bound=max(nominal.bound or total, total),
+        instance, "deterministic", orders, known, value=total, bound=nominal.bound or total,
         status=_worst([nominal.status or "feasible", *(s.status for s in solutions)]), solutions=solutions,
         runtime_s=clock.used_s())
-    if stochastic.value is not None and expected >= stochastic.value - TIE * max(1.0, abs(stochastic.value)):
+    if stochastic.value is not None and expected >= stochastic.value - TIE * abs(stochastic.value):
         stochastic = _certified(instance, replace(
             stochastic, routes=plan.routes, fuel_s=plan.fuel_s, value=expected,
-            bound=None if stochastic.bound is None else max(stochastic.bound, expected)))
-    lowest = min(expected, ties.expected(least.orders) if least else expected)
+            bound=None if stochastic.bound is None else _above(stochastic.bound, expected)))
+    lowest = min(expected, _expected(instance, least.orders) if least else expected)
     worst = None
-    if least and lowest < expected - TIE * max(1.0, abs(expected)):
+    if least and lowest < expected - TIE * abs(expected):
         total = _sum(_incentives(instance), least.orders)
         worst = _finish(instance, "deterministic", least.orders, known, value=total,
-                        bound=max(plan.bound or total, total), status=plan.status or "feasible", solutions=[least],
+                        bound=plan.bound or total, status=plan.status or "feasible", solutions=[least],
                         runtime_s=clock.used_s())
     return DeterministicPlans(plan=plan, stochastic=stochastic, most=expected, least=lowest, worst=worst)
 
@@ -199,18 +210,19 @@ def wait_and_see(
     """
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
+    known.check(instance)
     outcomes = possible(instance)
     if len(outcomes) > MOST_SUBSETS and not force:
         return None
-    clock, total = limits.clock(), 0.0
+    clock, total, (own, _) = limits.clock(), 0.0, in_own_units(instance)
     for available, probability in outcomes.items():
         there = np.array([v.name in available for v in instance.vehicles], dtype=np.float64)
-        solution = _greatest(instance, there, known, clock, limits.gap)
+        solution = _greatest(own, there, known, clock, limits.gap)
         if solution.status != "optimal":
             _log.warning("instance %s: no proof for the outcome in which %s are available; the value of perfect "
                          "information stays open", instance.name, ", ".join(sorted(available)) or "no vehicles")
             return None
-        total += probability * solution.value
+        total += probability * _sum(_incentives(instance) * there[:, None], solution.orders)
     return total
 
 
@@ -228,16 +240,17 @@ def _plan(
         if reasons:
             raise BadInput(f"instance {instance.name}: the plan to start from is infeasible: {reasons[0]}")
         known.orders[_orders(instance, incumbent, known)] = None
+    own, unit = in_own_units(instance)
     if instance.failure == "per_leg":
-        goal = Goal(weights=_incentives(instance), survival=availability)
-        solution = solve(instance, goal, known, clock, limits.gap)
-        return _finish(instance, objective, solution.orders, known, value=solution.value, bound=solution.bound,
-                       status=solution.status, solutions=[solution], runtime_s=clock.used_s())
-    solution = _greatest(instance, availability, known, clock, limits.gap, method, cuts)
-    scale = float(availability.max(initial=0.0))
-    value = _sum(_incentives(instance) * availability[:, None], solution.orders)
-    return _finish(instance, objective, solution.orders, known, value=value, bound=max(solution.bound * scale, value),
-                   status=solution.status, solutions=[solution], runtime_s=clock.used_s())
+        solution = solve(own, Goal(weights=_incentives(own), survival=availability), known, clock, limits.gap)
+        value = rewards(_incentives(instance), availability, solution.orders)
+    else:
+        solution = _greatest(own, availability, known, clock, limits.gap, method, cuts)
+        value = _sum(_incentives(instance) * availability[:, None], solution.orders)
+        unit *= float(availability.max(initial=0.0))
+    return _finish(instance, objective, solution.orders, known, value=value,
+                   bound=value + unit * (solution.bound - solution.value), status=solution.status,
+                   solutions=[solution], runtime_s=clock.used_s())
 
 
 def _greatest(
@@ -282,16 +295,12 @@ class _Ties:
                  method: Method) -> None:
         self._instance, self._known, self._clock, self._gap = instance, known, clock, gap
         self._method: Method = method
-        self._incentives, self._availability = _incentives(instance), _availability(instance)
+        self._incentives, availability = _incentives(instance), _availability(instance)
         best = _sum(self._incentives, nominal)
-        self._floor = best - _FLOOR * max(1.0, abs(best))
-        spread = self._availability - self._availability.min(initial=1.0)
+        self._floor = best - _FLOOR * abs(best)
+        spread = availability - availability.min(initial=1.0)
         self._equal = float(spread.max(initial=0.0)) < 1e-12
         self._shares = np.zeros(len(spread)) if self._equal else spread / spread.max()
-
-    def expected(self, orders: Orders) -> float:
-        """Expected value of a plan."""
-        return _sum(self._incentives * self._availability[:, None], orders)
 
     def solutions(self, interrupted: bool) -> tuple[Solution | None, Solution | None, Solution | None]:
         """The tied plans of most and least expected value, and the quickest of most; ``None`` = not sought."""
@@ -307,7 +316,7 @@ class _Ties:
             return most, least, None
         floors = [(self._incentives, self._floor)]
         if most is not None:
-            floors.append((weights, most.value - _FLOOR * max(1.0, abs(most.value))))
+            floors.append((weights, most.value - _FLOOR * abs(most.value)))
         soonest = self._solve("soonest", Goal(weights=np.zeros_like(weights), floors=tuple(floors), driving=1.0))
         return most, least, soonest
 
@@ -334,7 +343,7 @@ def _finish(
     method = solutions[0].method if solutions else "expected"
     return _certified(instance, Plan(
         routes=routes, instance=instance.name, objective=objective, method=method, status=status, value=value + 0.0,
-        bound=bound + 0.0, fuel_s=fuel, runtime_s=runtime_s, seed=0, details=counted))
+        bound=_above(bound, value) + 0.0, fuel_s=fuel, runtime_s=runtime_s, seed=0, details=counted))
 
 
 def _certified(instance: Instance, plan: Plan) -> Plan:
@@ -370,6 +379,15 @@ def _availability(instance: Instance) -> FloatArray:
 
 def _sum(weights: FloatArray, orders: Orders) -> float:
     return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
+
+
+def _expected(instance: Instance, orders: Orders) -> float:
+    return _sum(_incentives(instance) * _availability(instance)[:, None], orders)
+
+
+def _above(bound: float, value: float) -> float:
+    """The bound, or the value where the two differ by rounding."""
+    return value if bound - value <= _ROUNDING * abs(value) else bound
 
 
 def _worst(statuses: Sequence[Status]) -> Status:

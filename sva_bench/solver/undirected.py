@@ -16,7 +16,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.cuts import Cut
-from sva_bench.solver.formulation import SLACK_S, Goal, LinearModel, RowBuilder, Rows
+from sva_bench.solver.formulation import SLACK_S, Goal, LinearModel, RowBuilder, Rows, sizes_of
 from sva_bench.solver.heuristic import Orders
 from sva_bench.solver.preprocess import Scope
 
@@ -58,8 +58,7 @@ class UndirectedModel:
             of_poi = self._visit[:, j][self._visit[:, j] >= 0]
             if len(of_poi) > 1:
                 build.add(of_poi, np.ones(len(of_poi)), -np.inf, 1.0)
-        for weights, floor in goal.floors:
-            size = max(1.0, abs(floor))
+        for (weights, floor), size in zip(goal.floors, sizes_of(goal.floors), strict=True):
             used = np.argwhere((self._visit >= 0) & (weights != 0))
             build.add(self._visit[used[:, 0], used[:, 1]], weights[used[:, 0], used[:, 1]] / size, floor / size, np.inf)
         self.model = LinearModel(objective=np.array(objective), upper=np.array(upper),

@@ -1,0 +1,49 @@
+"""A look up from compiled code: was Ctrl-C pressed, and is time up?
+
+Compiled code keeps Python from noticing signals. So code that may take long calls ``look`` now and then, which lets
+Python run its handlers and see the clock; called within ``deferring_ctrl_c``, they only leave a mark in ``stop``.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.core import types as _numba_types
+from numpy.typing import NDArray
+
+from sva_bench.interrupts import flag
+
+_types: Any = _numba_types
+
+OFTEN = 256
+"""Steps of some microseconds between two looks."""
+
+_run_handlers = _types.ExternalFunction("PyErr_CheckSignals", _types.int32())
+_forget_error = _types.ExternalFunction("PyErr_Clear", _types.void())
+_clock_gettime = _types.ExternalFunction("clock_gettime", _types.int32(_types.int32, _types.CPointer(_types.int64)))
+_CLOCK = time.CLOCK_MONOTONIC
+
+
+def stop_mark() -> NDArray[np.uint8]:
+    """What ``look`` reads: not 0 once Ctrl-C was pressed, shape (1,)."""
+    return np.frombuffer(flag(), dtype=np.uint8)
+
+
+@njit(cache=True)
+def look(stop):
+    """Whether to stop; gives Python's handlers of signals a chance to say so."""
+    if _run_handlers() != 0:  # another handler's exception: compiled code can't raise it, but can end
+        _forget_error()
+        stop[0] = 1
+    return stop[0] != 0
+
+
+@njit(cache=True)
+def now_s():
+    """A clock [s]."""
+    parts = np.zeros(2, np.int64)
+    _clock_gettime(_CLOCK, parts.ctypes)
+    return parts[0] + 1e-9 * parts[1]

@@ -1,0 +1,91 @@
+"""The units that plans are made in, so that the unit an instance counts its incentives in changes nothing.
+
+Two steps. Where an instance comes in, its incentives become multiples of its own largest one, rounding undone
+(``in_own_units``): whatever all of them are multiplied by, the same numbers come out. Then each goal is multiplied by
+the power of two that brings the most that one visit can earn near ``LARGEST`` (``factor_of``), which loses nothing.
+Constants that are compared with values anywhere in the solver are meant in these units, where the best plan of a goal
+without negative weights is worth ``LARGEST / 2`` at least.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from sva_bench.mission.instance import Instance
+from sva_bench.solver.formulation import Goal
+
+LARGEST = 128.0
+"""Least power of two above the largest incentive."""
+ROUNDING = 1e-9
+"""Share of the most that one visit can earn within which two values, or a value and a bound, are the same."""
+MOST_UNITS = 1_000_000
+_MULTIPLE = 1e-9  # how far from an integer a multiple of the common unit may be
+_BITS = 36  # of a mantissa that are kept; the rest is noise of scaling and unscaling
+
+
+def common_unit(values: Iterable[float]) -> float:
+    """The greatest number of which all values are multiples, but for rounding; 0 where none is plain to see.
+
+    A unit of less than a millionth of the largest value is none.
+    """
+    distinct = sorted({abs(float(value)) for value in values} - {0.0}, reverse=True)
+    if not distinct:
+        return 0.0
+    largest, units = distinct[0], 1
+    for value in distinct:
+        units = math.lcm(units, Fraction(value / largest).limit_denominator(MOST_UNITS).denominator)
+        if units > MOST_UNITS:
+            return 0.0
+    counts = [value / largest * units for value in distinct]
+    if any(round(count) == 0 or abs(count - round(count)) > _MULTIPLE for count in counts):
+        return 0.0
+    return largest / units
+
+
+def in_own_units(instance: Instance) -> tuple[Instance, float]:
+    """The instance with incentives below ``LARGEST``, and the unit: what 1 of them is in the instance's own.
+
+    Where all incentives are multiples of one number they become exact multiples of a power of two, so sums that are
+    equal in decimals are equal; else they are rounded to 11 digits.
+    """
+    incentives = np.array([v.incentives for v in instance.vehicles])
+    largest = float(incentives.max(initial=0.0))
+    if largest == 0.0:
+        return instance, 1.0
+    step = common_unit(incentives.ravel())
+    relative = incentives / largest
+    if step > 0.0:
+        units = round(largest / step)
+        scaled, top = np.rint(relative * units), float(units)
+    else:
+        mantissa, exponent = np.frexp(relative)
+        scaled, top = np.ldexp(np.rint(np.ldexp(mantissa, _BITS)), exponent - _BITS), 1.0
+    factor = _power_below(top)
+    own = replace(instance, vehicles=tuple(
+        replace(v, incentives=row) for v, row in zip(instance.vehicles, scaled * factor, strict=True)))
+    return own, max(largest / (top * factor), math.ulp(0.0))
+
+
+def factor_of(goal: Goal) -> float:
+    """The power of two that brings the most one visit can earn under a goal to ``LARGEST / 2`` or more, but below
+    ``LARGEST``; 1 where nothing is earned."""
+    most = most_of_a_visit(goal)
+    return _power_below(most) if most > 0.0 else 1.0
+
+
+def most_of_a_visit(goal: Goal) -> float:
+    """The most that one visit can earn, or cost."""
+    rates = np.abs(goal.weights) * goal.chances()[:, None]
+    if goal.risk is not None:
+        rates = rates + goal.risk.measure.weight * goal.risk.outcomes.incentives
+    return float(rates.max(initial=0.0))
+
+
+def _power_below(most: float) -> float:
+    """The power of two that brings a number to ``LARGEST / 2`` or more, but below ``LARGEST``."""
+    return LARGEST * 2.0 ** -math.frexp(most)[1]

@@ -1,0 +1,146 @@
+"""Blocks in which Ctrl-C waits, and in which it is heard.
+
+In a block that raises, what is still done after the key is the point.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Iterator
+from threading import Thread
+
+import pytest
+
+from sva_bench.interrupts import (
+    deferring_ctrl_c,
+    flag,
+    hear_ctrl_c,
+    heard_ctrl_c,
+    hearing_ctrl_c,
+    holding_back_ctrl_c,
+    pressed,
+)
+
+
+def press() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left() -> Iterator[None]:
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    assert signal.getsignal(signal.SIGINT) is before
+    assert not pressed()
+    with deferring_ctrl_c():
+        assert not pressed()
+
+
+@pytest.mark.parametrize("block", [deferring_ctrl_c, holding_back_ctrl_c])
+def test_ctrl_c_waits_until_the_end_of_a_block(block: type[deferring_ctrl_c]) -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt), block():  # noqa: PT012
+        press()
+        with block():
+            done.append("inside")
+        done.append("after")
+    assert done == ["inside", "after"]
+
+
+def test_where_it_is_heard_it_comes_at_once_and_not_again_at_the_end() -> None:
+    done = []
+    with deferring_ctrl_c():
+        try:
+            with hearing_ctrl_c():
+                press()
+                done.append("never")
+        except KeyboardInterrupt:
+            done.append("kept")
+        done.append("written")
+    assert done == ["kept", "written"]
+
+
+def test_what_was_pressed_before_is_heard_as_soon_as_somebody_listens() -> None:
+    done = []
+    with deferring_ctrl_c():
+        press()
+        for _ in range(2):  # the second piece of work ends at once too
+            try:
+                with hearing_ctrl_c():
+                    done.append("never")
+            except KeyboardInterrupt:
+                done.append("kept")
+    assert done == ["kept", "kept"]
+
+
+def test_compiled_code_within_work_that_hears_raises_when_it_has_returned() -> None:
+    done = []
+    with deferring_ctrl_c():
+        try:
+            with hearing_ctrl_c():
+                with deferring_ctrl_c():
+                    press()
+                    assert flag()[0] != 0
+                    done.append("returned")
+                done.append("never")
+        except KeyboardInterrupt:
+            done.append("kept")
+    assert done == ["returned", "kept"]
+
+
+def test_pressed_after_the_work_it_is_raised_at_the_end() -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt), deferring_ctrl_c():  # noqa: PT012
+        with hearing_ctrl_c():
+            done.append("work")
+        press()
+        done.append("written")
+    assert done == ["work", "written"]
+
+
+def test_what_a_callback_has_swallowed_is_raised_by_the_next_look() -> None:
+    heard = False
+    with deferring_ctrl_c():
+        try:
+            with hearing_ctrl_c():
+                with contextlib.suppress(KeyboardInterrupt):
+                    press()
+                hear_ctrl_c()
+        except KeyboardInterrupt:
+            heard = True
+    assert heard
+
+
+def test_who_acts_upon_it_need_not_raise_it() -> None:
+    with deferring_ctrl_c():
+        press()
+        heard_ctrl_c()
+
+
+def test_an_error_in_the_block_is_not_hidden() -> None:
+    with pytest.raises(ValueError, match="mine"), deferring_ctrl_c():  # noqa: PT012
+        press()
+        raise ValueError("mine")
+
+
+def test_other_threads_and_ignored_signals_are_left_alone() -> None:
+    seen: list[bool] = []
+
+    def work() -> None:
+        with deferring_ctrl_c(), hearing_ctrl_c():
+            seen.append(pressed())
+
+    with pytest.raises(KeyboardInterrupt), deferring_ctrl_c():  # noqa: PT012
+        press()
+        thread = Thread(target=work)
+        thread.start()
+        thread.join()
+    assert seen == [False]
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with deferring_ctrl_c(), hearing_ctrl_c():
+            press()
+    finally:
+        signal.signal(signal.SIGINT, before)
