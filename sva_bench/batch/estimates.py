@@ -54,11 +54,12 @@ def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: 
     while jobs and jobs[0].kept:
         results = []
         for job in jobs:
-            found = None if job.key in seen else cache.get(job.kind, job.key)
-            if found is None and job.key not in seen:
+            key = job.key
+            found = cache.get(job, key)
+            if found is None and key not in seen:
                 seconds += _seconds(job, each)
-            seen.add(job.key)
-            results.append(found if found is not None else cache.get(job.kind, job.key))
+            seen.add(key)
+            results.append(found)
         if any(result is None for result in results):
             seconds += _beyond(jobs[0], point, grid, each)
             break
