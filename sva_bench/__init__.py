@@ -1,5 +1,12 @@
 """What a multi-robot mission plan is worth when robots fail, measured in physics."""
 
-from importlib.metadata import version
+import sys
+
+from sva_bench.safe_path import distrust_current_folder
+
+if sys.argv[:1] == ["-m"]:  # as a program, before anything else is imported
+    distrust_current_folder()
+
+from importlib.metadata import version  # noqa: E402
 
 __version__ = version("sva-bench")

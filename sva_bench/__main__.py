@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import errno
-import logging
-import os
-import sys
-import traceback
-from collections.abc import Sequence
-from pathlib import Path
+from sva_bench.safe_path import distrust_current_folder
+
+distrust_current_folder()  # before all else, for what else is imported
+
+import errno  # noqa: E402
+import logging  # noqa: E402
+import os  # noqa: E402
+import sys  # noqa: E402
+import traceback  # noqa: E402
+from collections.abc import Sequence  # noqa: E402
+from pathlib import Path  # noqa: E402
 
 # One thread a process: the workers are the parallelism, and sums keep one order. Before numpy is imported.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
