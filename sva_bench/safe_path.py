@@ -10,7 +10,7 @@ import sys
 
 _SAFELY = {
     "PYTHONSAFEPATH": "1",  # interpreters that are started from here don't look into the current folder either
-    "NUMBA_CACHE_DIR": "",  # its default; else a .numba_config.yaml in the current folder could say from where to load code
+    "NUMBA_CACHE_DIR": "",  # its default; else a .numba_config.yaml in the current folder says where to load code from
 }
 
 

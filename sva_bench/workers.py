@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker, util
 from multiprocessing.process import BaseProcess
 from types import ModuleType
+from typing import Any
 
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -101,7 +102,7 @@ def _end_tracker_at_exit() -> None:
 
 
 def _end_tracker() -> None:
-    tracker = resource_tracker._resource_tracker
+    tracker: Any = resource_tracker._resource_tracker
     if tracker._pid is not None:  # else it is another process's, or none was started
         tracker._stop()
 
@@ -111,7 +112,7 @@ _at_exit: list[util.Finalize] = []
 
 @contextmanager
 def _without_main_module() -> Iterator[None]:
-    """Workers that are started meanwhile don't import the program's main module again: nothing of it is theirs to do."""
+    """Workers that are started meanwhile don't import the program's main module again: they have no use for it."""
     main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     try:
         yield

@@ -79,8 +79,8 @@ def test_an_empty_entry_of_pythonpath_is_taken_out_for_us_and_our_children(tmp_p
               "print(subprocess.run(child, stderr=subprocess.DEVNULL).returncode)\n"
               "print(subprocess.run(child, stderr=subprocess.DEVNULL, env=environment_of_children()).returncode)\n"
               "import trap\n")
-    done = subprocess.run([sys.executable, "-P", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False,
-                          env=os.environ | {"PYTHONPATH": f"{os.pathsep}/nowhere"})
+    done = subprocess.run([sys.executable, "-P", "-c", script], cwd=tmp_path, capture_output=True, text=True,
+                          env=os.environ | {"PYTHONPATH": f"{os.pathsep}/nowhere"}, check=False)
     assert done.stdout.split() == ["/nowhere", "1", "1"]
     assert "No module named 'trap'" in done.stderr
 

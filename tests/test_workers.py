@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -39,17 +41,21 @@ def test_ctrl_c_while_workers_start_is_not_lost_and_ends_them() -> None:
     assert done.stdout == "caught 0\n", done.stderr
 
 
-def test_a_worker_that_is_killed_is_told_of_with_what_to_change() -> None:
-    with pytest.raises(WorkerLost, match=r"SIGKILL.*--workers 1") as lost, local_workers(2) as executor:
+def asked_of_a_worker(function: Callable[..., Any], argument: Any) -> None:
+    with local_workers(2) as executor:
         assert executor is not None
-        executor.submit(signal.raise_signal, signal.SIGKILL).result()
+        executor.submit(function, argument).result()
+
+
+def test_a_worker_that_is_killed_is_told_of_with_what_to_change() -> None:
+    with pytest.raises(WorkerLost, match=r"SIGKILL.*--workers 1") as lost:
+        asked_of_a_worker(signal.raise_signal, signal.SIGKILL)
     assert lost.value.exit_code == ExitCode.UNFINISHED_TRIALS
 
 
 def test_a_worker_without_memory_is_told_of_with_what_to_change() -> None:
-    with pytest.raises(WorkerLost, match=r"memory ran out.*--workers 1"), local_workers(2) as executor:
-        assert executor is not None
-        executor.submit(bytearray, 1 << 60).result()
+    with pytest.raises(WorkerLost, match=r"memory ran out.*--workers 1"):
+        asked_of_a_worker(bytearray, 1 << 60)
 
 
 HELPED = """
