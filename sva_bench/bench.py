@@ -185,7 +185,8 @@ def _publish(
                 progress("recording", number + 1, len(executed))
         legs = leg_columns(executed)
         write_legs(folder / "legs.parquet", legs)
-        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots], options.fidelity)
+        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
+                       settings_of(world, options))
         write_json(folder / "summary.json", summary)
         told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
         write_json(folder / "manifest.json", told)

@@ -178,7 +178,10 @@ def view(
     """Open recordings in the Rerun viewer."""
     with holding_back_ctrl_c():
         from sva_bench.recording.viewer import view as open_viewer
+        from sva_bench.stored import run_folder_at
 
+    if recording.is_dir() and not (recording / "recordings").is_dir():
+        run_folder_at(recording)  # which says what it is, if it is none
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
 
@@ -236,9 +239,10 @@ def report(
         from sva_bench.stored import report_again, write_csv
 
     set_up_logging(verbose)
+    page = report_again(folder)
     if csv:
         write_csv(folder)
-    messages.print(f"written to [bold]{escape(str(report_again(folder)))}[/bold]", highlight=False)
+    messages.print(f"written to [bold]{escape(str(page))}[/bold]", highlight=False)
 
 
 @app.callback(invoke_without_command=True)

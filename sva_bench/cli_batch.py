@@ -135,7 +135,7 @@ def retry(
         from sva_bench.batch.grid import grid_of
 
     _existing(folder)
-    grid = grid_of(settings_in(folder), folder / "manifest.json")
+    grid = grid_of(*settings_in(folder))
     _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True)
 
 
@@ -150,7 +150,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
 
     _existing(folder)
     running = at_work(folder)
-    grid = grid_of(settings_in(folder), folder / "manifest.json")
+    grid = grid_of(*settings_in(folder))
     units = grid.units()
     done = units_in(folder) & set(units)
     failures = [failure for failure in failures_in(folder) if failure.unit not in done]

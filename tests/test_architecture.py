@@ -26,16 +26,18 @@ MAY_KNOW: dict[str, set[str]] = {
     "execution": {"world", "robot", "travel", "mission"},
     "analysis": {"world", "robot", "travel", "mission", "execution"},
     "recording": {"world", "robot", "travel", "mission", "execution"},
-    "runs": {"world", "robot", "travel", "mission", "execution"},
+    "tables": set(),
+    "outcome_table": {"execution", "tables"},
+    "runs": {"world", "robot", "travel", "mission", "execution", "outcome_table", "tables"},
     "workers": {"execution"},
 }
 # These put the parts together, and may know all.
 TOP = {"options", "inputs", "bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed",
        "precision", "tally", "assumptions", "reproduce", "cli", "cli_batch", "cli_inputs", "cli_plans", "live",
-       "sweeps", "terminal", "__main__", "__init__"}
+       "sweeps", "terminal", "read_back", "results_schema", "__main__", "__init__"}
 # Of these, those that the command line stands on: they know nothing of it.
 BENCH = {"bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed", "precision", "tally",
-         "assumptions", "reproduce"}
+         "assumptions", "reproduce", "read_back", "results_schema"}
 ONLY_IN = {
     "pybullet": "execution/simulator.py", "pybullet_data": "execution/simulator.py",
     "pybullet_utils": "execution/simulator.py", "ompl": "travel/roadmap.py", "highspy": "solver/highs.py",

@@ -12,7 +12,7 @@ from scipy.stats import t as student_t
 from sva_bench.analysis.statistics import CONFIDENCE
 from sva_bench.batch.folder import Failure, shard_path
 from sva_bench.batch.grid import Grid
-from sva_bench.batch.shards import Note, read_note
+from sva_bench.batch.shards import Note, read_note, unit_of
 from sva_bench.batch.tallies import join, scenario_from
 
 KIND = "sva-bench/batch@1"
@@ -43,7 +43,7 @@ def _entries(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Itera
         for first, _ in ranges:
             unit = grid.unit_name(point, seed, first)
             if unit in done:
-                note = read_note(shard_path(folder, unit))
+                note = read_note(shard_path(folder, unit), unit_of(grid, point, seed, first))
                 together = note if together is None else joined(together, note)
         if together is not None:
             yield entry_of(together)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +14,8 @@ from sva_bench.errors import nearest
 from sva_bench.mission.instance import Instance
 
 KIND = "sva-bench/plan@1"
+MOST_STOPS = 10_000
+"""Of a route: two thousand sites and as many visits of stations leave room."""
 Objective = Literal["stochastic", "deterministic", "cvar", "excess"]
 Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 Route = tuple[str, ...]
@@ -80,16 +82,7 @@ def read_plan(path: Path, instance: Instance) -> Plan:
     Raises:
         BadFile: If it is no valid plan, or names a vehicle or site that the instance doesn't have.
     """
-    document = read_json(path)
-    file = validate(document, _PlanFile, KIND)
-    vehicles = [v.name for v in instance.vehicles]
-    for robot, route in file.routes.items():
-        if robot not in vehicles:
-            raise document.error(("routes", robot), f"there is no vehicle {robot!r}; {nearest(robot, vehicles)}")
-        for k, site in enumerate(route):
-            if site not in instance.sites:
-                raise document.error(("routes", robot, k),
-                                     f"there is no site {site!r}; {nearest(site, list(instance.sites))}")
+    file = _read(path, [v.name for v in instance.vehicles], instance.sites)
     base = instance.sites[instance.base]
     routes = {robot: () if list(route) == [base] else tuple(route) for robot, route in file.routes.items()}
     return Plan(
@@ -97,6 +90,44 @@ def read_plan(path: Path, instance: Instance) -> Plan:
         value=file.value, bound=file.bound, fuel_s=file.fuel_s, runtime_s=file.runtime_s, seed=file.seed,
         details=file.details,
     )
+
+
+def read_routes(path: Path, robots: Sequence[str], sites: Sequence[str]) -> dict[str, Route]:
+    """The routes of a plan file for these robots and sites, as they stand there.
+
+    Raises:
+        BadFile: As ``read_plan``.
+    """
+    return {robot: tuple(route) for robot, route in _read(path, robots, sites).routes.items()}
+
+
+def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFile:
+    """A plan file, its names and its size checked."""
+    document = read_json(path)
+    routes = document.data.get("routes") if isinstance(document.data, dict) else None
+    for robot, route in routes.items() if isinstance(routes, dict) else ():
+        if isinstance(route, list) and len(route) > MOST_STOPS:
+            raise document.error(("routes", robot), f"{len(route)} stops; at most {MOST_STOPS} are driven")
+    file = validate(document, _PlanFile, KIND)
+    if not _is_text(file.details):
+        raise document.error(("details",), "holds half of a character that is none by itself (a lone surrogate)")
+    known = set(sites)
+    for robot, stops in file.routes.items():
+        if robot not in vehicles:
+            raise document.error(("routes", robot), f"there is no vehicle {robot!r}; {nearest(robot, list(vehicles))}")
+        for k, site in enumerate(stops):
+            if site not in known:
+                raise document.error(("routes", robot, k), f"there is no site {site!r}; {nearest(site, list(sites))}")
+    return file
+
+
+def _is_text(value: Any) -> bool:
+    """Whether all words in free data can be written as UTF-8."""
+    if isinstance(value, dict):
+        return all(_is_text(key) and _is_text(item) for key, item in value.items())
+    if isinstance(value, list):
+        return all(map(_is_text, value))
+    return not isinstance(value, str) or value.isascii() or not any("\ud800" <= c <= "\udfff" for c in value)
 
 
 def plan_as_dict(plan: Plan) -> dict[str, Any]:
