@@ -18,8 +18,11 @@ from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.world.load import world_as_dict, world_of
 from sva_bench.world.model import World
 
-MOST_POINTS, MOST_UNITS = 10_000, 1_000_000
-"""A million shards fill a folder; ten thousand worlds with all their variants are read and kept in memory."""
+MOST_POINTS, MOST_UNITS = 10_000, 200_000
+"""Shards that a folder holds with ease; worlds with all their variants that are kept in memory."""
+
+
+_HASH = 10  # digits that tell ten thousand variants apart; of six, two of them would be alike
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,7 +42,7 @@ class Point:
     @property
     def name(self) -> str:
         """Part of file names: the world's name, and a hash of the variation."""
-        return f"{self.world.name}-{digest(self.variant)[:6]}" if self.variant else self.world.name
+        return f"{self.world.name}-{digest(self.variant)[:_HASH]}" if self.variant else self.world.name
 
     @property
     def label(self) -> str:

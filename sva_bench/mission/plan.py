@@ -9,11 +9,13 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from sva_bench.documents import Name, Number, Section, WholeNumber, pretty_json, read_json, validate
-from sva_bench.errors import nearest
-from sva_bench.mission.instance import Instance
+from sva_bench.documents import Name, Number, Section, WholeNumber, dotted, pretty_json, validate
+from sva_bench.errors import BadFile, nearest
+from sva_bench.mission.instance import MOST_VEHICLES, Instance
+from sva_bench.read_back import read_bounded
 
 KIND = "sva-bench/plan@1"
+MOST_BYTES = 20_000_000
 MOST_STOPS = 10_000
 """Of a route: two thousand sites and as many visits of stations leave room."""
 Objective = Literal["stochastic", "deterministic", "cvar", "excess"]
@@ -103,11 +105,13 @@ def read_routes(path: Path, robots: Sequence[str], sites: Sequence[str]) -> dict
 
 def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFile:
     """A plan file, its names and its size checked."""
-    document = read_json(path)
+    document = read_bounded(path, MOST_BYTES)
     routes = document.data.get("routes") if isinstance(document.data, dict) else None
+    if isinstance(routes, dict) and len(routes) > MOST_VEHICLES:
+        raise BadFile(path, None, "routes", f"{len(routes)} routes; at most {MOST_VEHICLES} are read")
     for robot, route in routes.items() if isinstance(routes, dict) else ():
         if isinstance(route, list) and len(route) > MOST_STOPS:
-            raise document.error(("routes", robot), f"{len(route)} stops; at most {MOST_STOPS} are driven")
+            raise BadFile(path, None, dotted(("routes", robot)), f"{len(route)} stops; at most {MOST_STOPS} are driven")
     file = validate(document, _PlanFile, KIND)
     if not _is_text(file.details):
         raise document.error(("details",), "holds half of a character that is none by itself (a lone surrogate)")
