@@ -24,6 +24,7 @@ from typer.exceptions import TyperException  # noqa: E402
 
 from sva_bench.cli import app  # noqa: E402
 from sva_bench.errors import ExitCode, Interrupted, SvaBenchError  # noqa: E402
+from sva_bench.printable import printable  # noqa: E402
 from sva_bench.terminal import messages  # noqa: E402
 
 _log = logging.getLogger(__name__)
@@ -52,6 +53,7 @@ def run_command_line(arguments: Sequence[str]) -> int:
 
         if isinstance(error.__cause__, ValidationError):
             error.message = of_an_option(error.__cause__)
+        error.message = printable(error.message)
         getattr(error, "show", error.format_message)()
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):

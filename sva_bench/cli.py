@@ -34,6 +34,7 @@ from sva_bench.options import (
     WorkerCount,
     WorldArgument,
 )
+from sva_bench.printable import is_name
 from sva_bench.terminal import (
     check_output,
     messages,
@@ -154,6 +155,9 @@ def execute(
 
     names = [path.stem for path in plans]
     for path in plans:
+        if not is_name(path.stem):
+            raise BadInput(f"{path}: the name of this file, which its plan goes by, is no UTF-8, or holds control "
+                           "characters; rename it")
         if names.count(path.stem) > 1:
             raise BadInput(f"{path}: there is another plan named {path.stem!r}; file names must differ")
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)

@@ -11,6 +11,7 @@ from sva_bench.execution.execute import Fidelity
 from sva_bench.execution.outcome import End
 from sva_bench.mission.failures import FailureProcess
 from sva_bench.mission.plan import Status
+from sva_bench.printable import is_name
 
 MOST_TRIALS, MOST_ROLLOUTS = 10_000_000, 10_000_000
 
@@ -27,13 +28,19 @@ def _is_text(value: object) -> object:
     return value
 
 
+def _is_shown(name: str) -> str:
+    if not is_name(name):
+        raise ValueError("a name that holds control characters")
+    return name
+
+
 Figure = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e15, le=1e15)]
 """A sum of incentives, or a percentage of one; a page adds, subtracts and draws them."""
 Interval = Annotated[list[Figure], Field(min_length=2, max_length=2), AfterValidator(_in_order)]
 Words = Annotated[str, Field(max_length=10_000)]
 AnyText = Annotated[Any, AfterValidator(_is_text)]
 """Of the command line, which may hold what is no UTF-8."""
-PlanName = Annotated[str, Field(pattern=r"^[^/\x00]{1,250}$")]
+PlanName = Annotated[str, Field(pattern=r"^[^/\x00-\x1f]{1,250}$"), AfterValidator(_is_shown)]
 """Part of file names."""
 Share = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
 

@@ -98,7 +98,8 @@ def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], st
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
     """Write a JSON file that a person can read."""
-    path.write_text(pretty_json(dict(data)), encoding="utf-8")
+    # A name that is no UTF-8 becomes an escape as JSON has it.
+    path.write_bytes(pretty_json(dict(data)).encode("utf-8", "backslashreplace"))
 
 
 def write_map(folder: Path, source: MapSource) -> None:

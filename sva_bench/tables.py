@@ -56,11 +56,14 @@ TRAVEL_TIMES = _schema({
 """A row per robot model and directed pair of sites."""
 
 
-def write_table(path: Path | pa.BufferOutputStream, schema: pa.Schema, pieces: Iterable[pa.Table]) -> None:
+def write_table(target: Path | pa.BufferOutputStream, schema: pa.Schema, pieces: Iterable[pa.Table]) -> None:
     """Write a table, piece by piece."""
-    with pq.ParquetWriter(path, schema) as writer:
-        for piece in pieces:
-            writer.write_table(piece.cast(schema))
+    # Arrow opens no file whose name is no UTF-8, so all files are opened here.
+    with contextlib.ExitStack() as stack:
+        sink = stack.enter_context(target.open("wb")) if isinstance(target, Path) else target
+        with pq.ParquetWriter(sink, schema) as writer:
+            for piece in pieces:
+                writer.write_table(piece.cast(schema))
 
 
 def pieces_of(
@@ -81,23 +84,21 @@ def pieces_of(
             or unpacks to more memory than any of ours.
     """
     spelt = [field.name for field in schema if pa.types.is_string(field.type)]
-    with _memory_bounded():
+    with _memory_bounded(), contextlib.ExitStack() as stack:
         with _said_of(path, _AGAIN):
             if not path.is_file():
                 raise BadFile(path, None, "", f"no table of ours: no file is there; {_AGAIN}")
-            with pq.ParquetFile(path) as file:
-                _check_head(path, file, schema, rows, most)
-            file = pq.ParquetFile(path, read_dictionary=spelt)
-        with file:
+            source = stack.enter_context(path.open("rb"))
+            _check_head(path, pq.ParquetFile(source), schema, rows, most)
+            batches = pq.ParquetFile(source, read_dictionary=spelt).iter_batches(
+                _BATCH, columns=schema.names, use_threads=False)
+        while True:
             with _said_of(path, _AGAIN):
-                batches = file.iter_batches(_BATCH, columns=schema.names, use_threads=False)
-            while True:
-                with _said_of(path, _AGAIN):
-                    batch = next(batches, None)
-                    if batch is None:
-                        return
-                    _check(path, batch, schema, words or {})
-                yield pa.Table.from_batches([batch]).select(schema.names)
+                batch = next(batches, None)
+                if batch is None:
+                    return
+                _check(path, batch, schema, words or {})
+            yield pa.Table.from_batches([batch]).select(schema.names)
 
 
 @contextlib.contextmanager
@@ -155,7 +156,10 @@ def read_note_of(path: Path, key: bytes) -> bytes:
     """
     remedy = "remove it and --resume"
     with _memory_bounded(), _said_of(path, remedy):
-        note: bytes | None = (pq.read_schema(path).metadata or {}).get(key) if path.is_file() else None
+        note: bytes | None = None
+        if path.is_file():
+            with path.open("rb") as source:
+                note = (pq.read_schema(source).metadata or {}).get(key)
     if note is None or len(note) > MOST_NOTE_BYTES:
         raise BadFile(path, None, "", f"no shard of a batch (its tally is missing, or too long); {remedy}")
     return note
@@ -164,7 +168,7 @@ def read_note_of(path: Path, key: bytes) -> bytes:
 def write_csv(path: Path, target: Path, schema: pa.Schema) -> None:
     """Write a table of ours as CSV too, piece by piece."""
     bare = pa.schema([pa.field(field.name, field.type) for field in schema])
-    with pcsv.CSVWriter(target, bare) as writer:
+    with target.open("wb") as sink, pcsv.CSVWriter(sink, bare) as writer:
         for piece in pieces_of(path, schema):
             writer.write_table(piece.cast(bare))
 

@@ -12,6 +12,7 @@ from pydantic import Field
 from sva_bench.documents import Name, Number, Section, WholeNumber, dotted, pretty_json, validate
 from sva_bench.errors import BadFile, nearest
 from sva_bench.mission.instance import MOST_VEHICLES, Instance
+from sva_bench.printable import all_text
 from sva_bench.read_back import read_bounded
 
 KIND = "sva-bench/plan@1"
@@ -113,8 +114,9 @@ def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFil
         if isinstance(route, list) and len(route) > MOST_STOPS:
             raise BadFile(path, None, dotted(("routes", robot)), f"{len(route)} stops; at most {MOST_STOPS} are driven")
     file = validate(document, _PlanFile, KIND)
-    if not _is_text(file.details):
-        raise document.error(("details",), "holds half of a character that is none by itself (a lone surrogate)")
+    for key in ("instance", "method", "details"):
+        if not all_text(getattr(file, key)):
+            raise document.error((key,), "holds half of a character that is none by itself (a lone surrogate)")
     known = set(sites)
     for robot, stops in file.routes.items():
         if robot not in vehicles:
@@ -123,15 +125,6 @@ def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFil
             if site not in known:
                 raise document.error(("routes", robot, k), f"there is no site {site!r}; {nearest(site, list(sites))}")
     return file
-
-
-def _is_text(value: Any) -> bool:
-    """Whether all words in free data can be written as UTF-8."""
-    if isinstance(value, dict):
-        return all(_is_text(key) and _is_text(item) for key, item in value.items())
-    if isinstance(value, list):
-        return all(map(_is_text, value))
-    return not isinstance(value, str) or value.isascii() or not any("\ud800" <= c <= "\udfff" for c in value)
 
 
 def plan_as_dict(plan: Plan) -> dict[str, Any]:
