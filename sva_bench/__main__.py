@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import errno
-import logging
-import os
-import sys
-import traceback
-from collections.abc import Sequence
-from pathlib import Path
+from sva_bench.safe_path import distrust_current_folder
+
+distrust_current_folder()  # before all else, for what else is imported
+
+import errno  # noqa: E402
+import logging  # noqa: E402
+import os  # noqa: E402
+import sys  # noqa: E402
+import traceback  # noqa: E402
+from collections.abc import Sequence  # noqa: E402
+from pathlib import Path  # noqa: E402
 
 # One thread a process: the workers are the parallelism, and sums keep one order. Before numpy is imported.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -20,6 +24,7 @@ from typer.exceptions import TyperException  # noqa: E402
 
 from sva_bench.cli import app  # noqa: E402
 from sva_bench.errors import ExitCode, Interrupted, SvaBenchError  # noqa: E402
+from sva_bench.printable import printable  # noqa: E402
 from sva_bench.terminal import messages  # noqa: E402
 
 _log = logging.getLogger(__name__)
@@ -48,6 +53,7 @@ def run_command_line(arguments: Sequence[str]) -> int:
 
         if isinstance(error.__cause__, ValidationError):
             error.message = of_an_option(error.__cause__)
+        error.message = printable(error.message)
         getattr(error, "show", error.format_message)()
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):

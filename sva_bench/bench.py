@@ -14,6 +14,7 @@ from typing import Any
 from sva_bench.analysis.report import Content, write_report
 from sva_bench.analysis.summary import Judged, comparison_summary
 from sva_bench.assumptions import cross_table
+from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Drives, Executed, Settings, execute
 from sva_bench.informed import cases_of, is_part, put_together
 from sva_bench.mission.instance import Instance, write_instance
@@ -44,6 +45,9 @@ from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.load import world_as_dict
 from sva_bench.world.model import World
 
+MOST_ROWS = 50_000_000
+"""Outcomes that a run holds in memory, at some 80 bytes each."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
@@ -72,7 +76,12 @@ def run(world: World, options: Options, out: Path, executor: Executor | None, pr
 
 
 def measure(world: World, options: Options, executor: Executor | None, progress: Progress) -> Measured:
-    """Plan, execute and measure a world's mission."""
+    """Plan, execute and measure a world's mission.
+
+    Raises:
+        BadInput: If there are more trials than a run can keep in memory.
+    """
+    refuse_too_many_rows(world, max(options.trials, options.precision.max_trials if options.precision else 0), 2)
     clock = Stopwatch()
     with clock.phase("travel"):
         costs = plan_costs(world, options.planner, progress)
@@ -133,6 +142,7 @@ def execute_plans(
         out, executor, progress: As for ``run``.
         costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
     """
+    refuse_too_many_rows(world, options.trials, len(plans))
     clock = Stopwatch()
     settings = settings_of(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
@@ -152,6 +162,15 @@ def execute_plans(
     return _publish(world, options, costs, instances, executed, summary, out, clock, progress,
                     identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
                                         for name, plan in plans.items()}})
+
+
+def refuse_too_many_rows(world: World, trials: int, plans: int) -> None:
+    """Refuse a run whose trials would not fit into memory: all of them are at hand until its figures are worked out."""
+    rows = trials * len(world.scenarios) * plans * len(world.robots)
+    if rows > MOST_ROWS:
+        raise BadInput(f"{rows} outcomes ({trials} trials x {len(world.scenarios)} scenarios x {plans} plans x "
+                       f"{len(world.robots)} robots); a run keeps {MOST_ROWS} at most: take fewer trials, or a batch, "
+                       "which measures them unit by unit")
 
 
 def settings_of(world: World, options: Options) -> Settings:
@@ -185,7 +204,8 @@ def _publish(
                 progress("recording", number + 1, len(executed))
         legs = leg_columns(executed)
         write_legs(folder / "legs.parquet", legs)
-        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots], options.fidelity)
+        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
+                       settings_of(world, options))
         write_json(folder / "summary.json", summary)
         told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
         write_json(folder / "manifest.json", told)

@@ -34,6 +34,7 @@ from sva_bench.options import (
     WorkerCount,
     WorldArgument,
 )
+from sva_bench.printable import is_name
 from sva_bench.terminal import (
     check_output,
     messages,
@@ -154,6 +155,9 @@ def execute(
 
     names = [path.stem for path in plans]
     for path in plans:
+        if not is_name(path.stem):
+            raise BadInput(f"{path}: the name of this file, which its plan goes by, is no UTF-8, or holds control "
+                           "characters; rename it")
         if names.count(path.stem) > 1:
             raise BadInput(f"{path}: there is another plan named {path.stem!r}; file names must differ")
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
@@ -178,7 +182,10 @@ def view(
     """Open recordings in the Rerun viewer."""
     with holding_back_ctrl_c():
         from sva_bench.recording.viewer import view as open_viewer
+        from sva_bench.stored import run_folder_at
 
+    if recording.is_dir() and not (recording / "recordings").is_dir():
+        run_folder_at(recording)  # which says what it is, if it is none
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
 
@@ -236,9 +243,10 @@ def report(
         from sva_bench.stored import report_again, write_csv
 
     set_up_logging(verbose)
+    page = report_again(folder)
     if csv:
         write_csv(folder)
-    messages.print(f"written to [bold]{escape(str(report_again(folder)))}[/bold]", highlight=False)
+    messages.print(f"written to [bold]{escape(str(page))}[/bold]", highlight=False)
 
 
 @app.callback(invoke_without_command=True)

@@ -24,7 +24,7 @@ from sva_bench.options import (
     WorkerCount,
     finite,
 )
-from sva_bench.terminal import messages, print_json, results, set_up_logging
+from sva_bench.terminal import messages, print_json, progress_bars, results, set_up_logging
 
 if TYPE_CHECKING:
     from sva_bench.batch.engines import Engine
@@ -108,7 +108,8 @@ def over(
         planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
         margin=margin, execute_failure=execute_failure, time_limit_s=time_limit, gap=gap,
         vary=varied(vary) if vary else None, unit_trials=unit_trials))
-    grid = grid_of(sweep)
+    with progress_bars() as progress:
+        grid = grid_of(sweep, progress)
     folder = out or Path("runs") / batch_name(grid.settings())
     if dry_run:
         _list(grid, folder, cache, as_json)
@@ -135,7 +136,7 @@ def retry(
         from sva_bench.batch.grid import grid_of
 
     _existing(folder)
-    grid = grid_of(settings_in(folder), folder / "manifest.json")
+    grid = grid_of(*settings_in(folder))
     _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True)
 
 
@@ -150,7 +151,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
 
     _existing(folder)
     running = at_work(folder)
-    grid = grid_of(settings_in(folder), folder / "manifest.json")
+    grid = grid_of(*settings_in(folder))
     units = grid.units()
     done = units_in(folder) & set(units)
     failures = [failure for failure in failures_in(folder) if failure.unit not in done]
@@ -174,7 +175,8 @@ def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool) -> None:
         from sva_bench.batch.estimates import estimates
         from sva_bench.live import print_grid
 
-    listed = estimates(grid, Cache(folder=cache or default_folder()), folder)
+    with progress_bars() as progress:
+        listed = estimates(grid, Cache(folder=cache or default_folder()), folder, progress)
     if as_json:
         print_json({"format": "sva-bench/batch-grid@1", "strands": [
             {"world": e.point.world.name, "variant": e.point.variant, "seed": e.seed, "units": e.units, "rows": e.rows,

@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from sva_bench.workers import count_of
+
 # Spelt out, not imported: the modules that own them take a second to load, and --help should not.
 Fidelity = Literal["kinematic", "rollout", "physics"]
 Planner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
@@ -52,5 +54,14 @@ ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure pro
                                                               show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
-WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]
+
+
+def few_enough(count: int | None) -> int | None:
+    """Refuse more worker processes than this machine can have any use for, before any work."""
+    count_of(count)
+    return count
+
+
+WorkerCount = Annotated[int | None, typer.Option(min=1, callback=few_enough, help="Processes that drive.",
+                                                 show_default="all cores")]
 Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +23,7 @@ from sva_bench.mission.failures import FailureProcess
 from sva_bench.mission.generate import random_instance
 from sva_bench.mission.instance import Instance
 from sva_bench.planning import NOMINAL, Options, Progress, plan_costs, plan_scenarios
+from sva_bench.safe_path import environment_of_children
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_deterministic, plan_nominal, plan_stochastic
 from sva_bench.tally import expected_value
 from sva_bench.world.model import World
@@ -204,6 +206,8 @@ def runtimes(run: Callable[..., Any] = subprocess.run) -> int:
         raise BadInput("the table of runtimes is run by benchmarks/solver, which an installed package doesn't hold; "
                        "use a checkout, or read docs/paper-runtimes.md")
     here = Path.cwd()
-    code: int = run([sys.executable, "-m", "benchmarks.solver.paper", "--quick", "-o",
-                     str(here / "runs" / "paper-runtimes-quick")], cwd=root, check=False).returncode
+    environment = environment_of_children()
+    environment["PYTHONPATH"] = os.pathsep.join((str(root), environment["PYTHONPATH"]))
+    code: int = run([sys.executable, "-P", "-m", "benchmarks.solver.paper", "--quick", "-o",
+                     str(here / "runs" / "paper-runtimes-quick")], cwd=root, env=environment, check=False).returncode
     return code

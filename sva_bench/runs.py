@@ -14,17 +14,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from sva_bench import __version__
 from sva_bench.documents import pretty_json
-from sva_bench.errors import BadFile, BadInput
-from sva_bench.execution.execute import Executed
-from sva_bench.execution.outcome import ENDS
+from sva_bench.errors import BadInput
+from sva_bench.execution.execute import Executed, Settings
+from sva_bench.outcome_table import outcome_table
+from sva_bench.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import MapSource, World
+from sva_bench.world.model import MapSource
 
 PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
 
@@ -99,7 +98,8 @@ def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], st
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
     """Write a JSON file that a person can read."""
-    path.write_text(pretty_json(dict(data)), encoding="utf-8")
+    # A name that is no UTF-8 becomes an escape as JSON has it.
+    path.write_bytes(pretty_json(dict(data)).encode("utf-8", "backslashreplace"))
 
 
 def write_map(folder: Path, source: MapSource) -> None:
@@ -125,18 +125,13 @@ def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
                 rows["raw_s"].append(int(cost.times.time_ms[i, j]) / 1000)
                 rows["repaired_s"].append(int(cost.repaired_ms[i, j]) / 1000)
                 rows["via"].append(sites[int(cost.via[i, j])])
-    _write(path, rows, {"raw_s": "s", "repaired_s": "s"})
+    write_table(path, TRAVEL_TIMES, [pa.table(rows, schema=TRAVEL_TIMES)])
 
 
 MAP = "map"
 """Folder in a run folder that holds the files that the world's map was read from, under their names there."""
 
-LEG_COLUMNS = ("scenario", "planner", "rollout", "robot", "leg", "origin", "destination", "planned_s", "driven_s")
-
-
-_LEG_UNITS = {"leg": "1", "rollout": "1", "planned_s": "s", "driven_s": "s"}
-_OUTCOME_UNITS = {"trial": "1", "rollout": "1", "incentive": "incentive of the world file", "pois_reached": "1",
-                  "stops_reached": "1", "end_time_s": "s", "fuel_used_s": "s of driving"}
+LEG_COLUMNS = tuple(LEGS.names)
 
 
 def leg_columns(executed: Sequence[Executed]) -> dict[str, list[Any]]:
@@ -153,67 +148,9 @@ def leg_columns(executed: Sequence[Executed]) -> dict[str, list[Any]]:
 
 def write_legs(path: Path, rows: Mapping[str, Sequence[Any]]) -> None:
     """Write ``legs.parquet``."""
-    types = {key: pa.string() for key in ("scenario", "planner", "robot", "origin", "destination")}
-    types |= {"rollout": pa.int64(), "leg": pa.int64(), "planned_s": pa.float64(), "driven_s": pa.float64()}
-    _write(path, {key: pa.array(values, types[key]) for key, values in rows.items()},
-           _LEG_UNITS)
+    write_table(path, LEGS, [pa.table(dict(rows), schema=LEGS)])
 
 
-def outcome_columns(run: Executed, robots: Sequence[str], fidelity: str) -> dict[str, Any]:
-    """One row per trial and robot, trial by trial."""
-    trials, count = run.incentive.shape
-    return {
-        "scenario": np.full(trials * count, run.case.scenario.name),
-        "planner": np.full(trials * count, run.case.planner),
-        "trial": np.repeat(np.arange(trials), count), "rollout": np.repeat(run.rollout, count),
-        "robot": np.tile(np.array(robots), trials), "available": run.available.ravel(),
-        "incentive": run.incentive.ravel(), "pois_reached": run.pois_reached.ravel(),
-        "stops_reached": run.stops_reached.ravel(), "end": np.array(ENDS)[run.end.ravel()],
-        "end_time_s": run.end_time_s.ravel(), "fuel_used_s": run.fuel_used_s.ravel(),
-        "fidelity": np.full(trials * count, fidelity),
-    }
-
-
-def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[str], fidelity: str) -> None:
+def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[str], settings: Settings) -> None:
     """Write ``outcomes.parquet``: a row per scenario, plan, trial and robot."""
-    parts = [outcome_columns(run, robots, fidelity) for run in executed]
-    columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    _write(path, columns, _OUTCOME_UNITS)
-
-
-def write_shard(path: Path, executed: Sequence[Executed], world: World, seed: int, fidelity: str,
-                summary: Mapping[str, Any]) -> None:
-    """Write a unit's outcomes, its summary in the table's metadata: whole or not at all."""
-    parts = [outcome_columns(run, [robot.name for robot in world.robots], fidelity) for run in executed]
-    columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    rows = len(columns["trial"])
-    columns |= {"world": np.full(rows, world.name), "seed": np.full(rows, seed)}
-    draft = path.with_name(f"{path.name}.tmp")
-    _write(draft, columns, _OUTCOME_UNITS, {_SUMMARY: json.dumps(summary)})
-    draft.replace(path)
-
-
-def read_shard(path: Path) -> dict[str, Any]:
-    """The summary in a shard.
-
-    Raises:
-        BadFile: If it is no shard of ours.
-    """
-    try:
-        metadata = pq.read_schema(path).metadata or {}
-        summary: dict[str, Any] = json.loads(metadata[_SUMMARY.encode()])
-    except (OSError, ValueError, KeyError, pa.ArrowException) as error:
-        raise BadFile(path, None, "", f"no shard of a batch ({type(error).__name__}); remove it and --resume") from None
-    return summary
-
-
-_SUMMARY = "sva-bench/summary"
-
-
-def _write(path: Path, columns: Mapping[str, Any], units: Mapping[str, str],
-           metadata: Mapping[str, str] | None = None) -> None:
-    """Write a Parquet table, units in the metadata of its columns; ``1`` is a count or a number in order."""
-    table = pa.table(dict(columns))
-    fields = [field.with_metadata({"unit": units[field.name]}) if field.name in units else field
-              for field in table.schema]
-    pq.write_table(table.cast(pa.schema(fields, metadata=dict(metadata or {}))), path)
+    write_table(path, OUTCOMES, (outcome_table(run, robots, settings) for run in executed))

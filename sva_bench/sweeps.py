@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import glob
 import json
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from sva_bench.batch.grid import Grid, Point, checked
-from sva_bench.documents import Document, Name, Number, Section, WholeNumber, parse_yaml, read_yaml, validate
+from sva_bench.batch.digest import digest
+from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
+from sva_bench.batch.schema import Seed
+from sva_bench.documents import Document, Name, Number, Section, parse_yaml, read_yaml, validate
 from sva_bench.errors import BadInput, nearest
 from sva_bench.inputs import adapted
 from sva_bench.options import FailureProcess, Fidelity, Planner
-from sva_bench.planning import Options
+from sva_bench.patterns import has_pattern, matching
+from sva_bench.planning import Options, Progress
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.world.load import world_of
+from sva_bench.world.model import World
 
 _log = logging.getLogger(__name__)
 
@@ -29,7 +33,7 @@ UNIT_TRIALS = 10_000
 UNIT_TRIALS_PHYSICS = 10
 """A trial in physics takes seconds, a settled one microseconds; a unit should take seconds."""
 
-_MOST_SEEDS = 100_000
+MOST_SEEDS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,8 +68,8 @@ class Sweep:
 
 class _SweepFile(Section):
     format: Literal["sva-bench/sweep@1"]
-    worlds: list[str] = Field(min_length=1)
-    seeds: list[WholeNumber] | str | None = None
+    worlds: list[str] = Field(min_length=1, max_length=MOST_POINTS)
+    seeds: Annotated[list[Seed], Field(max_length=MOST_SEEDS)] | str | None = None
     trials: int | None = Field(default=None, ge=1, le=10_000_000)
     rollouts: int | None = Field(default=None, ge=1, le=100_000)
     fidelity: Fidelity | None = None
@@ -107,13 +111,17 @@ def _from_file(document: Document) -> Sweep:
 
 
 def _matching(given: Path) -> list[Path]:
-    """The files that a pattern matches; the path itself where it is none."""
-    if given.exists() or not glob.has_magic(str(given)):
+    """The files that a pattern matches; the path itself where it is none.
+
+    Raises:
+        BadInput: If none match, or too many, or too many places would have to be looked at.
+    """
+    if given.exists() or not has_pattern(given):
         return [given]
-    found = sorted(glob.glob(str(given), recursive=True))
+    found = matching(given, MOST_POINTS)
     if not found:
         raise BadInput(f"{given}: no file matches")
-    return [Path(path) for path in found]
+    return found
 
 
 def seeds_of(words: Sequence[str]) -> tuple[int, ...]:
@@ -124,10 +132,12 @@ def seeds_of(words: Sequence[str]) -> tuple[int, ...]:
         if len(ends) > 2 or not all(end.strip().isdecimal() and len(end) < 19 for end in ends):
             raise BadInput(f"--seed {part.strip()!r}: expected a whole number, or a range like 0-9")
         first, last = int(ends[0]), int(ends[-1])
-        if last < first or last - first >= _MOST_SEEDS:
+        if last < first or last - first >= MOST_SEEDS:
             raise BadInput(f"--seed {part.strip()!r}: a range goes from the smaller to the greater, over "
-                           f"{_MOST_SEEDS} seeds at most")
+                           f"{MOST_SEEDS} seeds at most")
         seeds += range(first, last + 1)
+        if len(seeds) > MOST_SEEDS:
+            raise BadInput(f"--seed: more than {MOST_SEEDS} seeds in all, with {part.strip()!r}")
     return tuple(dict.fromkeys(seeds))
 
 
@@ -155,8 +165,12 @@ def varied(words: Sequence[str]) -> dict[str, list[Any]]:
     return vary
 
 
-def grid_of(sweep: Sweep) -> Grid:
+def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
     """The grid that a sweep comes to.
+
+    Args:
+        sweep: What is asked for.
+        progress: Told of the worlds that are read: with all their variants they may be thousands.
 
     Raises:
         BadFile: If a world is wrong, as it is or varied.
@@ -167,23 +181,43 @@ def grid_of(sweep: Sweep) -> Grid:
     for key, values in vary.items():
         if len({json.dumps(value) for value in values}) < len(values):
             raise BadInput(f"--set {key}: a value stands there twice")
-    points = []
+    options = _options_of(sweep)
+    unit_trials = sweep.unit_trials or (UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS)
+    seeds = sweep.seeds or (0,)
+    points: list[Point] = []
+    # Before anything is read or multiplied out: a few lines can ask for more than there are atoms.
+    refuse_too_many(len(sweep.worlds) * math.prod(map(len, vary.values())) * len(planners), len(seeds), options.trials,
+                    unit_trials)
+    of = len(sweep.worlds) * math.prod(map(len, vary.values()))
+    held: dict[str, World] = {}
     for path in sweep.worlds:
         document = read_yaml(path)
         for values in product(*vary.values()):
+            progress("reading worlds", len(points) // len(planners), of)
             changed = document
             for key, value in zip(vary, values, strict=True):
                 changed = changed.changed(key, value)
             world = adapted(world_of(changed), sweep.scenarios, sweep.margin, execute_failure=sweep.execute_failure)
+            world = _sharing(world, held)
             for planner in planners:
                 parts = [f"{key}={json.dumps(value)}" for key, value in zip(vary, values, strict=True)]
                 parts += [f"planner={planner}"] if len(planners) > 1 else []
                 points.append(Point(world=world, planner=planner, variant="; ".join(parts)))
-    options = Options(
-        trials=sweep.trials or 1000, rollouts=sweep.rollouts or 8, fidelity=sweep.fidelity or "rollout",
-        limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap))
     if options.fidelity == "kinematic" and any(key.split(".")[0] == "noise" for key in vary):
         _log.warning("noise is varied to no effect: kinematic trials have none")
-    usual = UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS
-    return checked(Grid(points=points, seeds=sweep.seeds or (0,), options=options,
-                        unit_trials=sweep.unit_trials or usual))
+    return checked(Grid(points=points, seeds=seeds, options=options, unit_trials=unit_trials))
+
+
+def _sharing(world: World, held: dict[str, World]) -> World:
+    """The world; obstacles and map files are those of an earlier one where they are equal, so thousands fit."""
+    source = world.map_source
+    first = held.setdefault(digest(world.obstacles, None if source is None else source.digests()), world)
+    if source is not None and first.map_source is not None:
+        source = replace(source, files=first.map_source.files)
+    return replace(world, obstacles=first.obstacles, map_source=source)
+
+
+def _options_of(sweep: Sweep) -> Options:
+    return Options(
+        trials=sweep.trials or 1000, rollouts=sweep.rollouts or 8, fidelity=sweep.fidelity or "rollout",
+        limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap))

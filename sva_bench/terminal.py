@@ -6,24 +6,41 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.logging import RichHandler
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.segment import Segment
 from rich.table import Table
 
 from sva_bench.errors import BadInput
+from sva_bench.printable import printable
 
-messages = Console(stderr=True)
+
+class SafeConsole(Console):
+    """Prints nothing that a terminal would obey, wherever a text came from: the one door for all that is shown."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """What is to be printed, piece by piece."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(printable(segment.text), segment.style)
+
+
+class _SafeFormatter(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
+
+
+messages = SafeConsole(stderr=True)
 
 
 def results() -> Console:
     """Standard output; tables keep their shape in a pipe."""
-    return Console(width=None if sys.stdout.isatty() else 140)
+    return SafeConsole(width=None if sys.stdout.isatty() else 140, markup=False)  # names may hold brackets
 
 
 def print_json(data: Any) -> None:
@@ -47,7 +64,12 @@ def check_output(path: Path | None, *sources: Path) -> None:
 
 def write_result(path: Path | None, content: str | bytes) -> None:
     """Write a result to a file, whole or not at all, or to standard output; pipes and devices are written through."""
-    data = content.encode("utf-8") if isinstance(content, str) else content
+    try:
+        data = content.encode("utf-8") if isinstance(content, str) else content
+    except UnicodeEncodeError as error:
+        name = error.object[max(error.start - 40, 0):error.end]
+        raise BadInput(f"{name!r}: this name is no UTF-8, and no file of ours can hold it; rename what it is of"
+                       ) from None
     if path is None:
         if isinstance(content, str):
             sys.stdout.write(content)
@@ -83,7 +105,9 @@ def set_up_logging(verbose: bool) -> None:
         logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,
                             handlers=[RichHandler(console=messages, show_time=False, show_path=False)])
     else:  # a line each, whatever reads them
-        logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s", force=True)
+        handler = logging.StreamHandler()
+        handler.setFormatter(_SafeFormatter("%(levelname)s %(message)s"))
+        logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
     logging.getLogger("sva_bench").setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 

@@ -6,16 +6,48 @@ import ctypes
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing import resource_tracker, util
+from multiprocessing.process import BaseProcess
+from types import ModuleType
+from typing import Any
 
+from sva_bench.errors import BadInput, ExitCode, SvaBenchError
 from sva_bench.interrupts import holding_back_ctrl_c
+
+MOST_PER_CORE, FEWEST_MOST = 4, 16
+"""More workers a core, or in all where there are few cores, would only take memory from each other."""
+
+
+class WorkerLost(SvaBenchError):
+    """A worker process died, or there was no memory left for it: nothing of what it was to do can be kept."""
+
+    exit_code = ExitCode.UNFINISHED_TRIALS
+
+    def __init__(self, how: str) -> None:
+        super().__init__(how)
+        self.how = how
+
+    def __str__(self) -> str:
+        return (f"a worker process was lost ({self.how}), and nothing was written: if memory is short, take fewer "
+                "workers (--workers 1), trials or rollouts; a batch tries such units again")
 
 
 def count_of(wanted: int | None) -> int:
-    """How many worker processes: as many as wanted, else one a core."""
-    return wanted or len(os.sched_getaffinity(0))
+    """How many worker processes: as many as wanted, else one a core.
+
+    Raises:
+        BadInput: If that is more than this machine can have any use for.
+    """
+    cores = len(os.sched_getaffinity(0))
+    most = max(MOST_PER_CORE * cores, FEWEST_MOST)
+    if wanted is not None and wanted > most:
+        raise BadInput(f"--workers {wanted}: at most {most} on this machine, which has {cores} cores")
+    return wanted or cores
 
 
 @contextmanager
@@ -25,20 +57,67 @@ def local_workers(wanted: int | None) -> Iterator[Executor | None]:
     if count <= 1:
         yield None
         return
+    # Interpreters that are started with -c look for modules in the current folder first, unless told not to.
+    os.environ.setdefault("PYTHONSAFEPATH", "1")
     before = set(multiprocessing.active_children())
+    started: set[BaseProcess] = set()
     executor = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"),
                                    initializer=die_with, initargs=(os.getpid(),))
+    _end_tracker_at_exit()
     try:
-        with holding_back_ctrl_c():  # workers inherit it for good
+        with holding_back_ctrl_c(), _without_main_module():  # workers inherit the former for good
             for _ in range(count):  # they start, import and load compiled code while this process plans
                 executor.submit(_warm_up)
+        started = set(multiprocessing.active_children()) - before
         yield executor
-    except BaseException:
+    except BaseException as error:
         for worker in set(multiprocessing.active_children()) - before:
             worker.terminate()  # what they are at is of no use any more, and may take long
+        if isinstance(error, BrokenProcessPool):
+            executor.shutdown(wait=True, cancel_futures=True)
+            raise WorkerLost(_death_of(started)) from None
+        if isinstance(error, MemoryError):
+            raise WorkerLost("memory ran out") from None
         raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _death_of(workers: set[BaseProcess]) -> str:
+    """How the first of some worker processes died; the others were terminated because of it."""
+    codes = {worker.exitcode for worker in workers} - {None, 0, -signal.SIGTERM}
+    if -signal.SIGKILL in codes:
+        return "SIGKILL, sent by somebody, or for want of memory"
+    return ", ".join(signal.Signals(-code).name if code < 0 else f"status {code}" for code in codes if code) or "ended"
+
+
+def _end_tracker_at_exit() -> None:
+    """Have multiprocessing's own helper process end before this process does, not a moment later.
+
+    It ends when its line is closed; that is left to the kernel, so it outlives every program that had a pool. It must
+    go last, when all else is released that it keeps track of.
+    """
+    if not _at_exit:
+        _at_exit.append(util.Finalize(None, _end_tracker, exitpriority=-1000))
+
+
+def _end_tracker() -> None:
+    tracker: Any = resource_tracker._resource_tracker
+    if tracker._pid is not None:  # else it is another process's, or none was started
+        tracker._stop()
+
+
+_at_exit: list[util.Finalize] = []
+
+
+@contextmanager
+def _without_main_module() -> Iterator[None]:
+    """Workers that are started meanwhile don't import the program's main module again: they have no use for it."""
+    main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def die_with(parent: int) -> None:

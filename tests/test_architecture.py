@@ -13,9 +13,12 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MODULES = [path.relative_to(PACKAGE).as_posix() for path in FILES]
 
 # What every part may know. Files at the top that know nothing of the others may be known by all.
-EVERYBODYS = {"arrays", "complaints", "documents", "errors", "interrupts", "seeds"}
+EVERYBODYS = {"arrays", "complaints", "documents", "errors", "interrupts", "patterns", "printable", "read_back",
+              "safe_path", "seeds"}
 MAY_KNOW: dict[str, set[str]] = {
-    "arrays": set(), "errors": set(), "interrupts": set(), "complaints": {"errors"},
+    "arrays": set(), "errors": set(), "interrupts": set(), "printable": set(), "safe_path": set(),
+    "patterns": {"errors"}, "read_back": {"documents", "errors"},
+    "complaints": {"errors"},
     "documents": {"complaints", "errors"}, "seeds": {"arrays"},
     "robot": set(),
     "mission": set(),
@@ -25,16 +28,18 @@ MAY_KNOW: dict[str, set[str]] = {
     "execution": {"world", "robot", "travel", "mission"},
     "analysis": {"world", "robot", "travel", "mission", "execution"},
     "recording": {"world", "robot", "travel", "mission", "execution"},
-    "runs": {"world", "robot", "travel", "mission", "execution"},
+    "tables": set(),
+    "outcome_table": {"execution", "tables"},
+    "runs": {"world", "robot", "travel", "mission", "execution", "outcome_table", "tables"},
     "workers": {"execution"},
 }
 # These put the parts together, and may know all.
 TOP = {"options", "inputs", "bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed",
        "precision", "tally", "assumptions", "reproduce", "cli", "cli_batch", "cli_inputs", "cli_plans", "live",
-       "sweeps", "terminal", "__main__", "__init__"}
+       "sweeps", "terminal", "results_schema", "__main__", "__init__"}
 # Of these, those that the command line stands on: they know nothing of it.
 BENCH = {"bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed", "precision", "tally",
-         "assumptions", "reproduce"}
+         "assumptions", "reproduce", "results_schema"}
 ONLY_IN = {
     "pybullet": "execution/simulator.py", "pybullet_data": "execution/simulator.py",
     "pybullet_utils": "execution/simulator.py", "ompl": "travel/roadmap.py", "highspy": "solver/highs.py",

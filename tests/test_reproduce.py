@@ -64,14 +64,15 @@ def test_a_world_without_scenarios_is_no_such_study(tmp_path: Path) -> None:
 def test_the_table_of_runtimes_is_the_benchmarks_own() -> None:
     asked: list[list[str]] = []
 
-    def run(command: list[str], *, cwd: Path, check: bool) -> SimpleNamespace:
+    def run(command: list[str], *, cwd: Path, env: dict[str, str], check: bool) -> SimpleNamespace:
         asked.append(command)
+        assert env["PYTHONPATH"].startswith(str(cwd))
         assert (cwd / "benchmarks" / "solver" / "paper.py").is_file()
         assert not check
         return SimpleNamespace(returncode=130)
 
     assert runtimes(run) == 130
-    assert asked[0][1:4] == ["-m", "benchmarks.solver.paper", "--quick"]
+    assert asked[0][1:5] == ["-P", "-m", "benchmarks.solver.paper", "--quick"]
 
 
 @pytest.mark.parametrize(("arguments", "said"), [

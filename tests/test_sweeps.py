@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 from sva_bench.batch.cache import Cache
 from sva_bench.batch.estimates import estimates
+from sva_bench.batch.folder import begin, settings_in
 from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.sweeps import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
@@ -77,7 +77,9 @@ def test_a_sweep_file_is_the_same_as_its_options_and_options_come_first(tmp_path
 
 def test_settings_give_the_same_grid_again(tmp_path: Path) -> None:
     grid = grid_of(Sweep(worlds=(world(tmp_path),), vary={"noise.wheel_gain_sd": [0.0, 0.02]}))
-    again = grid_from(json.loads(json.dumps(grid.settings())), tmp_path / "manifest.json")
+    (tmp_path / "out").mkdir()
+    begin(tmp_path / "out", grid.settings(), resume=False)
+    again = grid_from(*settings_in(tmp_path / "out"))
     assert again.settings() == grid.settings()
     assert again.units() == grid.units()
 

@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sva_bench.errors import BadInput, ExitCode
+from sva_bench.workers import WorkerLost, count_of, local_workers
 
 SCRIPT = """
 import multiprocessing, os, signal
@@ -29,3 +39,54 @@ if __name__ == "__main__":
 def test_ctrl_c_while_workers_start_is_not_lost_and_ends_them() -> None:
     done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=60, check=False)
     assert done.stdout == "caught 0\n", done.stderr
+
+
+def asked_of_a_worker(function: Callable[..., Any], argument: Any) -> None:
+    with local_workers(2) as executor:
+        assert executor is not None
+        executor.submit(function, argument).result()
+
+
+def test_a_worker_that_is_killed_is_told_of_with_what_to_change() -> None:
+    with pytest.raises(WorkerLost, match=r"SIGKILL.*--workers 1") as lost:
+        asked_of_a_worker(signal.raise_signal, signal.SIGKILL)
+    assert lost.value.exit_code == ExitCode.UNFINISHED_TRIALS
+
+
+def test_a_worker_without_memory_is_told_of_with_what_to_change() -> None:
+    with pytest.raises(WorkerLost, match=r"memory ran out.*--workers 1"):
+        asked_of_a_worker(bytearray, 1 << 60)
+
+
+HELPED = """
+from sva_bench.workers import local_workers
+if __name__ == "__main__":
+    with local_workers(2) as executor:
+        print(executor.submit(abs, -1).result())
+"""
+
+
+def test_no_process_of_ours_outlives_a_program_that_had_workers() -> None:
+    with subprocess.Popen([sys.executable, "-c", HELPED], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          start_new_session=True) as program:
+        program.wait()  # not until its outputs are closed: a helper would hold them
+        left = [stat for path in Path("/proc").glob("[0-9]*/stat")
+                if (stat := _stat(path)) and int(stat[3]) == program.pid]
+        assert not left
+        assert program.communicate() == ("1\n", "")
+
+
+def _stat(path: Path) -> list[str]:
+    """What the kernel says of a process, from its state on; its session comes fourth."""
+    try:
+        return path.read_text(encoding="utf-8").rpartition(")")[2].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return []
+
+
+def test_more_workers_than_a_machine_can_use_are_refused_by_number() -> None:
+    cores = len(os.sched_getaffinity(0))
+    assert count_of(None) == cores
+    assert count_of(16) == 16
+    with pytest.raises(BadInput, match=rf"--workers 99999999: at most {max(4 * cores, 16)} .* {cores} cores"):
+        count_of(99_999_999)

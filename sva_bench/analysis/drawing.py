@@ -53,7 +53,8 @@ _ROUTES: tuple[tuple[str, Any, float], ...] = (  # colour, style, width [pt]; la
 _HALO = withStroke(linewidth=2.2, foreground="white")
 _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "sva-bench", "svg.fonttype": "path", "font.family": "DejaVu Sans", "font.size": 8.0,
-    "axes.linewidth": 0.6, "path.simplify": False}
+    "axes.linewidth": 0.6, "path.simplify": False,
+    "text.parse_math": False}  # a dollar sign in a name is one
 _PER_LINE = 4  # incentives on a line of a label
 _MOST_MINDED = 300  # paths that labels try to leave free; more leave no room anyway
 _LEADER = 9.0  # pixels between a marker and its label from which on a line joins them

@@ -7,6 +7,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from sva_bench.printable import printable
+
 _STYLE = """
 :root{color-scheme:light}*{box-sizing:border-box}
 body{font:16px/1.5 system-ui,sans-serif;max-width:76rem;margin:0 auto;padding:1rem;color:#1b1b1b;background:#fff}
@@ -113,4 +115,4 @@ def sentence(words: str) -> str:
 
 def text(value: object) -> str:
     """As it stands in a page."""
-    return html.escape(str(value))
+    return html.escape(printable(str(value)))

@@ -12,7 +12,7 @@ from sva_bench.analysis.moments import Figure, pooled
 from sva_bench.analysis.statistics import Estimate, estimate, sample_mean
 from sva_bench.batch.folder import Failure, shard_path
 from sva_bench.batch.grid import Grid
-from sva_bench.batch.shards import Note, read_note
+from sva_bench.batch.shards import Note, read_note, unit_of
 from sva_bench.batch.tallies import join, scenario_from
 
 KIND = "sva-bench/batch@1"
@@ -44,7 +44,7 @@ def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterato
         for first, _ in ranges:
             unit = grid.unit_name(point, seed, first)
             if unit in done:
-                note = read_note(shard_path(folder, unit))
+                note = read_note(shard_path(folder, unit), unit_of(grid, point, seed, first))
                 together = note if together is None else joined(together, note)
         if together is not None:
             yield together

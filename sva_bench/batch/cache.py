@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
-import pickle
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sva_bench.batch.codec import NotOfType, decoded, encoded
 from sva_bench.batch.digest import code_digest
+from sva_bench.batch.jobs import Job
 from sva_bench.errors import BadInput
 
 _HASH_BYTES = 32
+_MAX_BYTES = 1 << 30  # paths between 400 sites stay below
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def default_folder() -> Path:
@@ -25,41 +30,90 @@ def default_folder() -> Path:
 class Cache:
     """A folder of results; only one process of a batch writes to it.
 
-    Files are Python's own serialisation behind a checksum: a torn or altered file counts as absent. As any cache of
-    this kind it must be a folder that only its user can write to.
+    Files are data behind a checksum (``codec``), never code. One that is torn, altered, not exactly of the type that
+    its job gives, not fitting to that job, or not written by this user alone counts as absent. What is kept lies in a
+    folder of its own for each version, which only its user may write to.
     """
 
     folder: Path
 
-    def get(self, kind: str, key: str) -> Any | None:
-        """What is kept under a key; ``None`` if nothing is, or nothing whole."""
+    def get(self, job: Job, key: str) -> Any | None:
+        """The result of a job, by its key; ``None`` if none is kept, or none that is whole and ours.
+
+        Raises:
+            BadInput: If the cache cannot be read, or others could have written to it.
+        """
         try:
-            content = self._path(kind, key).read_bytes()
-        except FileNotFoundError:
+            if not self._is_there():
+                return None
+            content = _read(self._path(job.kind, key))
+        except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
+            if error.errno == errno.ELOOP:  # a link, which we never make
+                return None
             raise BadInput(f"{self.folder}: the cache cannot be read ({error.strerror}); choose another with --cache"
                            ) from None
         check, body = content[:_HASH_BYTES], content[_HASH_BYTES:]
-        return pickle.loads(body) if hashlib.sha256(body).digest() == check else None
+        if hashlib.sha256(body).digest() != check:
+            return None
+        try:
+            result = decoded(body, job.result)
+        except NotOfType:
+            return None
+        return result if job.fits(result) else None
 
-    def put(self, kind: str, key: str, value: Any) -> None:
-        """Keep a value, whole or not at all.
+    def put(self, job: Job, key: str, result: Any) -> None:
+        """Keep the result of a job under its key, whole or not at all.
 
         Raises:
-            BadInput: If it cannot be written.
+            BadInput: If it cannot be written, or others can write to the cache.
         """
-        body = pickle.dumps(value, protocol=5)
-        path = self._path(kind, key)
+        body = encoded(result, job.result)
+        path = self._path(job.kind, key)
         draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
         try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._home.mkdir(mode=0o700, exist_ok=True)
+            self._is_there()
             path.parent.mkdir(parents=True, exist_ok=True)
-            draft.write_bytes(hashlib.sha256(body).digest() + body)
+            draft.unlink(missing_ok=True)  # of a process that was killed
+            with os.fdopen(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+                file.write(hashlib.sha256(body).digest() + body)
             draft.replace(path)
         except OSError as error:
             draft.unlink(missing_ok=True)
             raise BadInput(f"{self.folder}: the cache cannot be written to ({error.strerror}); choose another with "
                            "--cache") from None
 
+    @property
+    def _home(self) -> Path:
+        """What this version keeps: other code, other results."""
+        return self.folder / code_digest()[:16]
+
     def _path(self, kind: str, key: str) -> Path:
-        return self.folder / code_digest()[:16] / kind / key[:2] / key
+        return self._home / kind / key[:2] / key
+
+    def _is_there(self) -> bool:
+        """Whether this version's folder is there.
+
+        Raises:
+            BadInput: If others could have put something into it.
+        """
+        try:
+            found = self._home.lstat()
+        except FileNotFoundError:
+            return False
+        if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & _OTHERS_WRITE:
+            raise BadInput(f"{self._home}: others can write to this part of the cache (owner {found.st_uid}, mode "
+                           f"{stat.S_IMODE(found.st_mode):o}); remove it, or choose another cache with --cache")
+        return True
+
+
+def _read(path: Path) -> bytes:
+    """The content of a file that only its owner, this user, can have written; nothing of any other."""
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    with os.fdopen(handle, "rb") as file:
+        found = os.fstat(handle)
+        ours = stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & _OTHERS_WRITE
+        return file.read() if ours and found.st_size <= _MAX_BYTES else b""

@@ -114,7 +114,7 @@ class Conductor:
                     opened.failure = opened.failure or self._given_up[key]
                     continue
                 if key not in self._jobs:
-                    kept = self._cache.get(job.kind, key) if job.kept else None
+                    kept = self._cache.get(job, key) if job.kept else None
                     if kept is not None:
                         opened.results[position] = kept
                         continue
@@ -155,7 +155,7 @@ class Conductor:
                     self._warned.add(warning)
                     _log.warning("%s", warning)
             if job.kept:
-                self._cache.put(job.kind, key, answer.result)
+                self._cache.put(job, key, answer.result)
             elif isinstance(job, TrialsJob):
                 self._hooks.shard(job.unit, answer.result)
         elif isinstance(job, TrialsJob):

@@ -93,4 +93,5 @@ class LocalProcesses:
         for worker, _ in zip(idle, list(self._waiting), strict=False):
             key, job = self._waiting.popleft()
             self._at[worker] = key
+            # Pickled, both ways: a pipe between this process and its own child, which nobody else can write to.
             worker.give(pickle.dumps(job, protocol=5))

@@ -12,6 +12,7 @@ from sva_bench.batch.folder import units_in
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.jobs import DriveJob, Job, PlansJob, TravelTimesJob
 from sva_bench.batch.strands import strand
+from sva_bench.planning import Progress
 
 # Measured on a core of a shared virtual machine.
 _PATHS_S, _PLANS_S, _ROW_S = 5.0, 5.0, 1.5e-6
@@ -34,11 +35,16 @@ class Estimate:
     processor_s: float
 
 
-def estimates(grid: Grid, cache: Cache, folder: Path) -> list[Estimate]:
+def estimates(grid: Grid, cache: Cache, folder: Path, progress: Progress = lambda *_: None) -> list[Estimate]:
     """What is left of a grid, a point and seed at a time."""
     done = frozenset(units_in(folder)) if folder.is_dir() else frozenset()
     seen: set[str] = set()
-    return [_estimate(grid, point, seed, done, cache, seen) for point, seed in grid.strands()]
+    listed: list[Estimate] = []
+    of = len(grid.points) * len(grid.seeds)
+    for point, seed in grid.strands():
+        progress("estimating", len(listed), of)
+        listed.append(_estimate(grid, point, seed, done, cache, seen))
+    return listed
 
 
 def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: Cache, seen: set[str]) -> Estimate:
@@ -54,11 +60,12 @@ def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: 
     while jobs and jobs[0].kept:
         results = []
         for job in jobs:
-            found = None if job.key in seen else cache.get(job.kind, job.key)
-            if found is None and job.key not in seen:
+            key = job.key
+            found = cache.get(job, key)
+            if found is None and key not in seen:
                 seconds += _seconds(job, each)
-            seen.add(job.key)
-            results.append(found if found is not None else cache.get(job.kind, job.key))
+            seen.add(key)
+            results.append(found)
         if any(result is None for result in results):
             seconds += _beyond(jobs[0], point, grid, each)
             break

@@ -12,8 +12,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sva_bench.documents import pretty_json, read_json
+from sva_bench.batch.schema import FailuresFile, ManifestFile, SettingsEntry
+from sva_bench.documents import pretty_json, validate
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.read_back import MOST_BYTES, Part, read_bounded, read_ours
 
 MANIFEST = "sva-bench/batch-manifest@1"
 FAILURES = "sva-bench/batch-failures@1"
@@ -86,26 +88,43 @@ def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
     except OSError as error:
         raise _unwritable(folder, error) from None
     if not held:
-        write(manifest, pretty_json({"format": MANIFEST, "settings": dict(settings)}).encode())
+        content = pretty_json({"format": MANIFEST, "settings": dict(settings)}).encode()
+        if len(content) > MOST_BYTES:
+            raise BadInput(f"the worlds and variants of this batch take {len(content)} bytes; at most {MOST_BYTES} are "
+                           "kept in one folder: cut it into several batches")
+        write(manifest, content)
 
 
-def settings_in(folder: Path) -> dict[str, Any]:
-    """The settings that a batch folder was made with.
+def is_batch(folder: Path) -> bool:
+    """Whether a folder is that of a batch, whole or not."""
+    try:
+        data = read_bounded(folder / "manifest.json", MOST_BYTES).data
+    except BadFile:
+        return next(folder.glob("outcomes-*.parquet"), None) is not None
+    return isinstance(data, dict) and str(data.get("format", "")).startswith("sva-bench/batch-manifest@")
+
+
+def settings_in(folder: Path) -> tuple[Part, SettingsEntry]:
+    """The settings that a batch folder was made with, as they stand there and as they were checked.
 
     Raises:
-        BadFile: If it is no batch folder.
+        BadInput: If it is no batch folder.
+        BadFile: If its manifest is not as ours are.
     """
-    document = read_json(folder / "manifest.json")
-    data = document.data
-    settings = data.get("settings") if isinstance(data, dict) and data.get("format") == MANIFEST else None
-    if not isinstance(settings, dict):
-        raise BadFile(document.path, None, "settings", "this is no batch folder of ours; choose another")
-    return settings
+    path = folder / "manifest.json"
+    if not path.exists():
+        raise BadInput(f"{folder}: no folder of a batch (manifest.json is missing); choose another")
+    document = read_bounded(path, MOST_BYTES)
+    if isinstance(document.data, dict) and document.data.get("format") == "sva-bench/manifest@1":
+        raise BadInput(f"{folder}: the folder of a run, not of a batch; 'sva-bench report' with this folder writes its "
+                       "report again")
+    settings = validate(document, ManifestFile, MANIFEST).settings
+    return Part(document, ("settings",), document.data["settings"]), settings
 
 
 def refuse_other_settings(folder: Path, settings: Mapping[str, Any]) -> None:
     """Refuse to go on with a folder of other settings, naming the first difference."""
-    held, now = settings_in(folder), json.loads(json.dumps(settings))
+    held, now = settings_in(folder)[0].data, json.loads(json.dumps(settings))
     if held != now:
         key, was, is_now = _difference(held, now)
         plain = all(isinstance(value, bool | int | float | str | None) for value in (was, is_now))
@@ -149,12 +168,8 @@ def failures_in(folder: Path) -> list[Failure]:
     path = folder / "failures.json"
     if not path.exists():
         return []
-    document = read_json(path)
-    try:
-        return [Failure(**entry) for entry in document.data["failures"]]
-    except (KeyError, TypeError):
-        raise BadFile(path, None, "failures", "this is no list of failures of ours; remove it, and those units are "
-                      "tried again with --resume") from None
+    _, file = read_ours(path, FailuresFile, FAILURES)
+    return [Failure(**vars(entry)) for entry in file.failures]
 
 
 def write_failures(folder: Path, failures: Sequence[Failure]) -> None:

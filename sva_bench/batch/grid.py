@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,12 +10,19 @@ from typing import Any
 
 from sva_bench import __version__
 from sva_bench.batch.digest import digest
-from sva_bench.documents import Document
+from sva_bench.batch.schema import PointEntry, SettingsEntry
 from sva_bench.errors import BadInput
 from sva_bench.planning import Options
+from sva_bench.read_back import Part
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.world.load import world_as_dict, world_of
 from sva_bench.world.model import World
+
+MOST_POINTS, MOST_UNITS = 10_000, 200_000
+"""Shards that a folder holds with ease; worlds with all their variants that are kept in memory."""
+
+
+_HASH = 10  # digits that tell ten thousand variants apart; of six, two of them would be alike
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,7 +42,7 @@ class Point:
     @property
     def name(self) -> str:
         """Part of file names: the world's name, and a hash of the variation."""
-        return f"{self.world.name}-{digest(self.variant)[:6]}" if self.variant else self.world.name
+        return f"{self.world.name}-{digest(self.variant)[:_HASH]}" if self.variant else self.world.name
 
     @property
     def label(self) -> str:
@@ -98,33 +105,57 @@ class Grid:
 
 
 def checked(grid: Grid) -> Grid:
-    """The grid, refused if two of its points would write the same files."""
-    names = [point.name for point in grid.points]
-    for point in grid.points:
-        if names.count(point.name) > 1:
-            raise BadInput(f"two worlds are named {point.name!r}; names must differ within a batch")
+    """The grid, refused if two of its points would write the same files, or if it is larger than any batch.
+
+    Raises:
+        BadInput: Says which, and the number.
+    """
+    for name, count in Counter(point.name for point in grid.points).items():
+        if count > 1:
+            raise BadInput(f"two worlds are named {name!r}; names must differ within a batch")
+    refuse_too_many(len(grid.points), len(grid.seeds), grid.options.trials, grid.unit_trials)
     return grid
 
 
-def grid_of(settings: Mapping[str, Any], path: Path) -> Grid:
-    """The grid that gave these settings, read from the file at ``path``."""
-    told = settings["options"]
+def refuse_too_many(points: int, seeds: int, trials: int, unit_trials: int) -> None:
+    """Refuse a grid of more points or units than a batch can go through."""
+    if points > MOST_POINTS:
+        raise BadInput(f"{points} worlds, variants and planners in all; a batch has {MOST_POINTS} at most")
+    ranges = -(-trials // unit_trials)
+    units = points * seeds * ranges
+    if units > MOST_UNITS:
+        raise BadInput(f"{units} units ({points} worlds and variants x {seeds} seeds x {ranges} ranges of trials); a "
+                       f"batch has {MOST_UNITS} at most: take fewer seeds, or more trials a unit (--unit-trials)")
+
+
+def grid_of(document: Part, settings: SettingsEntry) -> Grid:
+    """The grid that gave the settings in a batch's manifest.
+
+    Raises:
+        BadFile: If a world there is wrong, or stands under another name than its own.
+        BadInput: If there are more units than any batch of ours has.
+    """
+    told = settings.options
     options = Options(
-        trials=told["trials"], rollouts=told["rollouts"], fidelity=told["fidelity"], evpi=told["evpi"],
-        limits=SolveLimits(time_limit_s=told["time_limit_s"], gap=told["gap"]))
-    points = [Point(world=world_of(Document(_beside_map(path, entry), entry["world"], json.dumps(entry["world"]))),
-                    planner=entry["planner"], variant=entry["variant"])
-              for entry in settings["points"].values()]
-    return Grid(points=points, seeds=settings["seeds"], options=options, unit_trials=settings["unit_trials"])
+        trials=told.trials, rollouts=told.rollouts, fidelity=told.fidelity, evpi=told.evpi,
+        limits=SolveLimits(time_limit_s=told.time_limit_s, gap=told.gap))
+    points = []
+    for name, entry in settings.points.items():
+        at = ("points", name)
+        world = world_of(Part(document, (*at, "world"), entry.world), _map_folder_at(document.path, entry))
+        points.append(Point(world=world, planner=entry.planner, variant=entry.variant))
+        if points[-1].name != name:
+            raise document.error(at, f"its world and variant are those of {points[-1].name!r}")
+    return checked(Grid(points=points, seeds=settings.seeds, options=options, unit_trials=settings.unit_trials))
 
 
 def _map_folder(digests: Mapping[str, str]) -> str:
     return f"map-{digest(digests)[:12]}"
 
 
-def _beside_map(path: Path, entry: Mapping[str, Any]) -> Path:
-    """Where a point's world would stand so that it finds its map."""
-    return path.parent / _map_folder(entry["files"]) / path.name if "files" in entry else path
+def _map_folder_at(path: Path, entry: PointEntry) -> Path:
+    """The folder of the files that a point's world names."""
+    return path.parent if entry.files is None else path.parent / _map_folder(entry.files)
 
 
 def batch_name(settings: Mapping[str, Any]) -> str:

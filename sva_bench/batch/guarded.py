@@ -14,6 +14,7 @@ from multiprocessing.connection import Connection
 
 from sva_bench.batch.answers import Answer, Caps, Failed
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.safe_path import environment_of_children
 
 _START_S = 300.0
 """A worker that takes longer to load its libraries is taken for hung; a busy machine needs half a minute."""
@@ -31,11 +32,12 @@ class GuardedWorker:
     def __init__(self, caps: Caps) -> None:
         self.caps = caps
         ours, theirs = socket.socketpair()
-        environment = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+        environment = environment_of_children() | dict.fromkeys(
+            ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
         with theirs, holding_back_ctrl_c():  # it inherits the mask for good: Ctrl-C is the parent's to handle
             # Libraries print to standard output, which is ours.
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "sva_bench.batch.worker", str(theirs.fileno()), str(os.getpid()),
+                [sys.executable, "-P", "-m", "sva_bench.batch.worker", str(theirs.fileno()), str(os.getpid()),
                  str(caps.memory_mb)],
                 pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, env=environment)
@@ -79,7 +81,7 @@ class GuardedWorker:
         if not self.ready:
             self.ready = True
             return None
-        answer: Answer = pickle.loads(content)
+        answer: Answer = pickle.loads(content)  # from our own child, by a pipe that nobody else holds
         return answer
 
     def overdue(self) -> Failed:

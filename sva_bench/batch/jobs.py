@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
 
+import numpy as np
+
+from sva_bench.arrays import FloatArray
 from sva_bench.batch.digest import digest
 from sva_bench.batch.shards import Facts, Shard, shard_of
 from sva_bench.execution.execute import (
@@ -18,6 +21,9 @@ from sva_bench.execution.execute import (
     settle_trials,
 )
 from sva_bench.execution.outcome import Driven
+from sva_bench.mission.certify import certify
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.plan import Plan
 from sva_bench.planning import Options, Planned, instance_of, plan_scenarios
 from sva_bench.robot.model import RobotModel
 from sva_bench.travel.fuel import FuelCosts
@@ -32,10 +38,12 @@ class Job(Protocol):
     Attributes:
         kind: What sort of result it has.
         kept: Whether its result goes into the cache.
+        result: Type of its result.
     """
 
     kind: ClassVar[str]
     kept: ClassVar[bool]
+    result: ClassVar[Any]
 
     @property
     def key(self) -> str:
@@ -48,6 +56,9 @@ class Job(Protocol):
     def run(self) -> Any:
         """Do it."""
 
+    def fits(self, result: Any) -> bool:
+        """Whether a result of the right type can be this job's, and nothing that follows would trip over it."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TravelTimesJob:
@@ -55,6 +66,7 @@ class TravelTimesJob:
 
     kind: ClassVar[str] = "travel-times"
     kept: ClassVar[bool] = True
+    result: ClassVar[Any] = TravelTimes
     world: World
     model: RobotModel
     planner: PlannerName
@@ -74,6 +86,20 @@ class TravelTimesJob:
         """Plan them."""
         return plan_travel_times(self.world, self.model, self.planner)
 
+    def fits(self, result: TravelTimes) -> bool:
+        """Of these sites and this robot, with a path and a time for each pair."""
+        n = len(self.world.sites)
+        apart = ~np.eye(n, dtype=bool)
+        return (result.sites == tuple(site.name for site in self.world.sites) and result.model == self.model
+                and len(result.headings_rad) == len(result.paths) == n and all(len(row) == n for row in result.paths)
+                and bool((result.time_ms[apart] > 0).all()) and not result.time_ms[~apart].any()
+                and all((path is None) == (i == j) and (path is None or _is_path(path))
+                        for i, row in enumerate(result.paths) for j, path in enumerate(row)))
+
+
+def _is_path(path: FloatArray) -> bool:
+    return path.ndim == 2 and path.shape[1] == 2 and len(path) > 1 and bool(np.isfinite(path).all())
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlansJob:
@@ -81,6 +107,7 @@ class PlansJob:
 
     kind: ClassVar[str] = "plans"
     kept: ClassVar[bool] = True
+    result: ClassVar[Any] = Mapping[str, Planned]
     world: World
     costs: Mapping[str, FuelCosts]
     options: Options
@@ -102,6 +129,19 @@ class PlansJob:
         """Make them."""
         return plan_scenarios(self.world, self.costs, self.options, lambda *_: None)
 
+    def fits(self, result: Mapping[str, Planned]) -> bool:
+        """Of these scenarios, made for these instances, and feasible there."""
+        return list(result) == [scenario.name for scenario in self.world.scenarios] and all(
+            digest(planned.instance) == digest(instance_of(self.world, self.costs, scenario))
+            and all(_is_plan(plan, planned.instance) for plan in (*planned.all_plans(), planned.worst) if plan)
+            for scenario, planned in zip(self.world.scenarios, result.values(), strict=True))
+
+
+def _is_plan(plan: Plan, instance: Instance) -> bool:
+    names, sites = {vehicle.name for vehicle in instance.vehicles}, set(instance.sites)
+    return set(plan.routes) <= names and all(sites.issuperset(route) for route in plan.routes.values()) \
+        and certify(instance, replace(plan, value=None)).feasible
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DriveJob:
@@ -109,6 +149,7 @@ class DriveJob:
 
     kind: ClassVar[str] = "drives"
     kept: ClassVar[bool] = True
+    result: ClassVar[Any] = Driven
     task: DriveTask
     robot: str
     rollout: int
@@ -126,6 +167,12 @@ class DriveJob:
     def run(self) -> Driven:
         """Drive it."""
         return drive_route(self.task)
+
+    def fits(self, result: Driven) -> bool:
+        """A time for each leg, or for those until it got stuck."""
+        legs, driven = len(self.task.legs), len(result.leg_s)
+        return (0 < driven <= legs if result.stuck else driven == legs) and bool(
+            np.isfinite(result.leg_s).all() and (result.leg_s >= 0).all())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -145,6 +192,7 @@ class TrialsJob:
 
     kind: ClassVar[str] = "trials"
     kept: ClassVar[bool] = False
+    result: ClassVar[Any] = Shard
     unit: str
     world: World
     variant: str
@@ -174,3 +222,7 @@ class TrialsJob:
         else:
             executed = settle_trials(self.world, self.cases, settings, self.drives)
         return shard_of(self.world, self.variant, executed, settings, self.facts)
+
+    def fits(self, result: Shard) -> bool:
+        """The shard of its trials."""
+        return (result.note.first, result.note.trials) == (self.first, self.trials)

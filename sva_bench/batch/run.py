@@ -26,7 +26,7 @@ from sva_bench.batch.folder import (
     write_maps,
 )
 from sva_bench.batch.grid import Grid, Point
-from sva_bench.batch.shards import Note, Shard, read_note
+from sva_bench.batch.shards import Note, Shard, read_note, unit_of
 from sva_bench.batch.strands import Strand, strand
 from sva_bench.documents import pretty_json
 
@@ -103,7 +103,7 @@ class _Books:
 
     def __init__(self, grid: Grid, folder: Path, *, retry: bool) -> None:
         self._grid, self._folder, self._begun = grid, folder, time.monotonic()
-        self._owner = {grid.unit_name(point, seed, first): (point, seed)
+        self._owner = {grid.unit_name(point, seed, first): (point, seed, first)
                        for point, seed in grid.strands() for first, _ in grid.ranges()}
         self.done = units_in(folder) & set(self._owner)
         held = failures_in(folder)
@@ -112,9 +112,9 @@ class _Books:
             write_failures(folder, self.failures)
         self._before = len(self.done)
         self._so_far: dict[tuple[str, int], Note] = {}
-        for unit, (point, seed) in self._owner.items():
+        for unit, (point, seed, first) in self._owner.items():
             if unit in self.done:
-                self._add(point.name, seed, read_note(shard_path(folder, unit)))
+                self._add(point.name, seed, read_note(shard_path(folder, unit), unit_of(grid, point, seed, first)))
 
     @property
     def left(self) -> bool:
@@ -131,12 +131,12 @@ class _Books:
         """Write a unit's rows."""
         write(shard_path(self._folder, unit), shard.content)
         self.done.add(unit)
-        point, seed = self._owner[unit]
+        point, seed, _ = self._owner[unit]
         self._add(point.name, seed, shard.note)
 
     def unit_failed(self, unit: str, reason: str, attempts: int) -> None:
         """Put down that a unit was given up."""
-        point, seed = self._owner[unit]
+        point, seed, _ = self._owner[unit]
         self._put_down([(unit, point, seed)], reason, attempts)
 
     def strand_failed(self, point: Point, seed: int, reason: str, attempts: int) -> None:

@@ -10,18 +10,35 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
+from pydantic import ValidationError
 
+from sva_bench.batch.grid import Grid, Point
+from sva_bench.batch.schema import NoteFile
 from sva_bench.batch.tallies import Tally, tally_as_dict, tally_from, tally_of
+from sva_bench.complaints import first_complaint
+from sva_bench.documents import dotted
 from sva_bench.errors import BadFile
 from sva_bench.execution.execute import Executed, Settings
-from sva_bench.execution.outcome import ENDS
+from sva_bench.outcome_table import constant, outcome_table
+from sva_bench.tables import SHARDS, read_note_of, write_table
 from sva_bench.world.model import World
 
 Facts = Mapping[str, Any]
 """A summary without its figures: its head, and for each scenario what is known before any trial."""
 
 _KEY = b"sva-bench/unit"
+_REMOVE = "remove it and --resume"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Unit:
+    """What a shard is of: a point and a seed of a grid, and a range of trials under so many noise draws."""
+
+    point: Point
+    seed: int
+    first: int
+    trials: int
+    rollouts: int
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,6 +74,12 @@ class Note:
     trials: int
 
 
+def unit_of(grid: Grid, point: Point, seed: int, first: int) -> Unit:
+    """A unit of a grid, by its first trial."""
+    return Unit(point=point, seed=seed, first=first, rollouts=grid.options.rollouts,
+                trials=min(grid.unit_trials, grid.options.trials - first))
+
+
 def shard_of(world: World, variant: str, executed: Sequence[Executed], settings: Settings, facts: Facts) -> Shard:
     """Rows and tally of trials, ready to be written."""
     robots = [robot.name for robot in world.robots]
@@ -66,51 +89,46 @@ def shard_of(world: World, variant: str, executed: Sequence[Executed], settings:
         for s in world.scenarios})
     words = {"facts": facts, "variant": variant, "robots": robots, "first": note.first, "trials": note.trials,
              "tallies": {name: tally_as_dict(tally) for name, tally in note.tallies.items()}}
-    table = pa.concat_tables([_rows(run, robots, world.name, variant, settings) for run in executed])
-    table = table.replace_schema_metadata({_KEY: json.dumps(words)})
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink)
+    write_table(sink, SHARDS.with_metadata({_KEY: json.dumps(words)}),
+                [pa.concat_tables([_rows(run, robots, world.name, variant, settings) for run in executed])])
     return Shard(content=sink.getvalue().to_pybytes(), note=note)
 
 
-def read_note(path: Path) -> Note:
-    """What a shard says of itself.
+def read_note(path: Path, unit: Unit) -> Note:
+    """What the shard of a unit says of itself.
 
     Raises:
-        BadFile: If it is no shard of ours.
+        BadFile: If it is no shard of ours, or one of another unit.
     """
     try:
-        words = json.loads((pq.read_schema(path).metadata or {})[_KEY])
-        return Note(facts=words["facts"], variant=words["variant"], robots=words["robots"], first=words["first"],
-                    trials=words["trials"],
-                    tallies={name: tally_from(data) for name, data in words["tallies"].items()})
-    except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
-        raise BadFile(path, None, "", f"no shard of a batch ({type(error).__name__}); remove it and --resume") from None
+        words = json.loads(read_note_of(path, _KEY))
+        NoteFile.model_validate(words)
+    except ValidationError as error:
+        loc, problem = first_complaint(words, NoteFile, error)
+        raise BadFile(path, None, dotted(loc), f"{problem}, in the tally of this shard; {_REMOVE}") from None
+    except (ValueError, RecursionError) as error:
+        raise BadFile(path, None, "", f"no shard of a batch: its tally is no JSON ({type(error).__name__}); {_REMOVE}"
+                      ) from None
+    world, facts = unit.point.world, words["facts"]
+    rollouts = {len(moments["counts"]) for tally in words["tallies"].values() for moments in (tally["difference"],)}
+    for key, found, known in (
+            ("world", facts["world"], world.name), ("seed", facts["seed"], unit.seed),
+            ("variant", words["variant"], unit.point.variant), ("first", words["first"], unit.first),
+            ("trials", words["trials"], unit.trials), ("robots", words["robots"], [r.name for r in world.robots]),
+            ("scenarios", [s["name"] for s in facts["scenarios"]], [s.name for s in world.scenarios]),
+            ("noise draws", rollouts, {0 if world.noise.silent else unit.rollouts})):
+        if found != known:
+            raise BadFile(path, None, key, f"the shard of another unit: expected {known!r:.60}, found {found!r:.60}; "
+                          f"{_REMOVE}")
+    return Note(facts=facts, variant=words["variant"], robots=words["robots"], first=words["first"],
+                trials=words["trials"], tallies={name: tally_from(data) for name, data in words["tallies"].items()})
 
 
 def _rows(run: Executed, robots: Sequence[str], world: str, variant: str, settings: Settings) -> pa.Table:
-    """One row per trial and robot, trial by trial; words are spelt out by Arrow, which is quick at it."""
-    trials, count = run.incentive.shape
-    rows = trials * count
-
-    def constant(word: str) -> pa.Array:
-        return _words(np.zeros(rows, dtype=np.int8), [word])
-
-    units = {b"unit": b"s"}
-    columns = {
-        "scenario": constant(run.case.scenario.name), "planner": constant(run.case.planner),
-        "trial": np.repeat(settings.first + np.arange(trials), count), "rollout": np.repeat(run.rollout, count),
-        "robot": _words(np.tile(np.arange(count, dtype=np.int32), trials), robots),
-        "available": run.available.ravel(), "incentive": run.incentive.ravel(),
-        "pois_reached": run.pois_reached.ravel(), "stops_reached": run.stops_reached.ravel(),
-        "end": _words(run.end.ravel().astype(np.int8), ENDS), "end_time_s": run.end_time_s.ravel(),
-        "fuel_used_s": run.fuel_used_s.ravel(), "fidelity": constant(settings.fidelity), "world": constant(world),
-        "seed": np.full(rows, settings.seed), "variant": constant(variant),
-    }
-    table = pa.table(columns)
-    return table.cast(pa.schema([field.with_metadata(units) if field.name.endswith("_s") else field
-                                 for field in table.schema]))
-
-
-def _words(codes: np.ndarray[Any, Any], words: Sequence[str]) -> pa.Array:
-    return pa.DictionaryArray.from_arrays(pa.array(codes), pa.array(list(words))).cast(pa.string())
+    """The rows of a run's table, and what they belong to."""
+    rows = outcome_table(run, robots, settings)
+    for name, column in (("world", constant(world, len(rows))), ("seed", np.full(len(rows), settings.seed)),
+                         ("variant", constant(variant, len(rows)))):
+        rows = rows.append_column(SHARDS.field(name), pa.array(column))
+    return rows

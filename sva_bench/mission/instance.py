@@ -12,11 +12,16 @@ import numpy as np
 from pydantic import Field
 
 from sva_bench.arrays import FloatArray, frozen
-from sva_bench.documents import Bounded, Document, Name, Probability, Section, pretty_json, read_json, validate
-from sva_bench.errors import nearest
+from sva_bench.documents import Bounded, Document, Name, Probability, Section, pretty_json, validate
+from sva_bench.errors import BadFile, nearest
 from sva_bench.mission.failures import FailureProcess, JointState, marginals
+from sva_bench.read_back import read_bounded
 
 KIND = "sva-bench/instance@1"
+MOST_BYTES = 64_000_000
+MOST_SITES, MOST_VEHICLES, MOST_STATES = 2000, 200, 10_000
+MOST_COSTS = 2 * MOST_SITES**2
+"""Of all matrices of fuel together: two of the most sites, or eight of a thousand."""
 TOLERANCE_S = 1e-6
 """Feasibility tolerance everywhere."""
 
@@ -122,7 +127,8 @@ def read_instance(path: Path) -> Instance:
     Raises:
         BadFile: If it is no valid instance; names line and key.
     """
-    document = read_json(path)
+    document = read_bounded(path, MOST_BYTES)
+    _refuse_too_large(path, document.data)
     file = validate(document, _InstanceFile, KIND)
     sites = tuple(file.sites)
     _refuse_twice(document, ("sites",), sites)
@@ -143,6 +149,35 @@ def read_instance(path: Path) -> Instance:
         stop_s=np.array(file.stop_s if file.stop_s is not None else [0.0] * len(sites)), vehicles=vehicles,
         failure=file.failure, joint=joint,
     )
+
+
+def _refuse_too_large(path: Path, data: Any) -> None:
+    """Refuse what no solver could go through, before it is checked entry by entry; lines of it are not looked up."""
+    if not isinstance(data, dict):
+        return
+    vehicles: Any = data.get("vehicles") if isinstance(data.get("vehicles"), list) else []
+    joint: Any = data.get("joint_availability")
+    for key, items, most in (("sites", data.get("sites"), MOST_SITES), ("stations", data.get("stations"), MOST_SITES),
+                             ("stop_s", data.get("stop_s"), MOST_SITES), ("vehicles", vehicles, MOST_VEHICLES),
+                             ("joint_availability", joint, MOST_STATES),
+                             *((f"joint_availability[{k}].available", state.get("available"), MOST_VEHICLES)
+                               for k, state in enumerate(joint[:MOST_STATES] if isinstance(joint, list) else ())
+                               if isinstance(state, dict)),
+                             *((f"vehicles[{k}].incentives", vehicle.get("incentives"), MOST_SITES)
+                               for k, vehicle in enumerate(vehicles[:MOST_VEHICLES]) if isinstance(vehicle, dict))):
+        if isinstance(items, list | dict) and len(items) > most:
+            raise BadFile(path, None, key, f"{len(items)} entries; at most {most} are read")
+    costs = 0
+    for holder in (data, *(vehicle for vehicle in vehicles if isinstance(vehicle, dict))):
+        rows = holder.get("fuel_s")
+        lengths = [len(row) for row in rows if isinstance(row, list)] if isinstance(rows, list) else []
+        longest = max([len(lengths), *lengths])
+        if longest > MOST_SITES:
+            raise BadFile(path, None, "fuel_s", f"a row or a column of {longest} entries; at most {MOST_SITES} "
+                          "are read")
+        costs += sum(lengths)
+    if costs > MOST_COSTS:
+        raise BadFile(path, None, "fuel_s", f"{costs} costs in all; at most {MOST_COSTS} are read")
 
 
 def _vehicle(
@@ -205,9 +240,11 @@ def _joint(document: Document, file: _InstanceFile) -> tuple[JointState, ...] | 
 
 
 def _refuse_twice(document: Document, loc: tuple[str | int, ...], names: Sequence[str]) -> None:
+    seen: set[str] = set()
     for k, name in enumerate(names):
-        if name in names[:k]:
+        if name in seen:
             raise document.error((*loc, k), f"{name!r} stands twice; names must differ")
+        seen.add(name)
 
 
 def instance_as_dict(instance: Instance) -> dict[str, Any]:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
 
-from sva_bench.documents import Name, Number, Section, WholeNumber, pretty_json, read_json, validate
-from sva_bench.errors import nearest
-from sva_bench.mission.instance import Instance
+from sva_bench.documents import Name, Number, Section, WholeNumber, dotted, pretty_json, validate
+from sva_bench.errors import BadFile, nearest
+from sva_bench.mission.instance import MOST_VEHICLES, Instance
+from sva_bench.printable import all_text
+from sva_bench.read_back import read_bounded
 
 KIND = "sva-bench/plan@1"
+MOST_BYTES = 20_000_000
+MOST_STOPS = 10_000
+"""Of a route: two thousand sites and as many visits of stations leave room."""
 Objective = Literal["stochastic", "deterministic", "cvar", "excess"]
 Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 Route = tuple[str, ...]
@@ -80,16 +85,7 @@ def read_plan(path: Path, instance: Instance) -> Plan:
     Raises:
         BadFile: If it is no valid plan, or names a vehicle or site that the instance doesn't have.
     """
-    document = read_json(path)
-    file = validate(document, _PlanFile, KIND)
-    vehicles = [v.name for v in instance.vehicles]
-    for robot, route in file.routes.items():
-        if robot not in vehicles:
-            raise document.error(("routes", robot), f"there is no vehicle {robot!r}; {nearest(robot, vehicles)}")
-        for k, site in enumerate(route):
-            if site not in instance.sites:
-                raise document.error(("routes", robot, k),
-                                     f"there is no site {site!r}; {nearest(site, list(instance.sites))}")
+    file = _read(path, [v.name for v in instance.vehicles], instance.sites)
     base = instance.sites[instance.base]
     routes = {robot: () if list(route) == [base] else tuple(route) for robot, route in file.routes.items()}
     return Plan(
@@ -97,6 +93,38 @@ def read_plan(path: Path, instance: Instance) -> Plan:
         value=file.value, bound=file.bound, fuel_s=file.fuel_s, runtime_s=file.runtime_s, seed=file.seed,
         details=file.details,
     )
+
+
+def read_routes(path: Path, robots: Sequence[str], sites: Sequence[str]) -> dict[str, Route]:
+    """The routes of a plan file for these robots and sites, as they stand there.
+
+    Raises:
+        BadFile: As ``read_plan``.
+    """
+    return {robot: tuple(route) for robot, route in _read(path, robots, sites).routes.items()}
+
+
+def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFile:
+    """A plan file, its names and its size checked."""
+    document = read_bounded(path, MOST_BYTES)
+    routes = document.data.get("routes") if isinstance(document.data, dict) else None
+    if isinstance(routes, dict) and len(routes) > MOST_VEHICLES:
+        raise BadFile(path, None, "routes", f"{len(routes)} routes; at most {MOST_VEHICLES} are read")
+    for robot, route in routes.items() if isinstance(routes, dict) else ():
+        if isinstance(route, list) and len(route) > MOST_STOPS:
+            raise BadFile(path, None, dotted(("routes", robot)), f"{len(route)} stops; at most {MOST_STOPS} are driven")
+    file = validate(document, _PlanFile, KIND)
+    for key in ("instance", "method", "details"):
+        if not all_text(getattr(file, key)):
+            raise document.error((key,), "holds half of a character that is none by itself (a lone surrogate)")
+    known = set(sites)
+    for robot, stops in file.routes.items():
+        if robot not in vehicles:
+            raise document.error(("routes", robot), f"there is no vehicle {robot!r}; {nearest(robot, list(vehicles))}")
+        for k, site in enumerate(stops):
+            if site not in known:
+                raise document.error(("routes", robot, k), f"there is no site {site!r}; {nearest(site, list(sites))}")
+    return file
 
 
 def plan_as_dict(plan: Plan) -> dict[str, Any]:

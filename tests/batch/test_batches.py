@@ -17,11 +17,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.batch.folder import begin, settings_in, shard_path, write_maps
+from sva_bench.batch.grid import Grid, Point
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.planning import Options
 from tests.test_batch import rows_of
 from tests.test_cli import sva_bench
 from tests.world.test_map_worlds import two_rooms
-from tests.worlds_for_tests import SMALL
+from tests.worlds_for_tests import SMALL, world_of
 
 POST = "- {cylinder: [4.4, 3.2], radius_m: 0.3}"
 
@@ -96,15 +98,22 @@ def test_worlds_that_crash_or_hang_the_physics_are_named_and_the_rest_goes_on(
 
 
 def test_a_batch_that_did_nothing_yet_is_in_nobodys_way(tmp_path: Path) -> None:
-    begin(tmp_path, {"trials": 10}, resume=False)
-    write_maps(tmp_path, {"maps-0/map.pgm": b"P5"})
-    with pytest.raises(BadFile, match=r"settings\.trials"):
-        begin(tmp_path, {"trials": 20}, resume=True)
-    begin(tmp_path, {"trials": 20}, resume=False)
-    assert settings_in(tmp_path) == {"trials": 20}
-    shard_path(tmp_path, "small-seed0").touch()
+    world, out = world_of(tmp_path), tmp_path / "out"
+    out.mkdir()
+
+    def settings(trials: int) -> dict[str, Any]:
+        return Grid(points=[Point(world=world, planner="prmstar")], seeds=[0], options=Options(trials=trials),
+                    unit_trials=10).settings()
+
+    begin(out, settings(10), resume=False)
+    write_maps(out, {"maps-0/map.pgm": b"P5"})
+    with pytest.raises(BadFile, match=r"settings\.options\.trials"):
+        begin(out, settings(20), resume=True)
+    begin(out, settings(20), resume=False)
+    assert settings_in(out)[0].data == settings(20)
+    shard_path(out, "small-seed0").touch()
     with pytest.raises(BadInput, match="--resume"):
-        begin(tmp_path, {"trials": 20}, resume=False)
+        begin(out, settings(20), resume=False)
 
 
 @pytest.mark.long

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from sva_bench.batch.cache import Cache
 from sva_bench.batch.digest import digest
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -22,13 +21,3 @@ def test_content_that_only_looks_alike_has_other_hashes() -> None:
     alike = [["ab", "c"], ["a", "bc"], ["abc"], [["ab"], "c"], {"ab": "c"}, 1, 1.0, True, "1", None, np.array([1]),
              np.array([1.0]), np.array([[1]])]
     assert len({digest(item) for item in alike}) == len(alike)
-
-
-def test_a_torn_cache_file_counts_as_absent(tmp_path: Path) -> None:
-    cache = Cache(folder=tmp_path)
-    cache.put("drives", "ab12", [1, 2])
-    assert cache.get("drives", "ab12") == [1, 2]
-    assert cache.get("drives", "ab13") is None
-    (file,) = (path for path in tmp_path.rglob("ab12") if path.is_file())
-    file.write_bytes(file.read_bytes()[:-1])
-    assert cache.get("drives", "ab12") is None

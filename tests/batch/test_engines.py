@@ -25,6 +25,7 @@ class Deed:
 
     kind: ClassVar[str] = "deed"
     kept: ClassVar[bool] = False
+    result: ClassVar[Any] = int
     deed: str
 
     @property
@@ -47,6 +48,9 @@ class Deed:
         if self.deed == "mend":
             raise BadInput("move the site")
         return os.getpid()
+
+    def fits(self, result: Any) -> bool:
+        return isinstance(result, int)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sva_bench.batch.folder import write_maps
+from sva_bench.batch.folder import begin, settings_in, write_maps
 from sva_bench.batch.grid import Grid, Point, grid_of
 from sva_bench.bench import run
 from sva_bench.documents import pretty_json
@@ -114,8 +114,10 @@ def test_a_run_keeps_the_maps_files_and_is_another_run_with_another_map(tmp_path
 
     assert grid(other).settings() != grid(world).settings()
     # A batch folder has the map, so the manifest's settings are all that it takes to go on.
+    (tmp_path / "batch").mkdir()
+    begin(tmp_path / "batch", grid(world).settings(), resume=False)
     write_maps(tmp_path / "batch", grid(world).map_files())
-    held = grid_of(grid(world).settings(), tmp_path / "batch" / "manifest.json")
+    held = grid_of(*settings_in(tmp_path / "batch"))
     assert held.settings() == grid(world).settings()
     assert run(other, options, tmp_path / "runs", None, lambda *_: None).folder != done.folder
 
