@@ -1,5 +1,14 @@
 """What a multi-robot mission plan is worth when robots fail, measured in physics."""
 
-from importlib.metadata import version
+from typing import Any
 
-__version__ = version("sva-bench")
+__version__: str
+
+
+def __getattr__(name: str) -> Any:
+    """``__version__``, found out when it is asked for: that takes longer than Ctrl-C should have to wait."""
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib.metadata import version
+
+    return version("sva-bench")
