@@ -34,15 +34,8 @@ from sva_bench.options import (
     WorkerCount,
     WorldArgument,
 )
-from sva_bench.terminal import (
-    check_output,
-    messages,
-    print_json,
-    print_summary,
-    progress_bars,
-    set_up_logging,
-    write_result,
-)
+from sva_bench.outputs import check_folder, check_output, write_result
+from sva_bench.terminal import messages, print_json, print_summary, progress_bars, set_up_logging
 from sva_bench.workers import local_workers
 
 app = typer.Typer(
@@ -99,13 +92,16 @@ def run(
 
     set_up_logging(verbose)
     asked = None if precision is None else precision_of(precision, max_trials, trials, rollouts)
+    check_folder(out, "--out")
     loaded = load(world, scenario, margin, plan_failure, execute_failure)
     # After the world is read: an error in the file is said at once.
     with holding_back_ctrl_c():
         from sva_bench.bench import run as run_bench
         from sva_bench.planning import Options
+        from sva_bench.runs import tidy
         from sva_bench.solver.two_stage import SolveLimits
 
+    tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
                       assumptions=assumptions, precision=asked)
@@ -144,22 +140,22 @@ def execute(
     Exits with 3 if a plan is infeasible, unless it is allowed.
     """
     with holding_back_ctrl_c():
-        from sva_bench.inputs import about, load
+        from sva_bench.inputs import about, by_name, load
 
     set_up_logging(verbose)
+    check_folder(out, "--out")
+    named = by_name(plans)
     loaded = load(world, scenario, margin, execute_failure=execute_failure)
     with holding_back_ctrl_c():
         from sva_bench.bench import execute_plans
         from sva_bench.planning import Options, plan_costs, read_plans
+        from sva_bench.runs import tidy
 
-    names = [path.stem for path in plans]
-    for path in plans:
-        if names.count(path.stem) > 1:
-            raise BadInput(f"{path}: there is another plan named {path.stem!r}; file names must differ")
+    tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
-        read = read_plans(loaded, costs, plans, allow_infeasible=allow_infeasible)
+        read = read_plans(loaded, costs, named, allow_infeasible=allow_infeasible)
         with local_workers(workers) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
     _show(result.summary, result.folder, as_json, csv=csv)
@@ -179,6 +175,7 @@ def view(
     with holding_back_ctrl_c():
         from sva_bench.recording.viewer import view as open_viewer
 
+    check_output(screenshot, way_out="choose another place with --screenshot")
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
 
@@ -236,6 +233,8 @@ def report(
         from sva_bench.stored import report_again, write_csv
 
     set_up_logging(verbose)
+    if folder.is_dir():  # else it is said what is missing
+        check_output(folder / "report.html", way_out="make the folder writable")
     if csv:
         write_csv(folder)
     messages.print(f"written to [bold]{escape(str(report_again(folder)))}[/bold]", highlight=False)

@@ -11,15 +11,8 @@ import typer
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import Family, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
-from sva_bench.terminal import (
-    check_output,
-    print_json,
-    progress_bars,
-    results,
-    set_up_logging,
-    write_beside,
-    write_result,
-)
+from sva_bench.outputs import check_output, write_beside, write_result
+from sva_bench.terminal import print_json, progress_bars, results, set_up_logging
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")

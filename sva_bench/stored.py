@@ -13,10 +13,11 @@ import pyarrow.csv as pcsv
 import pyarrow.parquet as pq
 
 from sva_bench.analysis.report import Content, write_report
+from sva_bench.atomic import draft_file
 from sva_bench.documents import check_kind, pretty_yaml, read_json
 from sva_bench.documents import parse_yaml as parse
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.runs import LEG_COLUMNS, MAP, draft_of
+from sva_bench.runs import LEG_COLUMNS, MAP, stem_of
 from sva_bench.world.load import world_of
 
 _AGREE = 1e-6  # relative; a mean added up in another order
@@ -36,7 +37,7 @@ def report_again(folder: Path) -> Path:
     path = folder / "report.html"
     content = read_content(folder)
     try:
-        with draft_of(path) as draft:
+        with draft_file(path) as draft:
             write_report(draft, content)
     except (KeyError, TypeError, IndexError, AttributeError) as error:
         raise BadFile(folder / "summary.json", None, "", f"no summary as this version writes it ({error}); run the "
@@ -55,7 +56,7 @@ def write_csv(folder: Path) -> list[Path]:
     for table in sorted(folder.glob("*.parquet")):
         rows = read_table(table)
         path = table.with_suffix(".csv")
-        with draft_of(path) as draft:
+        with draft_file(path) as draft:
             pcsv.write_csv(rows, draft)
         written.append(path)
     return written
@@ -74,6 +75,8 @@ def read_content(folder: Path) -> Content:
     try:
         plans = [(s["name"], name, plan["executed"]["mean"]) for s in summary["scenarios"]
                  for name, plan in s["plans"].items()]
+        stems = {(s["name"], name): stem_of(s["name"], name, foreign="comparisons" in s) for s in summary["scenarios"]
+                 for name in s["plans"]}
         world = world_of(parse(pretty_yaml(manifest["world"], {}), folder / "manifest.json"), folder / MAP)
     except (KeyError, TypeError, AttributeError) as error:
         raise BadFile(folder / "summary.json", None, "", f"no summary or manifest as this version writes it ({error}); "
@@ -81,13 +84,13 @@ def read_content(folder: Path) -> Content:
     _check_outcomes(folder / "outcomes.parquet", plans)
     routes = {}
     for scenario, name, _ in plans:
-        document = read_json(folder / "plans" / f"{scenario}-{name}.json")
+        document = read_json(folder / "plans" / f"{stems[scenario, name]}.json")
         check_kind(document, "sva-bench/plan@1")
-        routes[f"{scenario}-{name}"] = document.data.get("routes", {})
+        routes[scenario, name] = document.data.get("routes", {})
     legs = read_table(folder / "legs.parquet", LEG_COLUMNS)
     columns = {name: legs.column(name).to_numpy() if name.endswith("_s") else legs.column(name).to_pylist()
                for name in LEG_COLUMNS}
-    return Content(summary=summary, routes=routes, legs=columns, world=world, manifest=manifest)
+    return Content(summary=summary, routes=routes, stems=stems, legs=columns, world=world, manifest=manifest)
 
 
 def read_table(path: Path, columns: Sequence[str] | None = None) -> pa.Table:

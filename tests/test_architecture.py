@@ -13,9 +13,9 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MODULES = [path.relative_to(PACKAGE).as_posix() for path in FILES]
 
 # What every part may know. Files at the top that know nothing of the others may be known by all.
-EVERYBODYS = {"arrays", "complaints", "documents", "errors", "interrupts", "seeds"}
+EVERYBODYS = {"arrays", "atomic", "complaints", "documents", "errors", "interrupts", "seeds"}
 MAY_KNOW: dict[str, set[str]] = {
-    "arrays": set(), "errors": set(), "interrupts": set(), "complaints": {"errors"},
+    "arrays": set(), "errors": set(), "interrupts": set(), "atomic": {"errors", "interrupts"}, "complaints": {"errors"},
     "documents": {"complaints", "errors"}, "seeds": {"arrays"},
     "robot": set(),
     "mission": set(),
@@ -31,7 +31,7 @@ MAY_KNOW: dict[str, set[str]] = {
 # These put the parts together, and may know all.
 TOP = {"options", "inputs", "bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed",
        "precision", "tally", "assumptions", "reproduce", "cli", "cli_batch", "cli_inputs", "cli_plans", "live",
-       "sweeps", "terminal", "__main__", "__init__"}
+       "outputs", "streams", "sweeps", "terminal", "__main__", "__init__"}
 # Of these, those that the command line stands on: they know nothing of it.
 BENCH = {"bench", "planning", "batch", "pictures", "proposal", "worlds", "stored", "informed", "precision", "tally",
          "assumptions", "reproduce"}
