@@ -100,20 +100,19 @@ def write_file(path: Path, content: bytes, way_out: str = "choose another place"
         draft.write_bytes(content)
 
 
-def write_by_way_of(draft: Path, path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all, under a draft's name that is given: for folders with one writer at a time.
+@contextmanager
+def by_way_of(draft: Path, path: Path) -> Iterator[None]:
+    """A draft of a given name, written in this block, becomes a file: for folders with one writer at a time.
 
     Raises:
         OSError: If it can't be written; the draft is gone, and an older file stays as it was.
     """
     try:
-        with draft.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())  # else a power cut could leave a renamed file empty
-        draft.replace(path)
+        yield
+        _to_disk(draft)
+        os.replace(draft, path)
     finally:
-        with suppress(OSError):
+        with holding_back_ctrl_c(), suppress(OSError):
             draft.unlink(missing_ok=True)
 
 

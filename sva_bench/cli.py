@@ -18,12 +18,12 @@ from sva_bench.options import (
     AsCsv,
     AsJson,
     ExecuteFailure,
-    FailureProcess,
     FidelityOption,
     Gap,
     MarginOption,
     Out,
     Part,
+    PlanFailure,
     PlannerOption,
     Rollouts,
     ScenarioNames,
@@ -36,6 +36,7 @@ from sva_bench.options import (
 )
 from sva_bench.outputs import check_folder, check_output, write_result
 from sva_bench.terminal import messages, print_json, print_summary, progress_bars, set_up_logging
+from sva_bench.usage import PlainCommand
 from sva_bench.workers import local_workers
 
 app = typer.Typer(
@@ -50,7 +51,7 @@ app.add_typer(world_app, name="world")
 app.add_typer(instance_app, name="instance")
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def run(
     world: WorldArgument,
     seed: Seed = 0,
@@ -60,8 +61,7 @@ def run(
     planner: PlannerOption = "prmstar",
     scenario: ScenarioNames = None,
     margin: MarginOption = None,
-    plan_failure: Annotated[FailureProcess | None, typer.Option(help="Failure process that plans are made for.",
-                                                               show_default="the world's")] = None,
+    plan_failure: PlanFailure = None,
     execute_failure: ExecuteFailure = None,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
@@ -111,10 +111,10 @@ def run(
 
 
 for command in (times, plan, certify):
-    app.command()(command)
+    app.command(cls=PlainCommand)(command)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def execute(
     world: WorldArgument,
     plans: Annotated[list[Path], typer.Argument(metavar="PLAN...", help="Plan files (JSON), by hand or from anywhere.",
@@ -161,7 +161,7 @@ def execute(
     _show(result.summary, result.folder, as_json, csv=csv)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def view(
     recording: Annotated[Path, typer.Argument(metavar="RUN-or-RRD", help="Run folder, or one recording.",
                                               show_default=False)],
@@ -179,7 +179,7 @@ def view(
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def reproduce(
     part: Annotated[Part, typer.Argument(metavar="PART", help="rewards (Figure 4), simulation (Figures 7 and 8) or "
                                          "runtimes (the tables of section 5.1).", show_default=False)],
@@ -222,7 +222,7 @@ def reproduce(
     write_result(output, page)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def report(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)],
     csv: AsCsv = False,

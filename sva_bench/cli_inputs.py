@@ -13,12 +13,13 @@ from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.options import Family, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
 from sva_bench.outputs import check_output, write_beside, write_result
 from sva_bench.terminal import print_json, progress_bars, results, set_up_logging
+from sva_bench.usage import PlainCommand
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
 
 
-@world_app.command("check")
+@world_app.command("check", cls=PlainCommand)
 def check_world(
     world: WorldArgument,
     planner: PlannerOption = "prmstar",
@@ -54,7 +55,7 @@ def check_world(
                   + ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items()), highlight=False)
 
 
-@world_app.command("random")
+@world_app.command("random", cls=PlainCommand)
 def make_random_world(
     family: Annotated[WorldFamily, typer.Option(help="What stands there: walls with doors and furniture, scattered "
                                                      "obstacles, racks, or a maze.")] = "rooms",
@@ -84,7 +85,7 @@ def make_random_world(
     write_result(output, text)
 
 
-@world_app.command("from-map")
+@world_app.command("from-map", cls=PlainCommand)
 def make_world_from_map(
     source: Annotated[Path, typer.Argument(metavar="MAP.yaml|MAP.map", help="YAML file of a ROS map, or a MovingAI "
                                            "map.", show_default=False)],
@@ -109,6 +110,7 @@ def make_world_from_map(
 ) -> None:
     """Make a world of a map, with sites on free ground, a mission that suits it and the paper's scenarios S1 to S4."""
     with holding_back_ctrl_c():
+        from sva_bench.inputs import refuse_no_map
         from sva_bench.worlds import world_from_map
 
     set_up_logging(verbose)
@@ -120,6 +122,8 @@ def make_world_from_map(
     if base is not None and not all(map(math.isfinite, base)):
         raise BadInput("--base: expected two finite numbers")
     check_output(output, source)
+    if source.suffix.lower() in (".yaml", ".yml"):
+        refuse_no_map(source)
     with progress_bars() as progress:
         text, files = world_from_map(
             source, output, base=base, pois=pois, stations=stations, robots=robots, seed=seed, spacing_m=min_spacing,
@@ -129,7 +133,7 @@ def make_world_from_map(
     write_result(output, text)
 
 
-@world_app.command("draw")
+@world_app.command("draw", cls=PlainCommand)
 def draw(
     world: WorldArgument,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="PICTURE.png|svg", help="Picture to write.",
@@ -159,7 +163,7 @@ def draw(
     write_result(output, content)
 
 
-@world_app.command("schema")
+@world_app.command("schema", cls=PlainCommand)
 def world_schema() -> None:
     """Print the JSON schema of world files, for editors."""
     with holding_back_ctrl_c():
@@ -168,7 +172,7 @@ def world_schema() -> None:
     print_json(WorldFile.model_json_schema())
 
 
-@instance_app.command("random")
+@instance_app.command("random", cls=PlainCommand)
 def random_instances(
     family: Annotated[Family, typer.Option(help="A: one filling lasts for the mission; B: two to five refuels; C: "
                                                 "short routes.")] = "A",

@@ -13,6 +13,7 @@ from sva_bench.documents import read_yaml
 from sva_bench.errors import BadInput, nearest
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.mission.instance import Instance
+from sva_bench.mistaken import what_it_is
 from sva_bench.options import FailureProcess, Planner
 from sva_bench.terminal import messages
 from sva_bench.world.load import load_world
@@ -78,6 +79,17 @@ def instance_of_world(
         messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
                        f"to {cost.max_excess_pct:.1f} %", highlight=False)
     return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))
+
+
+def refuse_no_map(path: Path) -> None:
+    """Refuse a file of ours where a map is asked for.
+
+    Raises:
+        BadFile: If it is one, and which command takes it.
+    """
+    document = read_yaml(path)
+    if isinstance(document.data, dict) and "format" in document.data and (known := what_it_is(document.data)):
+        raise document.error((), f"expected a map, and {known}")
 
 
 def by_name(paths: Sequence[Path]) -> dict[str, Path]:

@@ -48,6 +48,8 @@ FidelityOption = Annotated[Fidelity, typer.Option(
     help="The kinematic twin alone; physics once per route and noise draw; or every trial in physics.")]
 ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",
                                                          show_default="all")]
+PlanFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that plans are made for.",
+                                                           show_default="the world's")]
 ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that is executed.",
                                                               show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]

@@ -34,8 +34,8 @@ class Point:
 
     @property
     def name(self) -> str:
-        """Part of file names: the world's name, and a hash of the variation."""
-        return f"{self.world.name}-{digest(self.variant)[:6]}" if self.variant else self.world.name
+        """Part of file names: the world's name, and a hash of the variation, long enough to tell millions apart."""
+        return f"{self.world.name}-{digest(self.variant)[:12]}" if self.variant else self.world.name
 
     @property
     def label(self) -> str:
@@ -99,10 +99,12 @@ class Grid:
 
 def checked(grid: Grid) -> Grid:
     """The grid, refused if two of its points would write the same files."""
-    names = [point.name for point in grid.points]
+    known: dict[str, Point] = {}
     for point in grid.points:
-        if names.count(point.name) > 1:
-            raise BadInput(f"two worlds are named {point.name!r}; names must differ within a batch")
+        other = known.setdefault(point.name, point)
+        if other is not point:
+            raise BadInput(f"{other.label} and {point.label} would both be named {point.name!r} in the batch folder; "
+                           "names must differ within a batch")
     return grid
 
 
