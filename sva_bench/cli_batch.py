@@ -48,8 +48,8 @@ TablesAsCsv = Annotated[bool, typer.Option("--csv", help="Write the tables map b
 MemoryMb = Annotated[int, typer.Option("--memory-mb", min=0, help="Memory that a unit may take; 0 = any.")]
 
 
-@batch_app.command(cls=UnnamedCommand, epilog="'sva-bench batch status DIR' says how far a batch is, 'sva-bench batch retry DIR' takes up "
-                          "what failed.")
+@batch_app.command(cls=UnnamedCommand, epilog="'sva-bench batch status DIR' says how far a batch is, 'sva-bench batch "
+                                             "retry DIR' takes up what failed.")
 def over(
     worlds: Annotated[list[Path], typer.Argument(metavar="WORLD...", help="World files (YAML), patterns of them, or "
                                                  "one sweep.yaml.", show_default=False)],

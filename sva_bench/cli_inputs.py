@@ -10,8 +10,9 @@ import typer
 
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.options import Family, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
+from sva_bench.options import Family, Force, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
 from sva_bench.outputs import check_output, write_beside, write_result
+from sva_bench.seal import refuse_edited, refuse_others, sealed
 from sva_bench.terminal import print_json, progress_bars, results, set_up_logging
 from sva_bench.usage import PlainCommand
 
@@ -71,6 +72,7 @@ def make_random_world(
     seed: Annotated[int, typer.Option(min=0, help="Seed of terrain, sites and incentives.")] = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="World file to write; default: standard "
                                                 "output.", show_default=False)] = None,
+    force: Force = False,
     verbose: Verbose = False,
 ) -> None:
     """Make a random world, with a mission that is neither trivial nor hopeless and the paper's scenarios S1 to S4."""
@@ -79,10 +81,12 @@ def make_random_world(
 
     set_up_logging(verbose)
     check_output(output)
+    if output is not None:
+        refuse_edited(output, force=force)
     with progress_bars() as progress:
         text = random_world(family, size_m=size, density=density, pois=pois, stations=stations, robots=robots,
                             seed=seed, progress=progress)
-    write_result(output, text)
+    write_result(output, sealed(text))
 
 
 @world_app.command("from-map", cls=PlainCommand)
@@ -106,6 +110,7 @@ def make_world_from_map(
     unknown: Annotated[Unknown | None, typer.Option(help="What unknown cells of a ROS map count as.",
                                                     show_default="occupied")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of points of interest and incentives.")] = 0,
+    force: Force = False,
     verbose: Verbose = False,
 ) -> None:
     """Make a world of a map, with sites on free ground, a mission that suits it and the paper's scenarios S1 to S4."""
@@ -122,15 +127,19 @@ def make_world_from_map(
     if base is not None and not all(map(math.isfinite, base)):
         raise BadInput("--base: expected two finite numbers")
     check_output(output, source)
+    refuse_edited(output, force=force)
     if source.suffix.lower() in (".yaml", ".yml"):
         refuse_no_map(source)
     with progress_bars() as progress:
         text, files = world_from_map(
             source, output, base=base, pois=pois, stations=stations, robots=robots, seed=seed, spacing_m=min_spacing,
             cell_m=1.0 if cell_m is None else cell_m, unknown=unknown or "occupied", progress=progress)
-    for file in files:  # before the world that names them
-        write_beside(output, file.name, file.content)
-    write_result(output, text)
+    if not force:
+        refuse_others(output, {file.name: file.content for file in files})
+    with holding_back_ctrl_c():  # a map and the world on it belong together
+        for file in files:  # before the world that names them
+            write_beside(output, file.name, file.content)
+        write_result(output, sealed(text))
 
 
 @world_app.command("draw", cls=PlainCommand)

@@ -56,3 +56,4 @@ Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the
 AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
 WorkerCount = Annotated[int | None, typer.Option(min=1, help="Processes that drive.", show_default="all cores")]
 Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]
+Force = Annotated[bool, typer.Option("--force", help="Write over a world that was edited by hand, too.")]

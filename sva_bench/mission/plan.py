@@ -91,7 +91,8 @@ def read_plan(path: Path, instance: Instance) -> Plan:
                 raise document.error(("routes", robot, k),
                                      f"there is no site {site!r}; {nearest(site, list(instance.sites))}")
     base = instance.sites[instance.base]
-    routes = {robot: () if list(route) in ([base], [base, base]) else tuple(route) for robot, route in file.routes.items()}
+    stays_home = ([base], [base, base])
+    routes = {robot: () if route in stays_home else tuple(route) for robot, route in file.routes.items()}
     return Plan(
         routes=routes, instance=file.instance, objective=file.objective, method=file.method, status=file.status,
         value=file.value, bound=file.bound, fuel_s=file.fuel_s, runtime_s=file.runtime_s, seed=file.seed,
