@@ -1,11 +1,9 @@
 """What a multi-robot mission plan is worth when robots fail, measured in physics."""
 
-from typing import Any
-
 __version__: str
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """``__version__``, found out when it is asked for: that takes longer than Ctrl-C should have to wait."""
     if name != "__version__":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,16 +1,15 @@
 """Entry point: turns whatever happens into an exit code and one clear message.
 
-Libraries are imported in functions here: Ctrl-C while Python starts finds somebody who hears it.
+What takes time to import is imported in functions here, once there is somebody who hears Ctrl-C.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import signal
 import sys
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -26,6 +25,8 @@ _ends: list[int] = []
 def main() -> None:
     """Run the command line."""
     _hear_signals()
+    import signal
+
     from sva_bench import streams
 
     output = streams.take_over()
@@ -38,11 +39,14 @@ def main() -> None:
         sys.stderr.write(f"error: standard output cannot be written to ({output.lost}); what was to stand there is "
                          "lost\n")
         code = 2
+    exec("")  # Python forgets that Ctrl-C came while a library had text executed, and ends with our code, not by SIGINT
     sys.exit(code)
 
 
 def run_command_line(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; every failure becomes one message on standard error."""
+    import signal
+
     import typer
     from rich.markup import escape
     from typer.exceptions import TyperException
@@ -110,14 +114,17 @@ def _unforeseen(error: Exception) -> int:
 
 def _hear_signals() -> None:
     """Answer Ctrl-C from the first moment, and let what else ends a process be as tidy; who ignores one goes on so."""
+    # Built in: ``signal`` itself takes some milliseconds to import, in which nobody would hear.
+    import _signal as signal  # type: ignore[import-not-found]
+
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _end_at_once)
     for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is signal.SIG_DFL:
+        if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _end_like_ctrl_c)
 
 
-def _end_at_once(*_: Any) -> None:
+def _end_at_once(*_: object) -> None:
     """Ctrl-C while libraries are loaded: nothing is begun yet that would have to be kept or cleared away."""
     try:
         os.write(2, b"interrupted\n")
@@ -125,8 +132,10 @@ def _end_at_once(*_: Any) -> None:
         os._exit(128 + _ends[0] if _ends else _INTERRUPTED)
 
 
-def _end_like_ctrl_c(number: int, *_: Any) -> None:
+def _end_like_ctrl_c(number: int, *_: object) -> None:
     """End as on Ctrl-C, by the same ways: best plans are kept, drafts cleared away, workers ended."""
+    import signal
+
     _ends.append(number)
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell
         signal.signal(signal.SIGINT, signal.default_int_handler)

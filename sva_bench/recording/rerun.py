@@ -17,7 +17,7 @@ from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
 from sva_bench.arrays import FloatArray
-from sva_bench.atomic import write_file
+from sva_bench.atomic import by_way_of
 from sva_bench.execution.outcome import Trace
 from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Story, story_of
 from sva_bench.world.model import Obstacles, World
@@ -69,7 +69,9 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
         _write_numbers(recording, story)
         _write_log(recording, story)
         recording.flush()
-        write_file(path, memory.drain_as_bytes())
+        unfinished = path.with_name(f"{path.name}.tmp")
+        with by_way_of(unfinished, path):
+            unfinished.write_bytes(memory.drain_as_bytes())
     finally:
         recording.disconnect()
 
