@@ -124,9 +124,9 @@ def try_out(folder: Path) -> None:
     """
     remove_left_behind(folder, lambda name: name == _TRIAL)
     with holding_back_ctrl_c():
-        trial = _Draft(folder / _TRIAL, folder=True)
+        trial = _Draft(folder / _TRIAL, folder=False)
         try:
-            with Path(trial.path, _TRIAL).open("wb") as file:
+            with trial.path.open("wb") as file:
                 file.write(bytes(_TRIAL_BYTES))
                 file.flush()
                 os.fsync(file.fileno())
