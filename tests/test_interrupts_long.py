@@ -94,6 +94,15 @@ def start(command: Command, folder: Path) -> subprocess.Popen[str]:
                             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
 
 
+def await_moment(process: subprocess.Popen[str], moment_s: float) -> None:
+    """Let time pass, but not beyond the end of the process, which is not waited for here."""
+    until = time.monotonic() + moment_s
+    while (left := until - time.monotonic()) > 0:
+        if os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
+            return
+        time.sleep(min(left, 0.02))
+
+
 def end_of(process: subprocess.Popen[str]) -> tuple[str, float]:
     """What it says until its end, and the processor time [s] that it took."""
     assert process.stderr is not None
@@ -169,7 +178,7 @@ def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
     there = False  # whether there is a result that must not be lost
     for number, moment in enumerate(moments(draw, count, alone.seconds)):
         process = start(command, folder)
-        time.sleep(moment)
+        await_moment(process, moment)
         began = listening(process.pid)
         taken, at = sum(session_of(process.pid).values()), time.monotonic()
         with suppress(ProcessLookupError):
@@ -200,7 +209,7 @@ def test_a_kill_at_any_moment_leaves_a_whole_result_or_none_and_blocks_nothing(
     folder = prepared(tmp_path / "disturbed")
     for number, moment in enumerate(moments(draw, count, alone.seconds)):
         process = start(command, folder)
-        time.sleep(moment)
+        await_moment(process, moment)
         process.kill()
         said, _ = end_of(process)
         what = f"moment {number} ({moment:.3f} s): {said}"
