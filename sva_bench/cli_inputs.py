@@ -163,6 +163,8 @@ def draw(
     set_up_logging(verbose)
     check_output(output, world)
     loaded = load(world)
+    if loaded.map_source is not None:  # a map may be a picture of that name
+        check_output(output, *(world.parent / file.name for file in loaded.map_source.files))
     with holding_back_ctrl_c():
         from sva_bench.pictures import picture_of
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -12,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from sva_bench import atomic
+from sva_bench.__main__ import run_command_line
 from sva_bench.atomic import draft_file, draft_folder, remove_left_behind, write_file
+from sva_bench.batch.folder import writing
 from sva_bench.errors import BadInput
 from sva_bench.runs import run_folder, tidy
 
@@ -171,3 +174,31 @@ def test_ctrl_c_while_a_draft_is_cleared_away_waits_until_it_is(
 
 def test_a_folder_that_cannot_be_read_has_nothing_to_be_cleared_away(tmp_path: Path) -> None:
     remove_left_behind(tmp_path / "nowhere", lambda _: True)
+
+
+def test_a_batch_folder_without_room_names_the_file_and_keeps_the_older_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    report = tmp_path / "report.html"
+    report.write_text("old")
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(BadInput, match=r"report\.html: cannot be written to \(No space left on device\)"), \
+            writing(report) as draft:
+        draft.write_text("ne")
+    assert (report.read_text(), names_in(tmp_path)) == ("old", ["report.html"])
+
+
+@pytest.mark.parametrize(("file", "said"), [(None, "a temporary file in /"), ("/tmp/x.urdf", "/tmp/x.urdf")])
+def test_a_full_disk_that_nobody_foresaw_is_bad_input_that_names_the_place(
+    file: str | None, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", file)
+
+    monkeypatch.setattr("sva_bench.cli.app", full)
+    assert run_command_line(["run"]) == 2
+    assert said in capsys.readouterr().err

@@ -11,11 +11,13 @@ import time
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
 from sva_bench.outputs import check_folder, check_output
 from tests.test_cli import TINY, sva_bench
+from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL
 
 SVA_BENCH = f"{sys.executable} -m sva_bench"
@@ -170,3 +172,18 @@ def test_ctrl_c_is_heard_while_libraries_are_loaded(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=30)[1]
     assert (process.returncode, said) == (130, "interrupted\n")
+
+
+def test_a_picture_is_not_drawn_over_the_map_that_it_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    two_rooms(tmp_path)
+    picture = Image.open("map.pgm")
+    picture.save("map.png")
+    text = (tmp_path / "map.yaml").read_text()
+    (tmp_path / "map.yaml").write_text(text.replace("map.pgm", "map.png"))
+    before = (tmp_path / "map.png").read_bytes()
+    assert run_command_line(["world", "draw", "world.yaml", "-o", "map.png"]) == 2
+    assert "this is what is read, and would be lost" in capsys.readouterr().err
+    assert (tmp_path / "map.png").read_bytes() == before
