@@ -7,6 +7,13 @@ from sva_bench.safe_path import distrust_current_folder
 if sys.argv[:1] == ["-m"]:  # as a program, before anything else is imported
     distrust_current_folder()
 
-from importlib.metadata import version
+__version__: str
 
-__version__ = version("sva-bench")
+
+def __getattr__(name: str) -> object:
+    """``__version__``, found out when it is asked for: that takes longer than Ctrl-C should have to wait."""
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib.metadata import version
+
+    return version("sva-bench")

@@ -34,13 +34,14 @@ from sva_bench.runs import (
     manifest,
     run_folder,
     run_name,
+    stem_of,
     write_json,
     write_legs,
     write_map,
     write_outcomes,
     write_travel_times,
 )
-from sva_bench.tally import WORST, by_stem, expected_value, head, model_is_executed, summarise
+from sva_bench.tally import WORST, by_case, expected_value, head, model_is_executed, summarise
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.load import world_as_dict
 from sva_bench.world.model import World
@@ -150,12 +151,12 @@ def execute_plans(
     with clock.phase("execution"):
         executed = execute(world, costs, cases, settings, executor,
                            lambda done, of: progress("driving routes", done, of))
-    runs, instances = by_stem(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
+    runs, instances = by_case(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
     robots, entries = [robot.name for robot in world.robots], []
     for scenario in world.scenarios:
         # What the routes are worth if fuel and limits allow them: an infeasible plan may be here to be seen failing.
         truth = unlimited(replace(instances[scenario.name], failure=world.execute_failure))
-        judged = [Judged(expected=expected_value(truth, plan), executed=runs[f"{scenario.name}-{name}"])
+        judged = [Judged(expected=expected_value(truth, plan), executed=runs[scenario.name, name])
                   for name, plan in plans.items()]
         entries.append(comparison_summary(judged, robots, noisy=not world.noise.silent))
     summary = head(world, options, settings, costs) | {"reproducible": True, "scenarios": entries}
@@ -184,10 +185,11 @@ def _publish(
     executed: list[Executed], summary: Mapping[str, Any], out: Path, clock: Stopwatch, progress: Progress,
     identity: Mapping[str, Any] | None = None,
 ) -> Run:
-    """Write the run folder; ``identity`` is what results depend on beside world, options and seed."""
+    """Write the run folder; ``identity`` is what results of plans from elsewhere depend on beside the rest."""
     resolved = world_as_dict(world)
     name = run_name(world.name, options.seed,
                     {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
+    stems = {key: stem_of(*key, foreign=identity is not None) for key in by_case(executed)}
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
@@ -198,9 +200,11 @@ def _publish(
             write_instance(folder / f"instance-{scenario}.json", instance)
         with clock.phase("recording"):
             for number, done in enumerate(executed):
-                stem = f"{done.case.scenario.name}-{done.case.planner}"
+                scenario, planner = done.case.scenario.name, done.case.planner
+                stem = stems[scenario, planner]
                 write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
-                record(folder / "recordings" / f"{stem}.rrd", world, done.traces, title=f"{world.name} {stem}")
+                record(folder / "recordings" / f"{stem}.rrd", world, done.traces,
+                       title=f"{world.name}, {scenario}, {planner}")
                 progress("recording", number + 1, len(executed))
         legs = leg_columns(executed)
         write_legs(folder / "legs.parquet", legs)
@@ -210,8 +214,8 @@ def _publish(
         told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
         write_json(folder / "manifest.json", told)
         write_report(folder / "report.html", Content(
-            summary=summary, routes={k: v.case.plan.routes for k, v in by_stem(executed).items()}, legs=legs,
-            world=world, manifest=told))
+            summary=summary, routes={k: v.case.plan.routes for k, v in by_case(executed).items()}, stems=stems,
+            legs=legs, world=world, manifest=told))
     return Run(folder=out / name, summary=summary)
 
 

@@ -18,12 +18,12 @@ from sva_bench.options import (
     AsCsv,
     AsJson,
     ExecuteFailure,
-    FailureProcess,
     FidelityOption,
     Gap,
     MarginOption,
     Out,
     Part,
+    PlanFailure,
     PlannerOption,
     Rollouts,
     ScenarioNames,
@@ -34,16 +34,9 @@ from sva_bench.options import (
     WorkerCount,
     WorldArgument,
 )
-from sva_bench.printable import is_name
-from sva_bench.terminal import (
-    check_output,
-    messages,
-    print_json,
-    print_summary,
-    progress_bars,
-    set_up_logging,
-    write_result,
-)
+from sva_bench.outputs import check_folder, check_output, write_result
+from sva_bench.terminal import messages, print_json, print_summary, progress_bars, set_up_logging
+from sva_bench.usage import PlainCommand
 from sva_bench.workers import local_workers
 
 app = typer.Typer(
@@ -58,7 +51,7 @@ app.add_typer(world_app, name="world")
 app.add_typer(instance_app, name="instance")
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def run(
     world: WorldArgument,
     seed: Seed = 0,
@@ -68,8 +61,7 @@ def run(
     planner: PlannerOption = "prmstar",
     scenario: ScenarioNames = None,
     margin: MarginOption = None,
-    plan_failure: Annotated[FailureProcess | None, typer.Option(help="Failure process that plans are made for.",
-                                                               show_default="the world's")] = None,
+    plan_failure: PlanFailure = None,
     execute_failure: ExecuteFailure = None,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
@@ -100,13 +92,16 @@ def run(
 
     set_up_logging(verbose)
     asked = None if precision is None else precision_of(precision, max_trials, trials, rollouts)
+    check_folder(out, "--out")
     loaded = load(world, scenario, margin, plan_failure, execute_failure)
     # After the world is read: an error in the file is said at once.
     with holding_back_ctrl_c():
         from sva_bench.bench import run as run_bench
         from sva_bench.planning import Options
+        from sva_bench.runs import tidy
         from sva_bench.solver.two_stage import SolveLimits
 
+    tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
                       assumptions=assumptions, precision=asked)
@@ -116,10 +111,10 @@ def run(
 
 
 for command in (times, plan, certify):
-    app.command()(command)
+    app.command(cls=PlainCommand)(command)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def execute(
     world: WorldArgument,
     plans: Annotated[list[Path], typer.Argument(metavar="PLAN...", help="Plan files (JSON), by hand or from anywhere.",
@@ -145,31 +140,28 @@ def execute(
     Exits with 3 if a plan is infeasible, unless it is allowed.
     """
     with holding_back_ctrl_c():
-        from sva_bench.inputs import about, load
+        from sva_bench.inputs import about, by_name, load
 
     set_up_logging(verbose)
+    check_folder(out, "--out")
+    named = by_name(plans)
     loaded = load(world, scenario, margin, execute_failure=execute_failure)
     with holding_back_ctrl_c():
         from sva_bench.bench import execute_plans
         from sva_bench.planning import Options, plan_costs, read_plans
+        from sva_bench.runs import tidy
 
-    names = [path.stem for path in plans]
-    for path in plans:
-        if not is_name(path.stem):
-            raise BadInput(f"{path}: the name of this file, which its plan goes by, is no UTF-8, or holds control "
-                           "characters; rename it")
-        if names.count(path.stem) > 1:
-            raise BadInput(f"{path}: there is another plan named {path.stem!r}; file names must differ")
+    tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
-        read = read_plans(loaded, costs, plans, allow_infeasible=allow_infeasible)
+        read = read_plans(loaded, costs, named, allow_infeasible=allow_infeasible)
         with local_workers(workers) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
     _show(result.summary, result.folder, as_json, csv=csv)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def view(
     recording: Annotated[Path, typer.Argument(metavar="RUN-or-RRD", help="Run folder, or one recording.",
                                               show_default=False)],
@@ -186,10 +178,11 @@ def view(
 
     if recording.is_dir() and not (recording / "recordings").is_dir():
         run_folder_at(recording)  # which says what it is, if it is none
+    check_output(screenshot, way_out="choose another place with --screenshot")
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def reproduce(
     part: Annotated[Part, typer.Argument(metavar="PART", help="rewards (Figure 4), simulation (Figures 7 and 8) or "
                                          "runtimes (the tables of section 5.1).", show_default=False)],
@@ -232,7 +225,7 @@ def reproduce(
     write_result(output, page)
 
 
-@app.command()
+@app.command(cls=PlainCommand)
 def report(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)],
     csv: AsCsv = False,
@@ -243,6 +236,8 @@ def report(
         from sva_bench.stored import report_again, write_csv
 
     set_up_logging(verbose)
+    if folder.is_dir():  # else it is said what is missing
+        check_output(folder / "report.html", way_out="make the folder writable")
     page = report_again(folder)
     if csv:
         write_csv(folder)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 from rich.markup import escape
-from typer.core import TyperGroup
 
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -18,28 +17,24 @@ from sva_bench.options import (
     ExecuteFailure,
     Fidelity,
     MarginOption,
+    PlanFailure,
+    Planner,
     ScenarioNames,
     TimeLimit,
     Verbose,
     WorkerCount,
     finite,
 )
+from sva_bench.outputs import check_folder
 from sva_bench.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.usage import PlainCommand, UnnamedCommand, WorldsFirst
 
 if TYPE_CHECKING:
     from sva_bench.batch.engines import Engine
     from sva_bench.batch.grid import Grid
 
 
-class _WorldsFirst(TyperGroup):
-    """``batch WORLD...`` is ``batch over WORLD...``: what is no command is a world."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        known = args and args[0] in self.commands
-        return super().parse_args(ctx, args if known else ["over", *args])
-
-
-batch_app = typer.Typer(cls=_WorldsFirst, rich_markup_mode="rich",
+batch_app = typer.Typer(cls=WorldsFirst, rich_markup_mode="rich",
                         help="Monte Carlo over many worlds; 'batch status DIR', 'batch retry DIR'.")
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The batch folder.", show_default=False)]
@@ -53,8 +48,8 @@ TablesAsCsv = Annotated[bool, typer.Option("--csv", help="Write the tables map b
 MemoryMb = Annotated[int, typer.Option("--memory-mb", min=0, help="Memory that a unit may take; 0 = any.")]
 
 
-@batch_app.command(epilog="'sva-bench batch status DIR' says how far a batch is, 'sva-bench batch retry DIR' takes up "
-                          "what failed.")
+@batch_app.command(cls=UnnamedCommand, epilog="'sva-bench batch status DIR' says how far a batch is, 'sva-bench batch "
+                                             "retry DIR' takes up what failed.")
 def over(
     worlds: Annotated[list[Path], typer.Argument(metavar="WORLD...", help="World files (YAML), patterns of them, or "
                                                  "one sweep.yaml.", show_default=False)],
@@ -67,14 +62,17 @@ def over(
     fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per route and "
                                                       "noise draw; or every trial in physics.",
                                                       show_default="rollout")] = None,
-    planner: Annotated[list[str] | None, typer.Option(metavar="prmstar|rrtconnect", help="OMPL planner; may be "
-                                                      "repeated.", show_default="prmstar")] = None,
+    planner: Annotated[list[str] | None, typer.Option(metavar="|".join(get_args(Planner)), help="OMPL planner, as for "
+                                                      "run; may be repeated.", show_default="prmstar")] = None,
     scenario: ScenarioNames = None,
     vary: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=V1,V2,...", help="Vary a key of the world "
                                                    "files, e.g. robots.uv2.fuel_capacity_s=200,250; may be repeated.",
                                                    show_default=False)] = None,
     margin: MarginOption = None,
+    plan_failure: PlanFailure = None,
     execute_failure: ExecuteFailure = None,
+    evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
+                                                      "takes.")] = False,
     time_limit: TimeLimit = None,
     gap: Annotated[float | None, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as "
                                               "optimal.", show_default="1e-06")] = None,
@@ -106,7 +104,8 @@ def over(
     sweep = sweep_of(worlds, Sweep(
         seeds=seeds_of(seed) if seed else None, trials=trials, rollouts=rollouts, fidelity=fidelity,
         planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
-        margin=margin, execute_failure=execute_failure, time_limit_s=time_limit, gap=gap,
+        margin=margin, plan_failure=plan_failure, execute_failure=execute_failure, evpi=evpi or None,
+        time_limit_s=time_limit, gap=gap,
         vary=varied(vary) if vary else None, unit_trials=unit_trials))
     with progress_bars() as progress:
         grid = grid_of(sweep, progress)
@@ -117,7 +116,7 @@ def over(
     _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=resume)
 
 
-@batch_app.command()
+@batch_app.command(cls=PlainCommand)
 def retry(
     folder: Folder,
     workers: WorkerCount = None,
@@ -140,7 +139,7 @@ def retry(
     _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True)
 
 
-@batch_app.command()
+@batch_app.command(cls=PlainCommand)
 def status(folder: Folder, as_json: AsJson = False) -> None:
     """How far is a batch, and what does it come to so far? It may be at work."""
     with holding_back_ctrl_c():
@@ -223,6 +222,8 @@ def _run(
         finally:
             running.close()
 
+    check_folder(folder, "--out")
+    check_folder(cache or default_folder(), "--cache")
     try:
         with watching() as report:
             summary = run_batch(grid, folder, engine, Cache(folder=cache or default_folder()), report, resume=resume,

@@ -10,22 +10,17 @@ import typer
 
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.options import Family, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
-from sva_bench.terminal import (
-    check_output,
-    print_json,
-    progress_bars,
-    results,
-    set_up_logging,
-    write_beside,
-    write_result,
-)
+from sva_bench.options import Family, Force, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
+from sva_bench.outputs import check_output, write_beside, write_result
+from sva_bench.seal import refuse_edited, refuse_others, sealed
+from sva_bench.terminal import print_json, progress_bars, results, set_up_logging
+from sva_bench.usage import PlainCommand
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
 
 
-@world_app.command("check")
+@world_app.command("check", cls=PlainCommand)
 def check_world(
     world: WorldArgument,
     planner: PlannerOption = "prmstar",
@@ -61,7 +56,7 @@ def check_world(
                   + ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items()), highlight=False)
 
 
-@world_app.command("random")
+@world_app.command("random", cls=PlainCommand)
 def make_random_world(
     family: Annotated[WorldFamily, typer.Option(help="What stands there: walls with doors and furniture, scattered "
                                                      "obstacles, racks, or a maze.")] = "rooms",
@@ -77,6 +72,7 @@ def make_random_world(
     seed: Annotated[int, typer.Option(min=0, help="Seed of terrain, sites and incentives.")] = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="World file to write; default: standard "
                                                 "output.", show_default=False)] = None,
+    force: Force = False,
     verbose: Verbose = False,
 ) -> None:
     """Make a random world, with a mission that is neither trivial nor hopeless and the paper's scenarios S1 to S4."""
@@ -85,13 +81,15 @@ def make_random_world(
 
     set_up_logging(verbose)
     check_output(output)
+    if output is not None:
+        refuse_edited(output, force=force)
     with progress_bars() as progress:
         text = random_world(family, size_m=size, density=density, pois=pois, stations=stations, robots=robots,
                             seed=seed, progress=progress)
-    write_result(output, text)
+    write_result(output, sealed(text))
 
 
-@world_app.command("from-map")
+@world_app.command("from-map", cls=PlainCommand)
 def make_world_from_map(
     source: Annotated[Path, typer.Argument(metavar="MAP.yaml|MAP.map", help="YAML file of a ROS map, or a MovingAI "
                                            "map.", show_default=False)],
@@ -112,10 +110,12 @@ def make_world_from_map(
     unknown: Annotated[Unknown | None, typer.Option(help="What unknown cells of a ROS map count as.",
                                                     show_default="occupied")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of points of interest and incentives.")] = 0,
+    force: Force = False,
     verbose: Verbose = False,
 ) -> None:
     """Make a world of a map, with sites on free ground, a mission that suits it and the paper's scenarios S1 to S4."""
     with holding_back_ctrl_c():
+        from sva_bench.inputs import refuse_no_map
         from sva_bench.worlds import world_from_map
 
     set_up_logging(verbose)
@@ -127,16 +127,22 @@ def make_world_from_map(
     if base is not None and not all(map(math.isfinite, base)):
         raise BadInput("--base: expected two finite numbers")
     check_output(output, source)
+    refuse_edited(output, force=force)
+    if source.suffix.lower() in (".yaml", ".yml"):
+        refuse_no_map(source)
     with progress_bars() as progress:
         text, files = world_from_map(
             source, output, base=base, pois=pois, stations=stations, robots=robots, seed=seed, spacing_m=min_spacing,
             cell_m=1.0 if cell_m is None else cell_m, unknown=unknown or "occupied", progress=progress)
-    for file in files:  # before the world that names them
-        write_beside(output, file.name, file.content)
-    write_result(output, text)
+    if not force:
+        refuse_others(output, {file.name: file.content for file in files})
+    with holding_back_ctrl_c():  # a map and the world on it belong together
+        for file in files:  # before the world that names them
+            write_beside(output, file.name, file.content)
+        write_result(output, sealed(text))
 
 
-@world_app.command("draw")
+@world_app.command("draw", cls=PlainCommand)
 def draw(
     world: WorldArgument,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="PICTURE.png|svg", help="Picture to write.",
@@ -157,6 +163,8 @@ def draw(
     set_up_logging(verbose)
     check_output(output, world)
     loaded = load(world)
+    if loaded.map_source is not None:  # a map may be a picture of that name
+        check_output(output, *(world.parent / file.name for file in loaded.map_source.files))
     with holding_back_ctrl_c():
         from sva_bench.pictures import picture_of
 
@@ -166,7 +174,7 @@ def draw(
     write_result(output, content)
 
 
-@world_app.command("schema")
+@world_app.command("schema", cls=PlainCommand)
 def world_schema() -> None:
     """Print the JSON schema of world files, for editors."""
     with holding_back_ctrl_c():
@@ -175,7 +183,7 @@ def world_schema() -> None:
     print_json(WorldFile.model_json_schema())
 
 
-@instance_app.command("random")
+@instance_app.command("random", cls=PlainCommand)
 def random_instances(
     family: Annotated[Family, typer.Option(help="A: one filling lasts for the mission; B: two to five refuels; C: "
                                                 "short routes.")] = "A",

@@ -26,15 +26,8 @@ from sva_bench.options import (
     WorldArgument,
     finite,
 )
-from sva_bench.terminal import (
-    check_output,
-    messages,
-    print_json,
-    progress_bars,
-    results,
-    set_up_logging,
-    write_result,
-)
+from sva_bench.outputs import check_output, write_result
+from sva_bench.terminal import messages, print_json, progress_bars, results, set_up_logging
 
 log = logging.getLogger(__name__)
 

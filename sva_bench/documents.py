@@ -23,7 +23,8 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from sva_bench.complaints import Loc as Loc
 from sva_bench.complaints import first_complaint, shown
-from sva_bench.errors import BadFile
+from sva_bench.errors import BadFile, nearest
+from sva_bench.mistaken import what_it_is, what_the_text_is
 
 MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
 MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 100 MB
@@ -85,19 +86,29 @@ class Document:
                 break
         return int(line) + 1
 
-    def changed(self, key: str, value: Any) -> Document:
+    def changed(self, key: str, value: Any, named: Mapping[Loc, str] | None = None) -> Document:
         """The same with another value at a dotted key, e.g. ``robots.uv2.fuel_capacity_s``; lines stay those read.
 
         Names may hold dots themselves: the longest name that is there counts.
+
+        Args:
+            key: The key; sections on the way that aren't there are made.
+            value: The value.
+            named: Sections that are not made, since their keys are names that the file gives: what they are names of.
         """
         data = copy.deepcopy(self.data)
         at, words = data, key.split(".")
+        loc: Loc = ()
         while True:
             name, words = _next_name(at, words)
             if isinstance(at, list) and not (isinstance(name, int) and name < len(at)):
                 raise self.error((), f"{key}: there is a list of {len(at)} items at {name!r}; count them from 0")
             if not isinstance(at, dict | list):
                 raise self.error((), f"{key}: there is nothing called {name!r} to set")
+            if words and loc in (named or {}) and not (isinstance(at, dict) and name in at):
+                kind = (named or {})[loc]
+                raise self.error((), f"{key}: there is no {kind} {name!r}; {nearest(str(name), list(at))}")
+            loc = (*loc, name)
             if not words:
                 at[name] = value
                 return Document(self.path, data, self._text, self._root)
@@ -141,11 +152,13 @@ def parse_yaml(text: str, path: Path) -> Document:
     """
     try:
         root = _compose(text)
-    except MarkedYAMLError as error:
+    except YAMLError as error:
+        if (known := what_the_text_is(text)) is not None:
+            raise BadFile(path, None, "", known) from None
+        if not isinstance(error, MarkedYAMLError):
+            raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}") from None
         mark = error.problem_mark or error.context_mark
         raise BadFile(path, mark.line + 1 if mark else None, "", f"not valid YAML: {error.problem}") from None
-    except YAMLError as error:
-        raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}") from None
     except RecursionError:
         raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
     except (ValueError, OverflowError):
@@ -182,8 +195,9 @@ def read_json(path: Path) -> Document:
     try:
         data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
     except json.JSONDecodeError as error:
-        if path.suffix.lower() in (".yaml", ".yml"):
-            raise BadFile(path, None, "", "expected JSON, found YAML; `sva-bench times` makes an instance of a world"
+        if path.suffix.lower() in (".yaml", ".yml", ".map"):
+            known = what_it_is(parse_yaml(text, path).data)
+            raise BadFile(path, None, "", "expected JSON, found YAML" + ("" if known is None else f"; {known}")
                           ) from None
         raise BadFile(path, error.lineno, "", f"not valid JSON: {error.msg} (column {error.colno})") from None
     except RecursionError:
@@ -227,11 +241,13 @@ def check_kind(document: Document, kind: str) -> None:
     """Refuse a document that is not a mapping of the declared kind."""
     if not isinstance(document.data, dict):
         raise document.error((), f"expected a mapping that starts with 'format: {kind}'")
-    found = document.data.get("format")
+    found, known = document.data.get("format"), what_it_is(document.data)
     if found is None:
-        raise document.error((), f"the key 'format' is missing; add 'format: {kind}'")
+        raise document.error((), known or f"the key 'format' is missing; add 'format: {kind}'")
     if found != kind:
-        raise document.error(("format",), f"expected {kind!r}, found {shown(found)}")
+        other = isinstance(found, str) and found.partition("@")[0] != kind.partition("@")[0]
+        hint = f"; {known}" if other and known is not None else ""
+        raise document.error(("format",), f"expected {kind!r}, found {shown(found)}{hint}")
 
 
 def _read(path: Path, limit: int) -> str:

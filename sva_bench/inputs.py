@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import unicodedata
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,10 +13,14 @@ from sva_bench.documents import read_yaml
 from sva_bench.errors import BadInput, nearest
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.mission.instance import Instance
+from sva_bench.mistaken import what_it_is
 from sva_bench.options import FailureProcess, Planner
 from sva_bench.terminal import messages
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World
+
+_LONGEST_NAME = 120
+"""Bytes of a plan's name: with a scenario's before it and an ending behind it, it is a file's name, of 255 at most."""
 
 
 def load(
@@ -73,6 +79,42 @@ def instance_of_world(
         messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
                        f"to {cost.max_excess_pct:.1f} %", highlight=False)
     return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))
+
+
+def refuse_no_map(path: Path) -> None:
+    """Refuse a file of ours where a map is asked for.
+
+    Raises:
+        BadFile: If it is one, and which command takes it.
+    """
+    document = read_yaml(path)
+    if isinstance(document.data, dict) and "format" in document.data and (known := what_it_is(document.data)):
+        raise document.error((), f"expected a map, and {known}")
+
+
+def by_name(paths: Sequence[Path]) -> dict[str, Path]:
+    """Plan files by the names that they go by, in tables and as names of files: their stems.
+
+    Raises:
+        BadInput: If one can't be shown, is too long to be part of a file's name, or is that of another, as file
+            systems that don't know capitals or ways of writing accents would say.
+    """
+    found: dict[str, Path] = {}
+    known: dict[str, Path] = {}
+    for path in paths:
+        name = path.stem
+        if not name.isprintable():
+            raise BadInput(f"{os.fsencode(path)!r}: a plan goes by the name of its file, and this one can't be shown; "
+                           "rename it")
+        if len(name.encode()) > _LONGEST_NAME:
+            raise BadInput(f"{path}: a plan goes by the name of its file, and this one is longer than {_LONGEST_NAME} "
+                           "bytes; rename it")
+        plain = unicodedata.normalize("NFKC", name).casefold()
+        if plain in known:
+            raise BadInput(f"{path}: there is another plan named {name!r}, {known[plain]}; the names of the files must "
+                           "differ, and in more than capitals")
+        found[name] = known[plain] = path
+    return found
 
 
 def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:

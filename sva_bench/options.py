@@ -50,6 +50,8 @@ FidelityOption = Annotated[Fidelity, typer.Option(
     help="The kinematic twin alone; physics once per route and noise draw; or every trial in physics.")]
 ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",
                                                          show_default="all")]
+PlanFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that plans are made for.",
+                                                           show_default="the world's")]
 ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that is executed.",
                                                               show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
@@ -65,3 +67,4 @@ def few_enough(count: int | None) -> int | None:
 WorkerCount = Annotated[int | None, typer.Option(min=1, callback=few_enough, help="Processes that drive.",
                                                  show_default="all cores")]
 Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]
+Force = Annotated[bool, typer.Option("--force", help="Write over a world that was edited by hand, too.")]

@@ -43,7 +43,7 @@ def picture_of(
     ways = [path for i, row in enumerate(widest.paths) for path in row[i + 1:] if path is not None] if paths else []
     routes: dict[str, list[Leg]] = {}
     if plan is not None:
-        (read,) = read_plans(world, costs, [plan], allow_infeasible=True).values()
+        (read,) = read_plans(world, costs, {plan.stem: plan}, allow_infeasible=True).values()
         routes = routes_of(world, costs, read)
     return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(ways), routes=routes))
 

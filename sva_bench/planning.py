@@ -199,9 +199,9 @@ def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list
 
 
 def read_plans(
-    world: World, costs: Mapping[str, FuelCosts], paths: Sequence[Path], *, allow_infeasible: bool,
+    world: World, costs: Mapping[str, FuelCosts], paths: Mapping[str, Path], *, allow_infeasible: bool,
 ) -> dict[str, Plan]:
-    """Read plan files for a world, by their stems.
+    """Read plan files for a world, by the names that they go by.
 
     Raises:
         BadFile: If a file is no plan, or names robots or sites that the world doesn't have.
@@ -210,7 +210,7 @@ def read_plans(
     instance = instance_of(world, costs, nominal_scenario(world))
     names = {instance.name, *(instance_of(world, costs, scenario).name for scenario in world.scenarios)}
     plans = {}
-    for path in paths:
+    for name, path in paths.items():
         plan = read_plan(path, instance)
         if plan.instance is not None and plan.instance not in names:
             _log.warning("%s was made for %s, not for %s", path, plan.instance, world.name)
@@ -220,7 +220,7 @@ def read_plans(
             if never or not allow_infeasible:
                 raise InfeasiblePlan(path, never or certificate.reasons)
             _log.warning("%s is infeasible, and driven all the same: %s", path, "; ".join(certificate.reasons))
-        plans[path.stem] = plan
+        plans[name] = plan
     return plans
 
 

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import platform
-import shutil
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
@@ -17,8 +17,8 @@ from typing import Any
 import pyarrow as pa
 
 from sva_bench import __version__
+from sva_bench.atomic import draft_folder, remove_left_behind
 from sva_bench.documents import pretty_json
-from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.outcome_table import outcome_table
 from sva_bench.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
@@ -26,6 +26,9 @@ from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import MapSource
 
 PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
+
+
+_RUN_NAME = re.compile(r".+-seed\d+-[0-9a-f]{8}")
 
 
 def run_name(world: str, seed: int, identity: Mapping[str, Any]) -> str:
@@ -42,45 +45,33 @@ def run_name(world: str, seed: int, identity: Mapping[str, Any]) -> str:
 
 @contextlib.contextmanager
 def run_folder(out: Path, name: str) -> Iterator[Path]:
-    """A folder that appears as ``out / name`` only when it is complete; it replaces an older one.
+    """A folder that appears as ``out / name`` only when it is complete; it replaces an older one in one step.
 
     Raises:
         BadInput: If ``out`` cannot be written to.
     """
-    target, draft = out / name, out / f".{name}.{os.getpid()}.tmp"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        draft.mkdir()
-    except OSError as error:
-        raise BadInput(f"{out}: no folder can be made there ({error.strerror}); choose another with --out") from None
-    try:
+    tidy(out)
+    with draft_folder(out / name, "choose another with --out") as draft:
         yield draft
-        old = out / f".{name}.{os.getpid()}.old"
-        if target.exists():
-            target.rename(old)
-        draft.rename(target)
-        shutil.rmtree(old, ignore_errors=True)
-    except OSError as error:
-        raise BadInput(f"{out}: cannot be written to ({error.strerror}); choose another with --out") from None
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
-@contextlib.contextmanager
-def draft_of(path: Path) -> Iterator[Path]:
-    """A file that takes the place of another only when it is whole.
+def tidy(out: Path) -> None:
+    """Remove what killed runs left unfinished, and put back an older run that one had moved away."""
+    remove_left_behind(out, lambda left: _RUN_NAME.fullmatch(left) is not None)
 
-    Raises:
-        BadInput: If it can't be written.
+
+def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
+    """Name of a plan's files under a scenario, which no other plan of the run has.
+
+    Names of ours have no ``+`` in them, and no planner's is the end of another's; plans from elsewhere may be called
+    anything.
+
+    Args:
+        scenario: The scenario's name.
+        planner: The planner's, or that of a plan from elsewhere.
+        foreign: Whether the plan is from elsewhere.
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        yield draft
-        draft.replace(path)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be written ({error.strerror})") from None
-    finally:
-        draft.unlink(missing_ok=True)
+    return f"{scenario}{'+' if foreign else '-'}{planner}"
 
 
 def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,

@@ -11,13 +11,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from sva_bench.analysis.report import Content, write_report
+from sva_bench.atomic import draft_file
 from sva_bench.batch.folder import is_batch
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.execution.outcome import ENDS
 from sva_bench.mission.plan import Route, read_routes
 from sva_bench.read_back import Part, read_ours
 from sva_bench.results_schema import ManifestFile, SummaryFile
-from sva_bench.runs import LEG_COLUMNS, MAP, draft_of
+from sva_bench.runs import LEG_COLUMNS, MAP, stem_of
 from sva_bench.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
 from sva_bench.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
@@ -59,7 +60,7 @@ def report_again(folder: Path) -> Path:
     """
     content = read_content(run_folder_at(folder))
     path = folder / "report.html"
-    with draft_of(path) as draft:
+    with draft_file(path) as draft:
         write_report(draft, content)
     return path
 
@@ -74,7 +75,7 @@ def write_csv(folder: Path) -> list[Path]:
     written = []
     for name, schema in (("legs", LEGS), ("outcomes", OUTCOMES), ("travel_times", TRAVEL_TIMES)):
         path = folder / f"{name}.csv"
-        with draft_of(path) as draft:
+        with draft_file(path) as draft:
             write_table_as_csv(folder / f"{name}.parquet", draft, schema)
         written.append(path)
     return written
@@ -101,18 +102,20 @@ def read_content(folder: Path) -> Content:
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
              "robot": frozenset(first.availability), "end": frozenset(ENDS), "fidelity": frozenset((summary.fidelity,))}
     _check_outcomes(folder / "outcomes.parquet", plans, summary.trials, len(first.availability), words)
-    return Content(summary=document.data, routes=_routes(folder, world, plans), manifest=told.data, world=world,
-                   legs=_legs(folder / "legs.parquet", world, words))
+    foreign = "comparisons" in document.data["scenarios"][0]
+    stems = {(scenario, name): stem_of(scenario, name, foreign=foreign) for scenario, name in plans}
+    return Content(summary=document.data, routes=_routes(folder, world, stems), stems=stems, manifest=told.data,
+                   world=world, legs=_legs(folder / "legs.parquet", world, words))
 
 
 def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:5])[:200] + (" ..." if len(names) > 5 else "")
 
 
-def _routes(folder: Path, world: World, plans: Mapping[tuple[str, str], float]) -> dict[str, Mapping[str, Route]]:
+def _routes(folder: Path, world: World, stems: Mapping[tuple[str, str], str]
+            ) -> dict[tuple[str, str], Mapping[str, Route]]:
     robots, sites = [robot.name for robot in world.robots], [site.name for site in world.sites]
-    return {f"{scenario}-{name}": read_routes(folder / "plans" / f"{scenario}-{name}.json", robots, sites)
-            for scenario, name in plans}
+    return {key: read_routes(folder / "plans" / f"{stem}.json", robots, sites) for key, stem in stems.items()}
 
 
 def _legs(path: Path, world: World, words: Mapping[str, frozenset[str]]) -> dict[str, Any]:

@@ -39,21 +39,21 @@ def summarise(
     planned: Mapping[str, Planned], executed: list[Executed],
 ) -> dict[str, Any]:
     """The content of ``summary.json``."""
-    runs = by_stem(executed)
+    runs = by_case(executed)
     robots = [robot.name for robot in world.robots]
     scenarios = []
     for scenario in world.scenarios:
         plans = planned[scenario.name]
         known = known_ahead(world, plans)
-        judged = {name: Judged(expected=known[name], executed=runs[f"{scenario.name}-{name}"])
+        judged = {name: Judged(expected=known[name], executed=runs[scenario.name, name])
                   for name in ("stochastic", "deterministic")}
         scenarios.append(scenario_summary(ScenarioResult(
             stochastic=judged["stochastic"], deterministic=judged["deterministic"],
             modelled_range=known["modelled_range"], vss_mean_value=known["vss_mean_value"],
-            worst=runs.get(f"{scenario.name}-{WORST}"), ws=known["ws"], evpi=known["evpi"],
+            worst=runs.get((scenario.name, WORST)), ws=known["ws"], evpi=known["evpi"],
             value_of_process=known["value_of_process"],
             informed=None if plans.informed is None else Judged(
-                expected=plans.informed.expected, executed=runs[f"{scenario.name}-{INFORMED}"]),
+                expected=plans.informed.expected, executed=runs[scenario.name, INFORMED]),
         ), robots, noisy=not world.noise.silent))
     summary = head(world, options, settings, costs) | {"reproducible": proved(planned), "scenarios": scenarios}
     return summary if options.precision is None else summary | {"precision": options.precision.as_dict(summary)}
@@ -92,6 +92,6 @@ def head(world: World, options: Options, settings: Settings, costs: Mapping[str,
     }
 
 
-def by_stem(executed: list[Executed]) -> dict[str, Executed]:
-    """What was executed, by ``<scenario>-<planner>``, as plans and recordings are named."""
-    return {f"{run.case.scenario.name}-{run.case.planner}": run for run in executed}
+def by_case(executed: list[Executed]) -> dict[tuple[str, str], Executed]:
+    """What was executed, by scenario and planner: joined into one word, two cases could be one."""
+    return {(run.case.scenario.name, run.case.planner): run for run in executed}

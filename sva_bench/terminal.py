@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -17,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.segment import Segment
 from rich.table import Table
 
-from sva_bench.errors import BadInput
+from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.printable import printable
 
 
@@ -48,57 +46,6 @@ def print_json(data: Any) -> None:
     sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
-def check_output(path: Path | None, *sources: Path) -> None:
-    """Refuse a place for a result where nothing can be written, or one that would write over what it is made of.
-
-    Raises:
-        BadInput: If the folder isn't there, or the file is one of the sources.
-    """
-    if path is None:
-        return
-    if not path.resolve().parent.is_dir():
-        raise BadInput(f"{path}: there is no such folder; choose another place with -o")
-    if any(source.exists() and path.exists() and path.samefile(source) for source in sources):
-        raise BadInput(f"{path}: this is what is read, and would be lost; choose another name with -o")
-
-
-def write_result(path: Path | None, content: str | bytes) -> None:
-    """Write a result to a file, whole or not at all, or to standard output; pipes and devices are written through."""
-    try:
-        data = content.encode("utf-8") if isinstance(content, str) else content
-    except UnicodeEncodeError as error:
-        name = error.object[max(error.start - 40, 0):error.end]
-        raise BadInput(f"{name!r}: this name is no UTF-8, and no file of ours can hold it; rename what it is of"
-                       ) from None
-    if path is None:
-        if isinstance(content, str):
-            sys.stdout.write(content)
-        else:
-            sys.stdout.buffer.write(content)
-        return
-    target = path.resolve()  # a link stays one
-    draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        if target.exists() and not target.is_file():
-            path.write_bytes(data)
-        else:
-            draft.write_bytes(data)
-            draft.replace(target)
-    except OSError as error:
-        draft.unlink(missing_ok=True)
-        raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another place with -o") from None
-
-
-def write_beside(path: Path, name: str, content: bytes) -> None:
-    """Write a file that belongs to another, by its name relative to the other's folder."""
-    target = path.parent / name
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"{target.parent}: cannot be made ({error.strerror}); choose another place with -o") from None
-    write_result(target, content)
-
-
 def set_up_logging(verbose: bool) -> None:
     """Send warnings to standard error, and everything of ours where the user wants to know more."""
     if messages.is_terminal:
@@ -124,16 +71,21 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
         yield say
         return
-    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-                  console=messages, transient=True) as bars:
-        tasks: dict[str, Any] = {}
+    tasks: dict[str, Any] = {}
 
-        def show(what: str, done: int, of: int) -> None:
-            if what not in tasks:
-                tasks[what] = bars.add_task(what, total=of)
-            bars.update(tasks[what], completed=done, total=of)
+    def show(what: str, done: int, of: int) -> None:
+        if what not in tasks:
+            tasks[what] = bars.add_task(what, total=of)
+        bars.update(tasks[what], completed=done, total=of)
 
+    bars = Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                    console=messages, transient=True)
+    try:
+        with holding_back_ctrl_c():  # the thread that draws them inherits it: Ctrl-C is this one's to hear
+            bars.start()
         yield show
+    finally:
+        bars.stop()
 
 
 def print_summary(summary: Any) -> None:

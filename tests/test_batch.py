@@ -70,7 +70,7 @@ def test_worlds_of_one_name_are_refused(tmp_path: Path) -> None:
     small = world_file(tmp_path)
     done = sva_bench("batch", small, small, *QUICK, "--cache", tmp_path / "cache", cwd=tmp_path)
     assert done.returncode == 2
-    assert "'small'" in done.stderr
+    assert "this world is given twice" in done.stderr
 
 
 def test_vss_over_maps_takes_maps_as_the_sample() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -11,6 +13,7 @@ from sva_bench.batch.estimates import estimates
 from sva_bench.batch.folder import begin, settings_in
 from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.options import Planner
 from sva_bench.sweeps import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 from tests.test_cli import sva_bench
 from tests.worlds_for_tests import SMALL
@@ -84,13 +87,100 @@ def test_settings_give_the_same_grid_again(tmp_path: Path) -> None:
     assert again.units() == grid.units()
 
 
-@pytest.mark.parametrize(("key", "told"), [
-    ("robots.uv9.fuel_capacity_s", "robots.uv9"), ("robot.uv1.fuel_capacity_s", "did you mean 'robots'"),
-    ("robots.uv1.fuel_capacity_s.x", "nothing called"), ("map.shapes.obstacles.7.radius_m", "3 items")])
-def test_a_key_that_no_world_has_is_refused_with_the_file(key: str, told: str, tmp_path: Path) -> None:
-    with pytest.raises(BadFile, match=r"small\.world\.yaml") as caught:
-        grid_of(Sweep(worlds=(world(tmp_path),), vary={key: [1]}))
+WRONG = [
+    ("robots.uv9.fuel_capacity_s", 1, "there is no robot 'uv9'; did you mean 'uv2'?"),
+    ("robots.uv2.availability", 1.2, "expected at most 1.0, found 1.2"),
+    ("robot.uv1.fuel_capacity_s", 1, "robot: unknown key 'robot'; did you mean 'robots'?"),
+    ("robots.uv1.fuel_capacity_s.x", 1, "there is nothing called 'x' to set"),
+    ("map.shapes.obstacles.7.radius_m", 1, "there is a list of 3 items at 7; count them from 0"),
+    ("map.shapes.obstacles.2.radius_m", -1, "expected at least 1e-06, found -1"),
+    ("sites.pois.p9.stop_s", 1, "there is no POI 'p9'; did you mean 'p4'?"),
+    ("sites.stations.r2.stop_s", 1, "there is no station 'r2'; did you mean 'r1'?"),
+    ("scenarios.hlaf.uv2", 1, "there is no scenario 'hlaf'; did you mean 'half'?"),
+    ("robots.uv1.incentives.p9", 1, "there is no POI 'p9'; did you mean 'p4'?"),
+    ("sites.pois.p1.at_m", [3.0, 1.0], "inside an obstacle"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "told"), WRONG)
+def test_a_value_that_is_wrong_is_said_of_the_option(key: str, value: object, told: str, tmp_path: Path) -> None:
+    path = world(tmp_path)
+    with pytest.raises(BadInput) as caught:
+        grid_of(Sweep(worlds=(path,), vary={"robots.uv1.availability": [0.5], key: [value]}))
+    assert str(caught.value).startswith(f"--set {key}={json.dumps(value)}: ")
     assert told in str(caught.value)
+    assert f"(in {path})" in str(caught.value)
+    assert ".yaml:" not in str(caught.value)  # the user never wrote it into a line of that file
+
+
+@pytest.mark.parametrize(("key", "value", "told"), WRONG)
+def test_a_value_that_is_wrong_is_said_of_the_line_of_the_sweep_file(
+    key: str, value: object, told: str, tmp_path: Path
+) -> None:
+    world(tmp_path)
+    path = tmp_path / "sweep.yaml"
+    path.write_text(SWEEP + f"  {key}: [{json.dumps(value)}]\n", encoding="utf-8")
+    with pytest.raises(BadFile) as caught:
+        grid_of(sweep_of([path], Sweep()))
+    assert str(caught.value).startswith(f"{path}:10: set.{key}: ")
+    assert told in str(caught.value)
+
+
+def test_of_two_values_the_one_that_is_wrong_alone_is_named(tmp_path: Path) -> None:
+    # What is said of the whole file names neither key: that nothing is left to go to.
+    vary: dict[str, list[object]] = {"robots.uv1.mission_limit_s": [100], "format": ["sva-bench/world@9"]}
+    with pytest.raises(BadInput, match=r"^--set format="):
+        grid_of(Sweep(worlds=(world(tmp_path),), vary=vary))
+
+
+def test_a_file_that_is_wrong_by_itself_is_named_all_the_same(tmp_path: Path) -> None:
+    path = world(tmp_path)
+    path.write_text(path.read_text().replace("availability: 0.75", "availability: 1.75"), encoding="utf-8")
+    with pytest.raises(BadFile, match=r"small\.world\.yaml:\d+: robots\.uv2\.availability"):
+        grid_of(Sweep(worlds=(path,), vary={"robots.uv1.availability": [0.5]}))
+
+
+def test_a_scenario_that_is_not_there_is_said_of_the_option_or_of_the_line(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.yaml"
+    path.write_text(SWEEP.replace("[half]", "[half, hlaf]"), encoding="utf-8")
+    world(tmp_path)
+    with pytest.raises(BadFile, match=r"sweep\.yaml:6: scenarios\[1\]: .*has no scenario 'hlaf'; did you mean 'half'"):
+        grid_of(sweep_of([path], Sweep()))
+    with pytest.raises(BadInput, match=r"^--scenario flah: .*small\.world\.yaml has no scenario 'flah'"):
+        grid_of(sweep_of([path], Sweep(scenarios=("flah",))))
+
+
+@pytest.mark.parametrize(("written", "meant"), [
+    ("0", (0,)), ("0-2", (0, 1, 2)), ("[0, 2]", (0, 2)), ("[4, 0-2, '7']", (4, 0, 1, 2, 7)), ('"3"', (3,))])
+def test_seeds_of_a_file_are_written_like_those_of_the_command_line(
+    written: str, meant: tuple[int, ...], tmp_path: Path
+) -> None:
+    world(tmp_path)
+    path = tmp_path / "sweep.yaml"
+    path.write_text(SWEEP.replace("seeds: 0-2", f"seeds: {written}"), encoding="utf-8")
+    assert sweep_of([path], Sweep()).seeds == meant
+
+
+@pytest.mark.parametrize("written", ["-1", "5-3", "x", "[1, x]", "1.5"])
+def test_what_is_no_seed_is_said_of_the_line(written: str, tmp_path: Path) -> None:
+    world(tmp_path)
+    path = tmp_path / "sweep.yaml"
+    path.write_text(SWEEP.replace("seeds: 0-2", f"seeds: {written}"), encoding="utf-8")
+    with pytest.raises(BadFile, match=r"sweep\.yaml:3: seeds") as caught:
+        sweep_of([path], Sweep())
+    assert "--seed" not in str(caught.value)
+
+
+def test_batches_offer_the_planners_and_failures_of_runs(tmp_path: Path) -> None:
+    grid = grid_of(Sweep(worlds=(world(tmp_path),), planners=planners_of(get_args(Planner)), plan_failure="per_leg",
+                         execute_failure="mission", evpi=True))
+    assert {point.planner for point in grid.points} == set(get_args(Planner))
+    assert {(point.world.plan_failure, point.world.execute_failure) for point in grid.points} == {
+        ("per_leg", "mission")}
+    assert grid.options.evpi
+    (tmp_path / "out").mkdir()
+    begin(tmp_path / "out", grid.settings(), resume=False)
+    assert grid_from(*settings_in(tmp_path / "out")).settings() == grid.settings()
 
 
 def test_noise_that_no_trial_has_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

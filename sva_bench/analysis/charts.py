@@ -193,6 +193,6 @@ def _width(groups: int, series: int) -> float:
 
 
 def _name(kind: str, of: str) -> str:
-    return kind + "-" + "".join(c if c.isascii() and c.isalnum() else f"-{ord(c):x}" for c in of)
+    return kind + "-" + "".join(c if c.isascii() and c.isalnum() else f"_{ord(c):x}_" for c in of)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -42,14 +43,16 @@ class Content:
 
     Attributes:
         summary: Content of ``summary.json``.
-        routes: Route of each robot, by ``<scenario>-<planner>``.
+        routes: Route of each robot, by scenario and planner.
+        stems: Names of a plan's files, by scenario and planner.
         legs: Columns of ``legs.parquet``.
         world: The world, for its picture.
         manifest: Content of ``manifest.json``.
     """
 
     summary: Mapping[str, Any]
-    routes: Mapping[str, Mapping[str, Sequence[str]]]
+    routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]
+    stems: Mapping[tuple[str, str], str]
     legs: Mapping[str, Sequence[Any]]
     world: World
     manifest: Mapping[str, Any]
@@ -77,7 +80,7 @@ def write_report(path: Path, content: Content) -> None:
         *_ends(scenarios),
         *_legs(content.legs),
         *_routes(content.routes),
-        *_recordings(scenarios),
+        *_recordings(content.stems),
         *_again(summary, content.manifest),
     ]
     write_page(path, str(summary["world"]), parts)
@@ -225,15 +228,15 @@ def _world(world: World) -> list[str]:
                                          "points of interest with what each robot earns there.")]
 
 
-def _routes(routes: Mapping[str, Mapping[str, Sequence[str]]]) -> list[str]:
-    rows = [[stem, robot, " → ".join(route) or "stays home"]
-            for stem, robots in routes.items() for robot, route in robots.items()]
-    return [heading("Routes"), table(["plan", "robot", "route"], rows, words=(0, 1, 2))]
+def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> list[str]:
+    rows = [[scenario, planner, robot, " → ".join(route) or "stays home"]
+            for (scenario, planner), robots in routes.items() for robot, route in robots.items()]
+    return [heading("Routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
 
 
-def _recordings(scenarios: Scenarios) -> list[str]:
-    links = [f'<a href="recordings/{stem}.rrd">{stem}</a>' for s in scenarios for name in s["plans"]
-             if (stem := text(f"{s['name']}-{name}"))]
+def _recordings(stems: Mapping[tuple[str, str], str]) -> list[str]:
+    links = [f'<a href="recordings/{quote(stem)}.rrd">{text(f"{scenario}, {planner}")}</a>'
+             for (scenario, planner), stem in stems.items()]
     return [heading("Recordings"), f"<p>Trial 0 of each plan, for the Rerun viewer: {', '.join(links)}. Open them all "
             "with <code>sva-bench view</code> and this folder.</p>"]
 

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sva_bench.atomic import by_way_of, why
 from sva_bench.batch.schema import FailuresFile, ManifestFile, SettingsEntry
 from sva_bench.documents import pretty_json, validate
 from sva_bench.errors import BadFile, BadInput
@@ -186,7 +187,7 @@ def write_maps(folder: Path, files: Mapping[str, bytes]) -> None:
             path.parent.mkdir(parents=True, exist_ok=True)
             held = path.exists() and path.read_bytes() == content
         except OSError as error:
-            raise _unwritable(folder, error) from None
+            raise _unwritable(path, error) from None
         if not held:
             write(path, content)
 
@@ -197,21 +198,27 @@ def write(path: Path, content: bytes) -> None:
     Raises:
         BadInput: If it cannot be written; what was written before stays.
     """
+    with writing(path) as draft:
+        draft.write_bytes(content)
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[Path]:
+    """A file of a batch folder to be written, which appears when it is whole.
+
+    Raises:
+        BadInput: If it cannot be written; what was written before stays.
+    """
     draft = path.with_name(f"{path.name}.tmp")
     try:
-        with draft.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())  # else a power cut could leave a renamed file empty
-        draft.replace(path)
+        with by_way_of(draft, path):
+            yield draft
     except OSError as error:
-        with contextlib.suppress(OSError):
-            draft.unlink(missing_ok=True)
-        raise _unwritable(path.parent, error) from None
+        raise _unwritable(path, error) from None
 
 
-def _unwritable(folder: Path, error: OSError) -> BadInput:
+def _unwritable(place: Path, error: OSError) -> BadInput:
     way_out = "make room and go on with --resume" if error.errno in (errno.ENOSPC, errno.EDQUOT) else \
         "make it writable and go on with --resume"
-    return BadInput(f"{folder}: cannot be written to ({error.strerror}); what is done is kept: {way_out}, or choose "
+    return BadInput(f"{place}: cannot be written to ({why(error)}); what is done is kept: {way_out}, or choose "
                     "another folder with --out")

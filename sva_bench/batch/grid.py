@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,7 +40,7 @@ class Point:
 
     @property
     def name(self) -> str:
-        """Part of file names: the world's name, and a hash of the variation."""
+        """Part of file names: the world's name, and a hash of the variation, long enough to tell millions apart."""
         return f"{self.world.name}-{digest(self.variant)[:_HASH]}" if self.variant else self.world.name
 
     @property
@@ -110,9 +109,12 @@ def checked(grid: Grid) -> Grid:
     Raises:
         BadInput: Says which, and the number.
     """
-    for name, count in Counter(point.name for point in grid.points).items():
-        if count > 1:
-            raise BadInput(f"two worlds are named {name!r}; names must differ within a batch")
+    known: dict[str, Point] = {}
+    for point in grid.points:
+        other = known.setdefault(point.name, point)
+        if other is not point:
+            raise BadInput(f"{other.label} and {point.label} would both be named {point.name!r} in the batch folder; "
+                           "names must differ within a batch")
     refuse_too_many(len(grid.points), len(grid.seeds), grid.options.trials, grid.unit_trials)
     return grid
 

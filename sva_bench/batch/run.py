@@ -24,6 +24,7 @@ from sva_bench.batch.folder import (
     write,
     write_failures,
     write_maps,
+    writing,
 )
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.shards import Note, Shard, read_note, unit_of
@@ -93,8 +94,8 @@ def run_batch(
                     tick=lambda: report(books.progress()))).run(books.strands())
         summary = summary_of(grid, folder, books.done, books.failures)
         write(folder / "summary.json", pretty_json(summary).encode())
-        write_batch_report(folder / "report.html.tmp", summary)
-        (folder / "report.html.tmp").replace(folder / "report.html")
+        with writing(folder / "report.html") as draft:
+            write_batch_report(draft, summary)
         return summary
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from sva_bench.analysis.summary import UNHAPPY
+from sva_bench.analysis.unseen import UNHAPPY
 from sva_bench.documents import Name, Number, Section, WholeNumber
 from sva_bench.execution.execute import Fidelity
 from sva_bench.execution.outcome import ENDS
@@ -70,29 +70,36 @@ class FailuresFile(Section):
     failures: list[FailureEntry]
 
 
-class MomentsEntry(Section):
+_Bounds = Annotated[list[_Sum], Field(min_length=2, max_length=2)]
+
+
+class FigureEntry(Section):
     count: Annotated[_Count, Field(ge=1)]
     mean: _Sum
     squares: _Square
+    drawn_bounds: _Bounds
+    taken_bounds: _Bounds
     counts: list[_Count]
     sums: list[_Sum]
 
     @model_validator(mode="after")
-    def _fits_together(self) -> MomentsEntry:
+    def _fits_together(self) -> FigureEntry:
         if len(self.counts) != len(self.sums) or (self.counts and sum(self.counts) != self.count):
             raise ValueError("counts and sums by noise draw don't add up to the trials")
+        if self.drawn_bounds[0] > self.drawn_bounds[1] or self.taken_bounds[0] > self.taken_bounds[1]:
+            raise ValueError("bounds: expected [low, high]")
         return self
 
 
 class PlanEntry(Section):
-    total: MomentsEntry
+    total: FigureEntry
     by_robot: list[_Sum]
     ends: Annotated[list[_Count], Field(min_length=len(ENDS), max_length=len(ENDS))]
     charged: Annotated[list[_Sum], Field(min_length=len(UNHAPPY), max_length=len(UNHAPPY))]
 
 
 class TallyEntry(Section):
-    difference: MomentsEntry
+    difference: FigureEntry
     plans: dict[Literal["stochastic", "deterministic"], PlanEntry]
 
 
@@ -115,8 +122,8 @@ class NoteFile(Section):
             if list(scenario.availability) != self.robots or len(scenario.plans) != 2:
                 raise ValueError(f"facts.scenarios[{number}]: expected the robots of 'robots', and two plans")
         for name, tally in self.tallies.items():
-            moments = [tally.difference, *(plan.total for plan in tally.plans.values())]
+            figures = [tally.difference, *(plan.total for plan in tally.plans.values())]
             if len(tally.plans) != 2 or any(len(plan.by_robot) != len(self.robots) for plan in tally.plans.values()) \
-                    or {m.count for m in moments} != {self.trials} or len({len(m.counts) for m in moments}) != 1:
+                    or {f.count for f in figures} != {self.trials} or len({len(f.counts) for f in figures}) != 1:
                 raise ValueError(f"tallies.{name}: not of two plans, these robots and these trials")
         return self

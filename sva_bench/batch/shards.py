@@ -111,13 +111,14 @@ def read_note(path: Path, unit: Unit) -> Note:
         raise BadFile(path, None, "", f"no shard of a batch: its tally is no JSON ({type(error).__name__}); {_REMOVE}"
                       ) from None
     world, facts = unit.point.world, words["facts"]
-    rollouts = {len(moments["counts"]) for tally in words["tallies"].values() for moments in (tally["difference"],)}
+    draws = {len(tally["difference"]["counts"]) for tally in words["tallies"].values()}
+    most = 0 if world.noise.silent else unit.rollouts
     for key, found, known in (
             ("world", facts["world"], world.name), ("seed", facts["seed"], unit.seed),
             ("variant", words["variant"], unit.point.variant), ("first", words["first"], unit.first),
             ("trials", words["trials"], unit.trials), ("robots", words["robots"], [r.name for r in world.robots]),
             ("scenarios", [s["name"] for s in facts["scenarios"]], [s.name for s in world.scenarios]),
-            ("noise draws", rollouts, {0 if world.noise.silent else unit.rollouts})):
+            ("noise draws", all(0 < met <= most or met == most for met in draws), True)):
         if found != known:
             raise BadFile(path, None, key, f"the shard of another unit: expected {known!r:.60}, found {found!r:.60}; "
                           f"{_REMOVE}")

@@ -87,7 +87,8 @@ def read_plan(path: Path, instance: Instance) -> Plan:
     """
     file = _read(path, [v.name for v in instance.vehicles], instance.sites)
     base = instance.sites[instance.base]
-    routes = {robot: () if list(route) == [base] else tuple(route) for robot, route in file.routes.items()}
+    stays_home = ([base], [base, base])
+    routes = {robot: () if route in stays_home else tuple(route) for robot, route in file.routes.items()}
     return Plan(
         routes=routes, instance=file.instance, objective=file.objective, method=file.method, status=file.status,
         value=file.value, bound=file.bound, fuel_s=file.fuel_s, runtime_s=file.runtime_s, seed=file.seed,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
 from sva_bench.arrays import FloatArray
+from sva_bench.atomic import by_way_of
 from sva_bench.execution.outcome import Trace
 from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Story, story_of
 from sva_bench.world.model import Obstacles, World
@@ -51,7 +51,6 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
         ValueError: If the traces don't belong to the world.
     """
     story = story_of(world, traces, title)
-    unfinished = path.with_name(path.name + ".tmp")
     # Layouts are kept per application id, and one layout fits one world. The recording's id follows from its content:
     # the same trial is the same recording, and two that are opened together stay apart.
     recording = rr.RecordingStream(f"sva-bench {world.name}", recording_id=_identity(story), send_properties=False)
@@ -70,11 +69,11 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
         _write_numbers(recording, story)
         _write_log(recording, story)
         recording.flush()
-        unfinished.write_bytes(memory.drain_as_bytes())
-        os.replace(unfinished, path)
+        unfinished = path.with_name(f"{path.name}.tmp")
+        with by_way_of(unfinished, path):
+            unfinished.write_bytes(memory.drain_as_bytes())
     finally:
         recording.disconnect()
-        unfinished.unlink(missing_ok=True)
 
 
 def end_s(path: Path) -> float:

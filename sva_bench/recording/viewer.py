@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
+from sva_bench.atomic import write_file
 from sva_bench.errors import BadFile, BadInput, ExitCode, SvaBenchError
 
 LAVAPIPE = Path("/usr/share/vulkan/icd.d/lvp_icd.x86_64.json")  # Mesa's Vulkan driver that needs no graphics card
@@ -97,7 +98,8 @@ def recordings_of(path: Path) -> tuple[Path, ...]:
         files = sorted((path / "recordings").glob("*.rrd"))
         if not files:
             raise BadInput(f"{path} holds no recordings/*.rrd: name a run folder or an .rrd file")
-        return tuple(sorted(files, key=lambda file: not file.stem.endswith("-stochastic")))
+        # Plans from elsewhere may be called anything: theirs have a '+' in the name.
+        return tuple(sorted(files, key=lambda file: "+" in file.stem or not file.stem.endswith("-stochastic")))
     if not path.exists():
         raise BadInput(f"there is no {path}: name a run folder or an .rrd file")
     if path.suffix != ".rrd":
@@ -158,7 +160,7 @@ def _picture(path: Path, picture: Path, at_s: float | None) -> None:
             if any(complaint in words for complaint in _NOTHING_TO_DRAW_WITH):
                 raise NoVulkanDriver from error
             raise ViewerFailed(words.split("stack backtrace")[0].strip()[:500] or str(error)) from error
-        shutil.move(unfinished, picture)
+        write_file(picture, unfinished.read_bytes(), "choose another place with --screenshot")
 
 
 def _show(files: Sequence[Path], *, web: bool) -> None:

@@ -1,0 +1,42 @@
+"""Usage lines as a user types them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+
+class PlainCommand(TyperCommand):
+    """A command whose arguments stand in its usage line by their names alone: ``execute [OPTIONS] WORLD PLAN...``."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """The words of the usage line after the command's name."""
+        pieces = [self.options_metavar] if self.options_metavar else []
+        arguments = [given for given in self.get_params(ctx) if given.param_type_name == "argument"]
+        return [*pieces, *(given.metavar or str(given.name) for given in arguments)]
+
+
+class _NameOfTheGroup(typer.Context):
+    """The group's words are the command's: nobody types its own."""
+
+    @property
+    def command_path(self) -> str:
+        """What is typed before the arguments."""
+        return self.parent.command_path if self.parent is not None else super().command_path
+
+
+class UnnamedCommand(PlainCommand):
+    """The command that a group stands for where none is named."""
+
+    context_class = _NameOfTheGroup
+
+
+class WorldsFirst(TyperGroup):
+    """``batch WORLD...`` is ``batch over WORLD...``: what is no command is a world."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the command's name where it is left out."""
+        known = args and args[0] in self.commands
+        return super().parse_args(ctx, args if known else ["over", *args])
