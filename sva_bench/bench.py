@@ -88,8 +88,6 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
         costs = plan_costs(world, options.planner, progress)
     with clock.phase("planning"):
         planned = plan_scenarios(world, costs, options, progress)
-    if any(plan.status == "interrupted" for p in planned.values() for plan in p.all_plans()):
-        raise KeyboardInterrupt
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios for name, plan in (
         ("stochastic", planned[scenario.name].stochastic), ("deterministic", planned[scenario.name].deterministic))]
     if model_is_executed(world):  # what the VSS would be against the least fortunate of the tied plans

@@ -11,7 +11,7 @@ from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.mission.instance import Instance
-from sva_bench.mission.plan import Plan
+from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.solver.outcomes import possible
 from sva_bench.solver.two_stage import MOST_SUBSETS, Knowledge, SolveLimits, plan_stochastic
 from sva_bench.world.model import Scenario
@@ -52,7 +52,7 @@ def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, 
     for available in sets:
         sure = replace(instance, joint=None, failure="mission", vehicles=tuple(
             replace(v, availability=1.0 if v.name in available else 0.0) for v in instance.vehicles))
-        plans[available] = plan_stochastic(sure, limits, known=known)
+        plans[available] = unless_interrupted(plan_stochastic(sure, limits, known=known))
     return InformedPlans(plans=plans, expected=sum(sets[s] * (plan.value or 0.0) for s, plan in plans.items()))
 
 

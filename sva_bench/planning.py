@@ -16,7 +16,7 @@ from sva_bench.execution.execute import Fidelity
 from sva_bench.informed import InformedPlans, plan_informed
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.mission.plan import Plan, read_plan
+from sva_bench.mission.plan import Plan, read_plan, unless_interrupted
 from sva_bench.precision import Precision
 from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.two_stage import (
@@ -120,6 +120,7 @@ def plan_scenarios(
 
     Raises:
         BadInput: If the informed planner is asked for where nothing can be known beforehand.
+        KeyboardInterrupt: On Ctrl-C; there is no use for some of the plans.
     """
     if options.informed and not model_is_executed(world):
         raise BadInput("the informed planner knows who is available for a mission; with failures along the route there "
@@ -132,15 +133,16 @@ def plan_scenarios(
         instance = replace(instance_of(world, costs, scenario), failure="mission")
         if known is None or nominal is None:
             known = knowledge_of(instance)
-            nominal = plan_nominal(instance, options.limits, known=known)
-        stochastic = plan_stochastic(instance, options.limits, known=known)
+            nominal = unless_interrupted(plan_nominal(instance, options.limits, known=known))
+        stochastic = unless_interrupted(plan_stochastic(instance, options.limits, known=known))
         pair = plan_deterministic(instance, stochastic, options.limits, nominal=nominal, known=known)
+        unless_interrupted(pair.plan)
         rp = expected_value(instance, pair.stochastic)
         foresight = wait_and_see(instance, options.limits, known, force=options.evpi)
         process = by_process = None
         if options.assumptions or "per_leg" in (world.plan_failure, world.execute_failure):
             along = replace(instance, failure="per_leg")
-            best = plan_stochastic(along, options.limits, pair.stochastic, known)
+            best = unless_interrupted(plan_stochastic(along, options.limits, pair.stochastic, known))
             by_process = PlansByProcess(instance=instance, deterministic=pair.plan,
                                         stochastic={"mission": pair.stochastic, "per_leg": best})
             process = max(expected_value(along, best) - expected_value(along, pair.stochastic), 0.0)

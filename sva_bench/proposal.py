@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadInput
 from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.mission.plan import unless_interrupted
 from sva_bench.robot.model import USUAL_MODEL
 from sva_bench.seeds import Stream, rng_for
 from sva_bench.solver.heuristic import Orders, search
@@ -181,7 +182,7 @@ def _trivial(instance: Instance) -> bool:
         either_way = np.minimum(vehicle.fuel_s, vehicle.fuel_s.T)[np.ix_(stops, stops)]
         if minimum_spanning_tree(either_way).sum() > vehicle.mission_limit_s:
             return False
-    nominal = plan_nominal(instance, SolveLimits(gap=_PROOF))
+    nominal = unless_interrupted(plan_nominal(instance, SolveLimits(gap=_PROOF)))
     return nominal.bound is None or nominal.bound >= float(most.sum()) * (1 - 1e-6)
 
 

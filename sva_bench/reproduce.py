@@ -22,6 +22,7 @@ from sva_bench.execution.execute import Case, Drives, Settings, execute
 from sva_bench.mission.failures import FailureProcess
 from sva_bench.mission.generate import random_instance
 from sva_bench.mission.instance import Instance
+from sva_bench.mission.plan import unless_interrupted
 from sva_bench.planning import NOMINAL, Options, Progress, plan_costs, plan_scenarios
 from sva_bench.safe_path import environment_of_children
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_deterministic, plan_nominal, plan_stochastic
@@ -73,9 +74,10 @@ def rewards(sizes: Sequence[int] = (10, 20), seeds: Sequence[int] = _SEEDS, prog
             instance = three_vehicles(pois, availability, seed)
             if known is None or nominal is None:
                 known = knowledge_of(instance)
-                nominal = plan_nominal(instance, SolveLimits(), known=known)
-            stochastic = plan_stochastic(instance, SolveLimits(), known=known)
+                nominal = unless_interrupted(plan_nominal(instance, SolveLimits(), known=known))
+            stochastic = unless_interrupted(plan_stochastic(instance, SolveLimits(), known=known))
             pair = plan_deterministic(instance, stochastic, SolveLimits(), nominal=nominal, known=known)
+            unless_interrupted(pair.plan)
             best = expected_value(instance, pair.stochastic)
             sites = instance.sites
             by_vehicle = tuple(v.availability * float(sum(v.incentives[sites.index(s)] for s in pair.stochastic.route(

@@ -145,6 +145,12 @@ def drafts_in(folder: Path) -> list[str]:
     return sorted(name for name in files_of(folder) if name.endswith((".tmp", ".old")))
 
 
+def is_there(result: Path) -> bool:
+    """Whether there is a result: a file, or a folder that holds more than drafts."""
+    return result.is_file() or (result.is_dir() and any(path.suffix not in (".tmp", ".old")
+                                                        for path in result.iterdir()))
+
+
 @dataclass(frozen=True)
 class Undisturbed:
     folder: Path
@@ -194,7 +200,7 @@ def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
                 assert time.monotonic() - at < HANGING_S, what
         assert gone(process.pid) == [], what
         assert drafts_in(folder) == [], what
-        there = there or (folder / command.result).exists()
+        there = there or is_there(folder / command.result)
         if there and (process.returncode == 0 or name != "batch"):
             assert command.whole(folder, alone.folder), what
     finish(command, folder, alone)
@@ -210,13 +216,11 @@ def test_a_kill_at_any_moment_leaves_a_whole_result_or_none_and_blocks_nothing(
     for number, moment in enumerate(moments(draw, count, alone.seconds)):
         process = start(command, folder)
         await_moment(process, moment)
-        process.kill()
+        os.kill(process.pid, signal.SIGKILL)  # not by Popen, which would look whether it has ended, and wait for it
         said, _ = end_of(process)
         what = f"moment {number} ({moment:.3f} s): {said}"
         assert gone(process.pid) == [], what
-        left = folder / command.result
-        drafts = {folder / draft for draft in drafts_in(folder)}
-        if left.exists() and not (left.is_dir() and set(left.iterdir()) <= drafts):
+        if is_there(folder / command.result):
             whole = folder.with_name("whole")
             subprocess.run(["cp", "-r", str(folder), str(whole)], check=True)
             for draft in drafts_in(whole):

@@ -64,6 +64,17 @@ class Plan:
         return all(self.route(robot) == other.route(robot) for robot in {*self.routes, *other.routes})
 
 
+def unless_interrupted(plan: Plan) -> Plan:
+    """The plan; but if Ctrl-C ended its solve early, that goes on, for whom such a plan is of no use.
+
+    Raises:
+        KeyboardInterrupt: If the plan is the best until Ctrl-C.
+    """
+    if plan.status == "interrupted":
+        raise KeyboardInterrupt
+    return plan
+
+
 class _PlanFile(Section):
     format: Literal["sva-bench/plan@1"]
     routes: dict[Name, list[Name]]

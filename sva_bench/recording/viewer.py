@@ -142,8 +142,8 @@ def _picture(path: Path, picture: Path, at_s: float | None) -> None:
         raise BadInput(f"there is no folder {picture.resolve().parent} for the picture")
     if picture.suffix.lower() != ".png":
         raise BadInput(f"{picture} is no name for a picture: let it end in .png")
-    environment = {**drawing_environment(os.environ), "RUST_LOG": "error"}  # notices would cover the picture
     verify(path)
+    environment = {**drawing_environment(os.environ), "RUST_LOG": "error"}  # notices would cover the picture
     from sva_bench.recording import rerun  # takes half a second to import: only once it is needed
 
     port = _free_port()

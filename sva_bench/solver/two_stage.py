@@ -218,6 +218,8 @@ def wait_and_see(
     for available, probability in outcomes.items():
         there = np.array([v.name in available for v in instance.vehicles], dtype=np.float64)
         solution = _greatest(own, there, known, clock, limits.gap)
+        if solution.status == "interrupted":
+            raise KeyboardInterrupt
         if solution.status != "optimal":
             _log.warning("instance %s: no proof for the outcome in which %s are available; the value of perfect "
                          "information stays open", instance.name, ", ".join(sorted(available)) or "no vehicles")
