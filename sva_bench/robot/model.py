@@ -68,10 +68,10 @@ class RobotModel:
         Each wheel bears half the weight, less what braking puts on the casters, and gives half of the force along and
         its share of the moment about the vertical axis; in a curve the turn rate may change at twice the limit.
         """
-        along = self.acceleration_m_s2 / 2
+        grip = _GRIP * _GRAVITY_M_S2 / 2
+        lifted = _GRIP * self.wheel_radius_m / (CASTERS_AT * self.radius_m) / 2  # per acceleration along
+        along = (0.5 + lifted) * self.acceleration_m_s2
         about = 2 * self.turn_inertia_m2 * self.turn_acceleration_rad_s2 / self.track_m
-        lifted = self.acceleration_m_s2 * self.wheel_radius_m / (CASTERS_AT * self.radius_m)
-        grip = _GRIP * max(_GRAVITY_M_S2 - lifted, 0.0) / 2
         if along + about > grip:
             key, most = ("acceleration_m_s2", self.acceleration_m_s2) if along > about else (
                 "turn_acceleration_rad_s2", self.turn_acceleration_rad_s2)

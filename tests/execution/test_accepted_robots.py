@@ -113,6 +113,7 @@ def with_figures(**changed: float) -> str:
 
 @pytest.mark.parametrize(("changed", "said"), [
     ({"acceleration_m_s2": 15}, "acceleration_m_s2 asks for most of it"),
+    ({"acceleration_m_s2": 20, "wheel_radius_m": 0.07}, "acceleration_m_s2 asks for most of it"),  # it lifts its wheels
     ({"turn_acceleration_rad_s2": 90}, "turn_acceleration_rad_s2 asks for most of it"),
     ({"track_m": 0.06}, "too narrow for a hull of radius 0.177 m"),
 ])
