@@ -80,7 +80,9 @@ class Proposal:
             else "Better equipped robots earn more, when they are there."}
 
 
-def propose_mission(sites: Sequence[Site], fuel_s: FloatArray, *, robots: int, seed: int) -> Proposal:
+def propose_mission(
+    sites: Sequence[Site], fuel_s: FloatArray, *, robots: int, seed: int, key: tuple[int, ...]
+) -> Proposal:
     """A mission for sites that are given, all robots alike.
 
     Half of the robots, rounded down, are uncertain and earn up to 170 at every POI; the others are certain and earn up
@@ -92,6 +94,7 @@ def propose_mission(sites: Sequence[Site], fuel_s: FloatArray, *, robots: int, s
         fuel_s: Planning cost from site to site [s], shape (n, n).
         robots: Number of robots.
         seed: Seed of the incentives.
+        key: What else they depend on: another world's are independent of these.
 
     Raises:
         BadInput: If there are too few robots or POIs for a choice.
@@ -106,7 +109,9 @@ def propose_mission(sites: Sequence[Site], fuel_s: FloatArray, *, robots: int, s
     names, certain = tuple(f"uv{k + 1}" for k in range(robots)), robots - robots // 2
     first: Proposal | None = None
     for draw in range(_DRAWS):
-        incentives = tuple(_incentives(pois, m < certain, seed, draw, m) for m in range(robots))
+        incentives = tuple(
+            _incentives(pois, m < certain, rng_for(seed, Stream.PROPOSED_MISSION, *key, draw, m))
+            for m in range(robots))
         free = Proposal(robots=names, certain=certain, fuel_capacity_s=math.inf, mission_limit_s=math.inf,
                         incentives=incentives)
         proposal = _limited(free, sites, fuel_s)
@@ -124,8 +129,7 @@ def propose_mission(sites: Sequence[Site], fuel_s: FloatArray, *, robots: int, s
     return first
 
 
-def _incentives(pois: Sequence[str], certain: bool, seed: int, draw: int, robot: int) -> dict[str, int]:
-    rng = rng_for(seed, Stream.PROPOSED_MISSION, draw, robot)
+def _incentives(pois: Sequence[str], certain: bool, rng: np.random.Generator) -> dict[str, int]:
     values = rng.integers(1, MOST_INCENTIVE[certain] + 1, size=len(pois))
     if certain:
         values[rng.permutation(len(pois))[: len(pois) // 2]] = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from enum import IntEnum
 
 import numpy as np
@@ -29,6 +30,16 @@ def seed_for(root: int, stream: Stream, *index: int) -> np.random.SeedSequence:
 def rng_for(root: int, stream: Stream, *index: int) -> np.random.Generator:
     """A generator for one purpose and item."""
     return np.random.default_rng(seed_for(root, stream, *index))
+
+
+def key_of(*parts: str | bytes) -> tuple[int, ...]:
+    """Index of a stream for one thing, by what it consists of: what differs in anything has a stream of its own."""
+    digest = hashlib.sha256()
+    for part in parts:
+        content = part.encode() if isinstance(part, str) else part
+        digest.update(len(content).to_bytes(8, "big") + content)  # "ab", "c" is not "a", "bc"
+    words = np.frombuffer(digest.digest()[:16], dtype=">u4")
+    return tuple(int(word) for word in words)
 
 
 def uniforms(root: int, stream: Stream, *index: int, first: int = 0, count: int) -> FloatArray:

@@ -15,6 +15,7 @@ from sva_bench.documents import NAME, Loc, parse_yaml, pretty_yaml
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.robot.model import BUILT_IN, USUAL_MODEL
+from sva_bench.seeds import key_of
 from sva_bench.world.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
 from sva_bench.world.clearance import clearance
 from sva_bench.world.generate import DENSITY, Family, random_places, random_terrain
@@ -120,7 +121,7 @@ def world_from_map(
         if base is not None and clearance(obstacles, *base) < radius:
             raise NoRoom("base", 0, 0.0)
         places, spacing = find_places(field_of(obstacles), base=base, radius_m=radius, stations=stations, pois=pois,
-                                      spacing_m=spacing_m, seed=seed)
+                                      spacing_m=spacing_m, seed=seed, key=obstacles.key())
     except NoRoom as error:
         where = "at the base" if error.kind == "base" and base else "on this map"
         said = f"there is no room {where}" if error.kind == "base" else str(error)
@@ -186,7 +187,9 @@ def with_mission(
     bare = world_of(parse_yaml(pretty_yaml({**head, "robots": {"uv1": robot}}, {}), path))
     (costs,) = plan_costs(bare, "prmstar", progress).values()
     progress("choosing a mission", 0, 1)
-    proposal = propose_mission(bare.sites, costs.cost_s, robots=robots, seed=seed)
+    places = key_of(*(f"{site.kind} {site.x_m!r} {site.y_m!r}" for site in bare.sites))
+    proposal = propose_mission(bare.sites, costs.cost_s, robots=robots, seed=seed,
+                               key=(*bare.obstacles.key(), *places))
     progress("choosing a mission", 1, 1)
     text = pretty_yaml(
         {**head, **proposal.sections(), "failure": "mission", "margin": bare.margin,

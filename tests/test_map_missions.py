@@ -61,6 +61,22 @@ def test_a_map_becomes_a_world_that_stands_by_itself(tmp_path: Path) -> None:
     assert 0.3 * everything < expected_value(planned["S1"].instance, planned["S1"].stochastic) < everything
 
 
+def test_another_map_of_the_same_size_has_other_places_and_incentives_from_a_seed(tmp_path: Path) -> None:
+    # One wall cell has moved: as many places are free as before, so that the same numbers would choose the same ones.
+    moved = ROOMS.replace("?#.............#\n?#.......#.....#\n?####", "?#.......#.....#\n?#.............#\n?####")
+    assert moved != ROOMS
+    worlds = []
+    for number, cells in enumerate((ROOMS, moved)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        write_ros_map(folder, cells)
+        assert from_map(folder / "map.yaml", *FEW, "-o", folder / "w.yaml") == 0
+        worlds.append(load_world(folder / "w.yaml"))
+    one, other = ({(site.x_m, site.y_m) for site in world.pois} for world in worlds)
+    assert len(one & other) <= 2
+    assert all(a.incentives != b.incentives for a, b in zip(worlds[0].robots, worlds[1].robots, strict=True))
+
+
 def test_the_base_may_be_chosen(tmp_path: Path) -> None:
     write_ros_map(tmp_path, ROOMS)
     arguments = (tmp_path / "map.yaml", *FEW, "-o", tmp_path / "rooms.yaml", "--base", 7.0, 0.9, "--min-spacing", 0.7)

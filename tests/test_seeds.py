@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import hashlib
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from sva_bench.seeds import Stream, rng_for, seed_for, uniforms
+from sva_bench.seeds import Stream, key_of, rng_for, seed_for, uniforms
 
 roots = st.integers(0, 2**64)
 counts = st.integers(0, 40)
@@ -58,3 +60,12 @@ def test_each_purpose_keeps_its_number() -> None:
 def test_a_negative_root_is_refused() -> None:
     with pytest.raises(ValueError, match="non-negative"):
         uniforms(-1, Stream.FAILURE, count=1)
+
+
+def test_a_key_by_content_is_the_same_everywhere_and_another_for_other_content() -> None:
+    # The first four words of SHA-256 over each part's length in eight bytes and the part itself.
+    content = b"".join(len(part).to_bytes(8, "big") + part for part in (b"rooms", b"18.0"))
+    digest = hashlib.sha256(content).hexdigest()
+    assert key_of("rooms", b"18.0") == tuple(int(digest[k:k + 8], 16) for k in (0, 8, 16, 24))
+    keys = [key_of(), key_of(""), key_of("ab", "c"), key_of("a", "bc"), key_of("abc"), key_of("abc", "")]
+    assert len(set(keys)) == len(keys)

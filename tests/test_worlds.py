@@ -19,9 +19,9 @@ from sva_bench.proposal import SCENARIOS, propose_mission
 from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.two_stage import knowledge_of, plan_nominal
 from sva_bench.tally import expected_value
-from sva_bench.world.generate import Family
+from sva_bench.world.generate import Family, random_places
 from sva_bench.world.load import world_of
-from sva_bench.world.model import Site, World
+from sva_bench.world.model import Obstacles, Site, World
 from sva_bench.worlds import random_world
 from tests.test_cli import sva_bench
 
@@ -94,7 +94,7 @@ def line_of_sites(pois: int, stations: int = 1) -> tuple[list[Site], np.ndarray]
 
 def test_limits_let_a_team_collect_much_but_not_all() -> None:
     sites, fuel = line_of_sites(8)
-    mission = propose_mission(sites, fuel, robots=3, seed=0)
+    mission = propose_mission(sites, fuel, robots=3, seed=0, key=())
     assert (mission.robots, mission.certain) == (("uv1", "uv2", "uv3"), 2)
     # The remotest POI is 90 s away: 180 s there and back would pass all others on the way.
     assert mission.mission_limit_s < 180
@@ -108,7 +108,7 @@ def test_limits_let_a_team_collect_much_but_not_all() -> None:
 def test_a_filling_lasts_for_the_way_to_the_remotest_poi_and_back_to_a_station() -> None:
     sites, fuel = line_of_sites(8, stations=0)
     fuel = fuel / 10 + 100 * (fuel > 0)  # about 100 s between any two: half the limit would not do
-    mission = propose_mission(sites, fuel, robots=2, seed=0)
+    mission = propose_mission(sites, fuel, robots=2, seed=0, key=())
     assert mission.fuel_capacity_s >= 200
     assert math.isfinite(mission.mission_limit_s)
 
@@ -117,7 +117,7 @@ def test_a_filling_lasts_for_the_way_to_the_remotest_poi_and_back_to_a_station()
 def test_too_few_robots_or_pois_leave_nothing_to_decide(pois: int, robots: int) -> None:
     sites, fuel = line_of_sites(pois)
     with pytest.raises(BadInput, match=f"{robots} robots and {pois} POIs leave nothing to decide"):
-        propose_mission(sites, fuel, robots=robots, seed=0)
+        propose_mission(sites, fuel, robots=robots, seed=0, key=())
 
 
 def test_the_command_writes_a_file_that_check_calls_good(tmp_path: Path) -> None:
@@ -168,3 +168,38 @@ def test_random_worlds_run(family: Family, tmp_path: Path) -> None:
     (tmp_path / "w.yaml").write_text(text_of(family, 5))
     done = sva_bench("run", "w.yaml", "--fidelity", "kinematic", "--trials", 100, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def earned(text: str) -> np.ndarray:
+    """What each robot of a world earns at each POI, shape (robots, POIs)."""
+    world = resolved(text)
+    return np.array([[robot.incentives.get(poi.name, 0.0) for poi in world.pois] for robot in world.robots])
+
+
+def test_worlds_of_one_seed_are_independent_samples() -> None:
+    # Families, sizes, densities and numbers of sites that used to draw the very same incentives from a seed.
+    texts = [text_of(family, 5) for family in FAMILIES]
+    texts += [text_of("field", 5, size_m=14), text_of("field", 5, density=0.06), text_of("field", 5, stations=1)]
+    drawn = [earned(text) for text in texts]
+    assert len({values[1].tobytes() for values in drawn}) == len(drawn)
+    assert len({values[0].tobytes() for values in drawn}) == len(drawn)
+    # 21 pairs of six uniforms each: their correlation is 0, its standard deviation 1 / sqrt(21 x 5) = 0.1.
+    pairs = [np.corrcoef(a[1], b[1])[0, 1] for k, a in enumerate(drawn) for b in drawn[:k]]
+    assert abs(np.mean(pairs)) < 0.4
+
+
+def test_the_same_room_with_another_post_draws_other_sites() -> None:
+    def ground(x: float) -> Obstacles:
+        return Obstacles(bounds_m=np.array([0.0, 0, 12, 12]), boxes=np.empty((0, 5)),
+                         cylinders=np.array([[x, 6.0, 0.2]]))
+
+    one, again, other = (random_places(ground(x), stations=2, pois=6, seed=0) for x in (6.0, 6.0, 6.1))
+    assert one == again
+    assert not set(one.pois) & set(other.pois)
+
+
+def test_missions_for_the_same_sites_on_other_ground_earn_otherwise() -> None:
+    sites, fuel = line_of_sites(8)
+    one, again, other = (propose_mission(sites, fuel, robots=3, seed=0, key=key) for key in ((1, 2), (1, 2), (1, 3)))
+    assert one.incentives == again.incentives
+    assert all(a != b for a, b in zip(one.incentives, other.incentives, strict=True))

@@ -16,7 +16,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
-from sva_bench.robot.model import RobotModel
+from sva_bench.robot.model import CASTERS_AT, RobotModel
 from sva_bench.robot.twin import patience_steps
 from sva_bench.world.model import Obstacles
 
@@ -49,6 +49,7 @@ PHYSICS_HZ = 120.0
 _SUBSTEPS = round(PHYSICS_HZ / CONTROL_HZ)
 _ITERATIONS = 50
 _RESIDUAL = 1e-4  # ends the iterations early: 1.6 times faster; leg times keep within 0.6 % of the twin
+_WHEEL_RAD_S, _WHEEL_RAD_S2 = 5.0, 7.0  # slower or more slowly accelerated wheels don't bear that residual [rad2/s2]
 _WALL_M = 0.2  # thickness of the walls about the bounds; nothing is seen of it
 _HEIGHT_M = 0.5  # of all obstacles; taller than any robot's hull
 _CASTER_GAP_M = 0.001  # casters touch the floor only when the hull tilts, so the weight rests on the driven wheels
@@ -56,6 +57,7 @@ _WHEEL_FRICTION = 1.0  # rubber on a hard floor
 _MOTOR_G = 3.0  # motor torque, in multiples of what accelerates the robot as its limits allow
 _STUCK_CHECK_S = 10.0  # a robot that hardly moves or turns for so long is stuck
 _STUCK_M, _STUCK_RAD = 0.02, 0.05
+_STUCK_DRIVING = 0.5  # share of the time between two checks spent on the way from which on only progress counts
 
 
 class Simulator:
@@ -76,7 +78,7 @@ class Simulator:
         try:
             pybullet.setPhysicsEngineParameter(
                 fixedTimeStep=1.0 / CONTROL_HZ, numSubSteps=_SUBSTEPS, numSolverIterations=_ITERATIONS,
-                solverResidualThreshold=_RESIDUAL, deterministicOverlappingPairs=1, physicsClientId=self._client)
+                solverResidualThreshold=_residual(model), deterministicOverlappingPairs=1, physicsClientId=self._client)
             pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
             with _quiet():
                 self._build_world(obstacles)
@@ -108,7 +110,7 @@ class Simulator:
         model, client = self._model, self._client
         wheel, hull = model.wheel_radius_m, 1.5 * model.wheel_radius_m
         caster = wheel / 2
-        reach = 0.75 * model.radius_m
+        reach = CASTERS_AT * model.radius_m
         base = pybullet.createCollisionShapeArray(
             shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_SPHERE, pybullet.GEOM_SPHERE],
             radii=[model.radius_m, caster, caster], lengths=[2 * hull, 0, 0], halfExtents=[[0, 0, 0]] * 3,
@@ -149,12 +151,12 @@ class Simulator:
         """
         model, client, body = self._model, self._client, self._body
         limits, dt, radius, half = model.limits, 1.0 / CONTROL_HZ, model.wheel_radius_m, model.track_m / 2
-        torque = _MOTOR_G * model.mass_kg * model.acceleration_m_s2 * radius
+        torque = motor_torque(model)
         left_gain, right_gain = self._gains
         check = round(_STUCK_CHECK_S * CONTROL_HZ)
         total = 0
         for stretch in course:
-            state, since_yaw, since_s = new_state(), self.pose()[2], 0.0
+            state, since_yaw, since_s, driving = new_state(), self.pose()[2], 0.0, 0
             for step in range(1, patience_steps(stretch, model) + 1):
                 x, y, yaw = self.pose()
                 speed, rate = control(stretch.path, stretch.arc, stretch.heading_rad, limits, state, x, y, yaw, dt)
@@ -166,17 +168,35 @@ class Simulator:
                                       (speed + half * rate) * right_gain / radius))
                 pybullet.stepSimulation(physicsClientId=client)
                 total += 1
+                driving += state[0] == DRIVE
                 if poses is not None:
                     poses.append(self.pose())
                 if step % check == 0:
                     # On the way only progress along the path counts: a robot that pushes a wall sways and slides.
+                    # One that has turned for nearly all of the time has not had any to make progress.
                     turned = abs(math.remainder(yaw - since_yaw, 2 * math.pi)) >= _STUCK_RAD
-                    if state[1] - since_s < _STUCK_M and (state[0] == DRIVE or not turned):
+                    on_the_way = state[0] == DRIVE and driving >= _STUCK_DRIVING * check
+                    if state[1] - since_s < _STUCK_M and (on_the_way or not turned):
                         return total * dt, False
-                    since_yaw, since_s = yaw, float(state[1])
+                    since_yaw, since_s, driving = yaw, float(state[1]), 0
             else:
                 return total * dt, False
         return total * dt, True
+
+
+def motor_torque(model: RobotModel) -> float:
+    """Greatest torque of a wheel's motor [Nm]: several times what the robot's limits ask for, driving or turning."""
+    turning = model.turn_inertia_m2 * model.turn_acceleration_rad_s2 / model.track_m
+    force = max(model.acceleration_m_s2, model.acceleration_m_s2 / 2 + turning)  # of each wheel, per mass [m/s2]
+    return _MOTOR_G * model.mass_kg * force * model.wheel_radius_m
+
+
+def _residual(model: RobotModel) -> float:
+    """Residual at which the solver's iterations may end: less where wheels are so slow that it would show."""
+    turning = model.track_m / 2
+    speed = min(model.followed_speed_m_s, model.max_turn_rad_s * turning) / model.wheel_radius_m
+    acceleration = min(model.acceleration_m_s2, model.turn_acceleration_rad_s2 * turning) / model.wheel_radius_m
+    return _RESIDUAL * min(speed / _WHEEL_RAD_S, acceleration / _WHEEL_RAD_S2, 1.0) ** 2
 
 
 def obstacles_urdf(obstacles: Obstacles) -> str:

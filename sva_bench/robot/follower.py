@@ -19,13 +19,14 @@ import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray
+from sva_bench.robot.model import LOOKAHEAD_M
 
 CONTROL_HZ = 60.0
 
 TURN_TO_PATH, DRIVE, TURN_TO_HEADING, ARRIVED = 0.0, 1.0, 2.0, 3.0
 
-_LOOKAHEAD_M = 0.25  # shorter oscillates at 24 Hz, longer cuts corners by more than the planning margin forgives
 _LATERAL_M_S2 = 0.5  # lateral acceleration in curves: slows the robot where the path bends
+_STEERED = 0.7  # share of the turn acceleration that a curve may ask for: what speed a robot that turns slowly keeps
 _CORNER_RAD = 0.6  # a path that bends by more at a vertex is stopped at there and turned in place
 _ASTRAY_RAD = 1.4  # a lookahead point further aside than any path without corners brings it: turn to it first
 _ALIGNED_RAD = 0.02  # heading error at which a turn in place is over
@@ -169,14 +170,14 @@ def control(
         phase = TURN_TO_HEADING
     if phase in (TURN_TO_PATH, DRIVE):
         s = _nearest_arc(path, arc, s, x, y)
-        ahead_x, ahead_y = _point_at(path, arc, min(s + _LOOKAHEAD_M, end))
+        ahead_x, ahead_y = _point_at(path, arc, min(s + LOOKAHEAD_M, end))
         aside = wrap(math.atan2(ahead_y - y, ahead_x - x) - yaw)
         left = end - s
         if left < _REACHED_M:
             phase = TURN_TO_HEADING
         elif phase == TURN_TO_PATH and abs(aside) < _ALIGNED_RAD:
             phase = DRIVE
-        elif phase == DRIVE and abs(aside) > _ASTRAY_RAD and left > _LOOKAHEAD_M / 2:
+        elif phase == DRIVE and abs(aside) > _ASTRAY_RAD and left > LOOKAHEAD_M / 2:
             phase = TURN_TO_PATH
     if phase == TURN_TO_PATH:
         speed = _towards(speed, 0.0, limits[2] * dt)
@@ -186,7 +187,9 @@ def control(
         curvature = 2.0 * math.sin(aside) / distance
         bend = max(abs(curvature), 1e-9)
         remaining = max(left - 0.5 * speed * dt, 0.0)
-        wanted = min(limits[0], math.sqrt(2.0 * _BRAKING * limits[2] * remaining), math.sqrt(_LATERAL_M_S2 / bend),
+        # A curve comes up over the lookahead, in which the robot must get from no turn rate to the curve's.
+        lateral = min(_LATERAL_M_S2, _STEERED * limits[3] * LOOKAHEAD_M)
+        wanted = min(limits[0], math.sqrt(2.0 * _BRAKING * limits[2] * remaining), math.sqrt(lateral / bend),
                      limits[1] / bend)
         wanted = min(max(wanted, min(_CREEP_M_S, limits[0])), left / dt)
         speed = _towards(speed, wanted, limits[2] * dt)

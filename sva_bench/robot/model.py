@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+
+LOOKAHEAD_M = 0.25
+"""How far ahead on its path a robot looks; shorter oscillates, longer cuts corners by more than the planning margin."""
+
+_STEERING = 0.3  # least turn acceleration x (time over the lookahead)^2 [rad]: with less it sways about its path
+_BRAKING_LOOKAHEADS = 2.0  # way in which a robot must come to rest, in lookaheads: a bend may come up only there
+_GRAVITY_M_S2 = 9.81
+_GRIP = 0.5  # share of the wheels' grip that the accelerations may ask for: speeds change by jerks, twice as fast
+CASTERS_AT = 0.75
+"""Where the casters are, before and behind the middle, in radii of the hull."""
+_HULL_SHARE, _WHEELS_SHARE = 0.9, 0.1  # of the mass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +57,49 @@ class RobotModel:
         if self.wheel_radius_m * 2.5 > self.radius_m:
             raise ValueError(f"wheels of radius {self.wheel_radius_m} m are too large for a hull of radius "
                              f"{self.radius_m} m; at most 0.4 of it")
+        if self.track_m < self.radius_m / 2:
+            raise ValueError(f"a track of {self.track_m} m is too narrow for a hull of radius {self.radius_m} m: it "
+                             "would sway about its wheels and not turn by what they do; at least half the radius")
+        self._check_grip()
+
+    def _check_grip(self) -> None:
+        """Refuse accelerations at which the wheels would slip: the robot would fall behind its figures.
+
+        Each wheel bears half the weight, less what braking puts on the casters, and gives half of the force along and
+        its share of the moment about the vertical axis; in a curve the turn rate may change at twice the limit.
+        """
+        grip = _GRIP * _GRAVITY_M_S2 / 2
+        lifted = _GRIP * self.wheel_radius_m / (CASTERS_AT * self.radius_m) / 2  # per acceleration along
+        along = (0.5 + lifted) * self.acceleration_m_s2
+        about = 2 * self.turn_inertia_m2 * self.turn_acceleration_rad_s2 / self.track_m
+        if along + about > grip:
+            key, most = ("acceleration_m_s2", self.acceleration_m_s2) if along > about else (
+                "turn_acceleration_rad_s2", self.turn_acceleration_rad_s2)
+            raise ValueError(f"the wheels would slip: driving and turning at these accelerations take "
+                             f"{(along + about) / grip:.1f} times the grip that the wheels can count on; {key} asks "
+                             f"for most of it: lower it from {most:g}")
 
     @property
     def limits(self) -> FloatArray:
-        """Speed [m/s], turn rate [rad/s], acceleration [m/s2], angular acceleration [rad/s2], for compiled code."""
-        return np.array([self.max_speed_m_s, self.max_turn_rad_s, self.acceleration_m_s2,
+        """Speed [m/s], turn rate [rad/s], acceleration [m/s2], angular acceleration [rad/s2] to drive at, compiled."""
+        return np.array([self.followed_speed_m_s, self.max_turn_rad_s, self.acceleration_m_s2,
                          self.turn_acceleration_rad_s2])
+
+    @property
+    def followed_speed_m_s(self) -> float:
+        """Fastest that it keeps to its path: it must steer and brake for what comes up within its lookahead.
+
+        Beyond it a robot sways about its path or overshoots bends, and no prediction of its times holds.
+        """
+        steered = LOOKAHEAD_M * math.sqrt(self.turn_acceleration_rad_s2 / _STEERING)
+        braked = math.sqrt(2 * self.acceleration_m_s2 * _BRAKING_LOOKAHEADS * LOOKAHEAD_M)
+        return min(self.max_speed_m_s, steered, braked)
+
+    @property
+    def turn_inertia_m2(self) -> float:
+        """Moment of inertia about the vertical axis per mass [m2], as physics builds the robot."""
+        # Physics takes a hull for the square about it: (2 r)^2 / 6.
+        return _HULL_SHARE * self.radius_m**2 * 2 / 3 + _WHEELS_SHARE * (self.track_m / 2) ** 2
 
     def figures(self) -> dict[str, float | str]:
         """All figures by name."""

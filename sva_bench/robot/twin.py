@@ -18,7 +18,7 @@ _SETTLING_S = 30.0
 
 def patience_steps(stretch: Stretch, model: RobotModel) -> int:
     """Control steps after which a stretch that isn't finished counts as stuck."""
-    fastest_s = float(stretch.arc[-1]) / model.max_speed_m_s + 2 * math.pi / model.max_turn_rad_s
+    fastest_s = float(stretch.arc[-1]) / model.followed_speed_m_s + 2 * math.pi / model.max_turn_rad_s
     return math.ceil((fastest_s / _SLOWEST + _SETTLING_S) * CONTROL_HZ)
 
 

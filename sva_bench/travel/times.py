@@ -104,6 +104,10 @@ def plan_travel_times(world: World, model: RobotModel, planner: PlannerName = "p
     Source:
         ``f'`` of section 5.2 of the paper.
     """
+    if model.followed_speed_m_s < model.max_speed_m_s:
+        _log.warning("%s: its accelerations let it keep to a path at up to %.2f m/s, not at its max_speed_m_s of %g; "
+                     "it is planned and driven at that; higher accelerations would let it be faster", model.name,
+                     model.followed_speed_m_s, model.max_speed_m_s)
     points = np.array([(site.x_m, site.y_m) for site in world.sites])
     room = min(clearance(world.obstacles, x, y) for x, y in points)
     lost = None

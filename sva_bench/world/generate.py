@@ -15,7 +15,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadInput
-from sva_bench.seeds import Stream, rng_for
+from sva_bench.seeds import Stream, key_of, rng_for
 from sva_bench.world.clearance import clearance, segment_distance
 from sva_bench.world.load import obstacles_of
 from sva_bench.world.mazes import maze_walls
@@ -77,12 +77,13 @@ def random_terrain(family: Family, *, size_m: float, density: float, seed: int) 
         size_m: Side of the square.
         density: Share of the area that furniture, obstacles or racks cover; of a maze, share of the walls of one
             without loops that are left standing.
-        seed: Seed.
+        seed: Seed; each family, size and density draws otherwise from it.
 
     Raises:
         BadInput: If so much does not fit with passages between.
     """
-    rng = rng_for(seed, Stream.RANDOM_WORLD, _STREAMS["terrain"])
+    which = key_of(family, repr(float(size_m)), repr(float(density)))
+    rng = rng_for(seed, Stream.RANDOM_WORLD, _STREAMS["terrain"], *which)
     scale = math.sqrt(max(size_m / _USUAL_M, 1.0))
     bounds = (0.0, 0.0, size_m, size_m)
     if family == "maze":
@@ -112,7 +113,7 @@ def random_places(obstacles: Obstacles, *, stations: int, pois: int, seed: int) 
     Raises:
         BadInput: If there is no room for so many.
     """
-    rng = rng_for(seed, Stream.RANDOM_WORLD, _STREAMS["sites"])
+    rng = rng_for(seed, Stream.RANDOM_WORLD, _STREAMS["sites"], *obstacles.key())
     x0, y0, x1, y1 = obstacles.bounds_m.tolist()
     corner = ((x0, y0), (x1, y0), (x0, y1), (x1, y1))[int(rng.integers(4))]
     found: list[Point] = []

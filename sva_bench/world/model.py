@@ -12,6 +12,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.mission.failures import FailureProcess, JointState
 from sva_bench.robot.model import RobotModel
+from sva_bench.seeds import key_of
 from sva_bench.world.cells import Cells
 from sva_bench.world.maps import MapFile
 
@@ -38,6 +39,14 @@ class Obstacles:
         object.__setattr__(self, "bounds_m", frozen(self.bounds_m, (4,)))
         object.__setattr__(self, "boxes", frozen(self.boxes, (None, 5)))
         object.__setattr__(self, "cylinders", frozen(self.cylinders, (None, 3)))
+
+    def key(self) -> tuple[int, ...]:
+        """Index of random streams that belong to this ground: another ground has others."""
+        if self.cells is not None:  # however they are covered by boxes
+            cells = self.cells
+            return key_of(np.packbits(cells.occupied).tobytes(), repr(cells.occupied.shape),
+                          repr(np.append(cells.origin, cells.cell_m).tolist()))
+        return key_of(*(repr(part.tolist()) for part in (self.bounds_m, self.boxes, self.cylinders)))
 
     def walled(self, thickness_m: float) -> Obstacles:
         """The same, with the walls about the bounds as boxes, the first four."""

@@ -83,7 +83,7 @@ def field_of(obstacles: Obstacles) -> DistanceField:
 
 def find_places(
     field: DistanceField, *, base: Point | None, radius_m: float, stations: int, pois: int, spacing_m: float | None,
-    seed: int, others: Sequence[Point] = (),
+    seed: int, others: Sequence[Point] = (), key: tuple[int, ...] = (),
 ) -> tuple[Places, float]:
     """Places in the connected free region about the base that a robot reaches, keeping as far from obstacles as can be.
 
@@ -99,6 +99,7 @@ def find_places(
             Stations keep no more than the usual distance from what was there before them.
         seed: Seed of the POIs.
         others: Sites that stand already, beside the base.
+        key: Index of the stream that POIs are drawn from: of the map, where maps are to be independent samples.
 
     Returns:
         The places; and the spacing.
@@ -121,7 +122,7 @@ def find_places(
             spread = _spread(field, region, stations, [here, *others],
                              _CLOSEST_M if spacing_m is None else min(spacing_m, APART_M))
             candidates = np.argwhere(region)
-            candidates = candidates[rng_for(seed, Stream.DRAWN_PLACES).permutation(len(candidates))]
+            candidates = candidates[rng_for(seed, Stream.DRAWN_PLACES, *key).permutation(len(candidates))]
             for spacing in _spacings(widest) if spacing_m is None else [spacing_m]:
                 drawn = _drawn(field, candidates, pois, [here, *others, *spread], spacing)
                 if len(drawn) == pois:

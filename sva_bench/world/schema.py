@@ -136,11 +136,14 @@ class Sites(Section):
 
 
 class Figures(Section):
-    """Figures of a robot that isn't built in."""
+    """Figures of a robot that isn't built in; the model itself checks how they go together.
 
-    radius_m: Annotated[Positive, Field(ge=0.02, le=5)]
-    wheel_radius_m: Annotated[Positive, Field(ge=0.005, le=2)]
-    track_m: Annotated[Positive, Field(ge=0.02, le=10)]
+    Smaller hulls, wheels and tracks than these are lost in what physics takes for contact.
+    """
+
+    radius_m: Annotated[Positive, Field(ge=0.05, le=5)]
+    wheel_radius_m: Annotated[Positive, Field(ge=0.01, le=2)]
+    track_m: Annotated[Positive, Field(ge=0.05, le=10)]
     mass_kg: Annotated[Positive, Field(ge=0.05, le=10_000)]
     max_speed_m_s: Annotated[Positive, Field(ge=0.02, le=20)]
     max_turn_rad_s: Annotated[Positive, Field(ge=0.05, le=20)]
