@@ -125,7 +125,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sva_bench.analysis.charts.legs_driven", lambda *_: "")
 
 
-COUNTS = [120, pytest.param(100_000, marks=pytest.mark.long)]
+COUNTS = [120, pytest.param(3000, marks=pytest.mark.long)]
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -230,6 +230,18 @@ def write_spoilt(source: Path, target: Path, name: str, what: str) -> None:
         pq.write_table(spoilt(table, name, what), target)
     else:
         whole[what]()
+
+
+def test_outcomes_of_runs_and_batches_have_the_same_columns_types_and_units(folders: dict[str, Path]) -> None:
+    run = pq.read_schema(folders["run"] / "outcomes.parquet")
+    for shard in (folders["batch"]).glob("outcomes-*.parquet"):
+        held = pq.read_schema(shard)
+        assert held.names == [*run.names, "world", "seed", "variant"]
+        for field in run:
+            other = held.field(field.name)
+            assert (other.type, other.metadata.get(b"unit") if other.metadata else None) == (
+                field.type, field.metadata.get(b"unit") if field.metadata else None), field.name
+    assert run.field("fuel_used_s").metadata[b"unit"] == b"s of driving"
 
 
 @pytest.mark.parametrize("table", ["outcomes", "legs"])
