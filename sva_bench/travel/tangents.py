@@ -20,7 +20,7 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.world.near import keeps_clear, solids_passed
 
 _MOST_PAIRS = 50_000_000  # of points spread evenly, that lie near enough to each other: says how near that is
-_MOST_WORK = 60_000_000  # solids and buckets that segments are held against: a second or less
+_MOST_WORK = 30_000_000  # solids and buckets that segments are held against: a second or less
 _AT_A_TIME = 5_000_000  # of them, before Ctrl-C is listened to
 _EDGE = 100  # what a tangent that is found costs, in this unit: as an edge of the roadmap, later
 _SEEN = 8  # points that are looked at, or squares, for the price of one solid
@@ -44,32 +44,45 @@ def tangents(checker: FloatArray, arcs: FloatArray) -> IntArray:
         Indices of their ends, shape (k, 2).
     """
     x0, y0, x1, y1 = checker[:4]
-    out = arcs[:, :2] - arcs[:, 2:4]
-    out /= np.hypot(out[:, 0], out[:, 1])[:, None]
-    alone = np.isnan(out[:, 0])
-    out[alone] = 0.0  # at right angles to every line: tangent to all
-    ends = np.column_stack([arcs[:, :2], out, arcs[:, 4] ** 2])
-    own, others = np.flatnonzero(alone), np.flatnonzero(~alone)
     farthest = math.hypot(x1 - x0, y1 - y0)
     # Of points spread evenly, so many partners lie within the circle that there are _MOST_PAIRS.
     longest = math.sqrt((x1 - x0) * (y1 - y0) * 2 * _MOST_PAIRS / math.pi) / max(len(arcs), 1)
-    squares = _squares(ends[others, :2])
-    found = [np.empty((0, 2), dtype=np.int64)]
-    for mine, reach in ((True, farthest), (False, min(longest, farthest))):
-        left = _MOST_WORK
-        for near, far in _rings(reach, squares.side if len(arcs) > _FEW else math.inf):
-            at = 0
-            while at < (len(own) if mine else len(others)) and left > 0:
-                if mine:
-                    pairs, at, work = _tangents_of_own(checker, ends, own, at, near, far, min(_AT_A_TIME, left))
-                else:
-                    pairs, at, work = _tangents_of_arcs(
-                        checker, ends[others], squares.starts, squares.items, squares.low, squares.side,
-                        squares.counts, at, near, far, min(_AT_A_TIME, left))
-                    pairs = others[pairs]
-                found.append(pairs)
-                left -= work
+    others = np.flatnonzero(~np.isnan(arcs[:, 2]))
+    ends = _ends(arcs[others])
+    squares = _squares(ends[:, :2])
+    found, left = [tangents_of_own(checker, arcs)], _MOST_WORK
+    for near, far in _rings(min(longest, farthest), squares.side, len(arcs)):
+        at = 0
+        while at < len(ends) and left > 0:
+            pairs, at, work = _tangents_of_arcs(
+                checker, ends, squares.starts, squares.items, squares.low, squares.side, squares.counts, at, near, far,
+                min(_AT_A_TIME, left))
+            found.append(others[pairs])
+            left -= work
     return np.concatenate(found)
+
+
+def tangents_of_own(checker: FloatArray, arcs: FloatArray) -> IntArray:
+    """Those tangents that begin or end at points of their own, as ``tangents``; so much work again at most."""
+    ends, own = _ends(arcs), np.flatnonzero(np.isnan(arcs[:, 2]))
+    found, left = [np.empty((0, 2), dtype=np.int64)], _MOST_WORK
+    x0, y0, x1, y1 = checker[:4]
+    farthest = math.hypot(x1 - x0, y1 - y0)
+    for near, far in _rings(farthest, 0.01 * farthest, len(arcs)):
+        at = 0
+        while at < len(own) and left > 0:
+            pairs, at, work = _tangents_of_own(checker, ends, own, at, near, far, min(_AT_A_TIME, left))
+            found.append(pairs)
+            left -= work
+    return np.concatenate(found)
+
+
+def _ends(arcs: FloatArray) -> FloatArray:
+    """x, y, the direction from the arc's centre, and the squared tolerance; shape (n, 5)."""
+    out = arcs[:, :2] - arcs[:, 2:4]
+    out /= np.hypot(out[:, 0], out[:, 1])[:, None]
+    out[np.isnan(out[:, 0])] = 0.0  # points of their own: at right angles to every line, so tangent to all
+    return np.column_stack([arcs[:, :2], out, arcs[:, 4] ** 2])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,9 +106,7 @@ class _Squares:
 
 def _squares(points: FloatArray) -> _Squares:
     """About two points a square, were they spread evenly."""
-    if not len(points):
-        points = np.zeros((1, 2))[:0]
-    low = points.min(axis=0, initial=np.inf) if len(points) else np.zeros(2)
+    low = points.min(axis=0) if len(points) else np.zeros(2)
     wide, high = (points.max(axis=0) - low).tolist() if len(points) else (0.0, 0.0)
     side = max(math.sqrt(2 * wide * high / max(len(points), 1)), max(wide, high) / 1000, 1e-3)
     columns, rows = math.floor(wide / side) + 1, math.floor(high / side) + 1
@@ -106,10 +117,10 @@ def _squares(points: FloatArray) -> _Squares:
                     items=np.argsort(square, kind="stable"))
 
 
-def _rings(reach_m: float, side_m: float) -> Iterator[tuple[float, float]]:
-    """Lengths from and to, until the reach; the first has a few squares at least."""
+def _rings(reach_m: float, side_m: float, points: int) -> Iterator[tuple[float, float]]:
+    """Lengths from and to, until the reach; the first ring is a few squares wide at least, and of few points all."""
     near, far = 0.0, 4 * side_m
-    while far < reach_m:
+    while far < reach_m and points > _FEW:
         yield near, far
         near, far = far, far * _RING
     yield near, reach_m
