@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.travel.lattice import lattice_ways, open_parts
 from sva_bench.travel.samples import arc_points, roadmap_samples
-from sva_bench.travel.tangents import tangents, tangents_of_own, taut
+from sva_bench.travel.tangents import nothing_known, tangents, tangents_of_own, taut
 from sva_bench.world.cells import Cells, distance_field
 from sva_bench.world.model import Obstacles
 from sva_bench.world.near import clearance_checker, keeps_clear, keeps_clearance
@@ -247,6 +247,7 @@ def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | N
     lengths, before = dijkstra(roadmap.graph, directed=False, indices=at, return_predecessors=True)
     n = len(points)
     paths: list[list[FloatArray | None]] = [[None] * n for _ in range(n)]
+    known = nothing_known()
     for i in range(n):
         for j in range(i + 1, n):
             if not math.isfinite(lengths[i, at[j]]):
@@ -254,7 +255,7 @@ def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | N
             chain = [at[j]]
             while chain[-1] != at[i]:
                 chain.append(int(before[i, chain[-1]]))
-            path = taut(roadmap.checker, roadmap.vertices[chain[::-1]], _WINDOW)
+            path = taut(roadmap.checker, roadmap.vertices, np.array(chain[::-1]), _WINDOW, known)
             path[0], path[-1] = points[i], points[j]
             paths[i][j], paths[j][i] = path, path[::-1].copy()
     return paths

@@ -20,11 +20,12 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.world.near import keeps_clear, solids_passed
 
 _MOST_PAIRS = 50_000_000  # of points spread evenly, that lie near enough to each other: says how near that is
-_MOST_WORK = 30_000_000  # solids and buckets that segments are held against: a second or less
+_MOST_WORK = 20_000_000  # solids and buckets that segments are held against: about half a second
 _AT_A_TIME = 5_000_000  # of them, before Ctrl-C is listened to
 _EDGE = 100  # what a tangent that is found costs, in this unit: as an edge of the roadmap, later
 _SEEN = 8  # points that are looked at, or squares, for the price of one solid
 _FEW = 2000  # points whose tangents are looked for at once, whatever their length
+_LINES = 1 << 18  # that are remembered
 _RING = 1.4  # else those up to some length, then those up to so much more, and so on
 
 
@@ -262,25 +263,41 @@ def _with(found: IntArray, count: int, i: int, j: int) -> tuple[IntArray, int]:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def taut(checker: FloatArray, path: FloatArray, window: int) -> FloatArray:
+def taut(checker: FloatArray, vertices: FloatArray, chain: IntArray, window: int, known: IntArray) -> FloatArray:
     """The shortest path by way of some of a path's vertices, in their order.
 
     Args:
         checker: As ``clearance_checker`` makes it.
-        path: Vertices [m], shape (n, 2); it keeps the clearance.
+        vertices: Those of the roadmap [m], shape (v, 2).
+        chain: Which of them the path runs through, shape (n,); it keeps the clearance.
         window: How many vertices at most are cut off at a time.
+        known: What was found out about lines between vertices for other paths, as ``nothing_known`` makes it.
     """
-    n = len(path)
+    n = len(chain)
     length = np.full(n, np.inf)
     before = np.zeros(n, dtype=np.int64)
     length[0] = 0.0
     for j in range(1, n):
         for i in range(max(j - window, 0), j):
-            way = length[i] + math.hypot(path[j, 0] - path[i, 0], path[j, 1] - path[i, 1])
-            if way < length[j] and (i == j - 1 or keeps_clear(checker, path[i, 0], path[i, 1], path[j, 0], path[j, 1])):
-                length[j], before[j] = way, i
+            ax, ay, bx, by = vertices[chain[i], 0], vertices[chain[i], 1], vertices[chain[j], 0], vertices[chain[j], 1]
+            way = length[i] + math.hypot(bx - ax, by - ay)
+            if way < length[j]:
+                free = i == j - 1
+                if not free:
+                    line = 2 * (chain[i] * len(vertices) + chain[j])
+                    slot = (line * 0x9E3779B1 >> 12) % len(known)
+                    if known[slot] != line and known[slot] != line + 1:
+                        known[slot] = line + keeps_clear(checker, ax, ay, bx, by)
+                    free = known[slot] == line + 1
+                if free:
+                    length[j], before[j] = way, i
     kept = [n - 1]
     while kept[-1] > 0:
         kept.append(before[kept[-1]])
-    shorter: FloatArray = path[np.array(kept[::-1])]
+    shorter: FloatArray = vertices[chain[np.array(kept[::-1])]]
     return shorter
+
+
+def nothing_known() -> IntArray:
+    """What ``taut`` remembers, at first: twice the number of a line, and one more if it is free; by its place."""
+    return np.full(_LINES, -1, dtype=np.int64)
