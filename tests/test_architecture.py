@@ -13,10 +13,10 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MODULES = [path.relative_to(PACKAGE).as_posix() for path in FILES]
 
 # What every part may know. Files at the top that know nothing of the others may be known by all.
-EVERYBODYS = {"arrays", "complaints", "documents", "errors", "interrupts", "seeds"}
+EVERYBODYS = {"arrays", "complaints", "documents", "errors", "interrupts", "json_lines", "seeds"}
 MAY_KNOW: dict[str, set[str]] = {
     "arrays": set(), "errors": set(), "interrupts": set(), "complaints": {"errors"},
-    "documents": {"complaints", "errors"}, "seeds": {"arrays"},
+    "documents": {"complaints", "errors", "json_lines"}, "json_lines": {"complaints"}, "seeds": {"arrays"},
     "robot": set(),
     "mission": set(),
     "world": {"robot", "mission.failures"},
