@@ -58,8 +58,8 @@ class Document:
     """Plain data read from a file, which knows the line of each key."""
 
     def __init__(self, path: Path, data: Any, text: str, root: Node | None = None) -> None:
-        self.path, self.data = path, data
-        self._text, self._root = text, root
+        self.path, self.data, self.text = path, data, text
+        self._root = root
 
     def error(self, loc: Loc, problem: str) -> BadFile:
         """A complaint about the value at ``loc``, e.g. ``("sites", "pois", "p1")``."""
@@ -68,7 +68,7 @@ class Document:
     def line(self, loc: Loc) -> int | None:
         """Line of the key at ``loc``, counted from 1; of the nearest parent where it is absent."""
         if self._root is None:
-            return json_line(self._text, loc)
+            return json_line(self.text, loc)
         node: Node = self._root
         line = node.start_mark.line
         for part in loc:
@@ -99,7 +99,7 @@ class Document:
                 raise self.error((), f"{key}: there is nothing called {name!r} to set")
             if not words:
                 at[name] = value
-                return Document(self.path, data, self._text, self._root)
+                return Document(self.path, data, self.text, self._root)
             at = at.setdefault(name, {}) if isinstance(at, dict) else at[name]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from json.decoder import scanstring
 
 from sva_bench.complaints import Loc
 
@@ -37,7 +36,7 @@ def _inside(text: str, at: int, part: str | int) -> tuple[int, int] | None:
     while text[at:at + 1] != end:
         begin, key = at, ""
         if named:
-            key, at = scanstring(text, at + 1, True)
+            key, at = _DECODER.raw_decode(text, at)
             at = _past_space(text, _past_space(text, at) + 1)
         if (key == str(part)) if named else (number == part):
             return begin, at

@@ -195,5 +195,6 @@ def open_parts(field: DistanceField, clearance_m: float, points: FloatArray) -> 
     """
     open_places = field.distance_m >= clearance_m - field.cells.cell_m / 2 * math.sqrt(0.5) - 1e-5
     at = field.index_of(points)
-    parts, _ = label(open_places, structure=np.ones((3, 3)))
-    return parts, parts[at[:, 0], at[:, 1]]
+    found, _ = label(open_places, structure=np.ones((3, 3)))
+    parts: NDArray[np.int32] = found.astype(np.int32, copy=False)
+    return parts, parts[at[:, 0], at[:, 1]].astype(np.int64)

@@ -150,7 +150,7 @@ def surely_apart(obstacles: Obstacles, points: FloatArray, clearance_m: float) -
         open_places = keeps_clearance(obstacles, centres, needed).reshape(tuple(counts))
         at = np.clip(((points - low) / cell).astype(np.int64), 0, counts - 1)
         parts, _ = label(open_places, structure=np.ones((3, 3)))
-        mine = parts[at[:, 0], at[:, 1]]
+        mine = parts[at[:, 0], at[:, 1]].astype(np.int64)
     apart: BoolArray = mine[:, None] != mine[None, :]
     return apart
 

@@ -133,6 +133,7 @@ def _thinned(points: FloatArray, count: int) -> IntArray:
     # The narrowest of these gaps that leaves no more: first one that is surely wide enough, then by halving.
     gaps = 0.01 * 1.3 ** np.arange(100)
     low, high, step = -1, 0, 1
+    kept: IntArray
     while len(kept := _apart(points, gaps[high])) > count:
         low, high, step = high, high + step, 2 * step
     while high - low > 1:
