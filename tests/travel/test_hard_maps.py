@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hard_maps import FAMILY, write_world
-from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.travel import tangents as tangents_module
 from sva_bench.travel.lattice import lattice_ways
 from sva_bench.travel.roadmap import plan_paths
@@ -30,7 +30,8 @@ CLEARANCE_M = 0.297
 def hatched(cells: int) -> BoolArray:
     """Lines at 45 degrees with doors."""
     y, x = np.mgrid[:cells, :cells]
-    return ((x + y) % 24 < 4) & ((x - y + 37 * ((x + y) // 24)) % 120 > 30)
+    lines: BoolArray = ((x + y) % 24 < 4) & ((x - y + 37 * ((x + y) // 24)) % 120 > 30)
+    return lines
 
 
 def every_tangent(checker: FloatArray, arcs: FloatArray) -> set[tuple[int, int]]:
@@ -78,7 +79,7 @@ def test_the_search_for_tangents_stops_when_the_work_is_done_and_keeps_the_short
     assert 0 < len(some) < len(every)
     assert set(map(tuple, some.tolist())) <= set(map(tuple, every.tolist()))
 
-    def longest(pairs: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> float:
+    def longest(pairs: IntArray) -> float:
         return float(np.hypot(*(arcs[pairs[:, 0], :2] - arcs[pairs[:, 1], :2]).T).max())
 
     assert longest(some) < longest(every)
