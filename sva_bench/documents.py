@@ -9,6 +9,8 @@ from __future__ import annotations
 import copy
 import json
 import math
+import os
+import stat
 from collections.abc import Callable, Mapping
 from io import StringIO
 from pathlib import Path
@@ -24,11 +26,13 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from sva_bench.complaints import Loc as Loc
 from sva_bench.complaints import first_complaint, shown
 from sva_bench.errors import BadFile, nearest
+from sva_bench.json_lines import json_line
 from sva_bench.mistaken import what_it_is, what_the_text_is
 
 MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
 MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 100 MB
 MAX_DEPTH = 32
+MAX_YAML_VALUES = 200_000  # keys and values; a world of 10 000 obstacles has 120 000, which take 5 s to read
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
 """Pattern of names of worlds, sites, robots and scenarios."""
@@ -55,8 +59,8 @@ class Document:
     """Plain data read from a file, which knows the line of each key."""
 
     def __init__(self, path: Path, data: Any, text: str, root: Node | None = None) -> None:
-        self.path, self.data = path, data
-        self._text, self._root = text, root
+        self.path, self.data, self.text = path, data, text
+        self._root = root
 
     def error(self, loc: Loc, problem: str) -> BadFile:
         """A complaint about the value at ``loc``, e.g. ``("sites", "pois", "p1")``."""
@@ -64,13 +68,8 @@ class Document:
 
     def line(self, loc: Loc) -> int | None:
         """Line of the key at ``loc``, counted from 1; of the nearest parent where it is absent."""
-        if self._root is None:  # JSON: composed only now, since ruamel is slow on large matrices
-            try:
-                self._root = _compose(self._text)
-            except (YAMLError, RecursionError, ValueError, OverflowError):
-                return None
         if self._root is None:
-            return None
+            return json_line(self.text, loc)
         node: Node = self._root
         line = node.start_mark.line
         for part in loc:
@@ -111,7 +110,7 @@ class Document:
             loc = (*loc, name)
             if not words:
                 at[name] = value
-                return Document(self.path, data, self._text, self._root)
+                return Document(self.path, data, self.text, self._root)
             at = at.setdefault(name, {}) if isinstance(at, dict) else at[name]
 
 
@@ -250,20 +249,42 @@ def check_kind(document: Document, kind: str) -> None:
         raise document.error(("format",), f"expected {kind!r}, found {shown(found)}{hint}")
 
 
-def _read(path: Path, limit: int) -> str:
+def read_bytes(path: Path, limit: int) -> bytes:
+    """The bytes of a regular file, of at most so many; pipes and devices are refused unopened.
+
+    Raises:
+        BadFile: If it is no such file.
+    """
     try:
-        size = path.stat().st_size
-        if not path.is_file():
+        if not stat.S_ISREG(path.stat().st_mode):
             raise BadFile(path, None, "", "not a file")
-        if size > limit:
-            raise BadFile(path, None, "", f"{size} bytes; at most {limit} are read")
-        return path.read_text(encoding="utf-8")
+        # Whatever has become of it since then: no waiting for a writer, and never more than asked for.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            state = os.fstat(file.fileno())
+            if not stat.S_ISREG(state.st_mode):
+                raise BadFile(path, None, "", "not a file")
+            content = b"" if state.st_size > limit else file.read(limit + 1)
     except FileNotFoundError:
         raise BadFile(path, None, "", "no such file") from None
-    except UnicodeDecodeError as error:
-        raise BadFile(path, None, "", f"not UTF-8 text (byte {error.start})") from None
     except OSError as error:
         raise BadFile(path, None, "", f"cannot be read: {error.strerror}") from None
+    except ValueError:  # a name with a null character
+        raise BadFile(repr(str(path)), None, "", "no such file") from None
+    size = max(state.st_size, len(content))
+    if size > limit:
+        raise BadFile(path, None, "", f"{size} bytes; at most {limit} are read")
+    return content
+
+
+def _read(path: Path, limit: int) -> str:
+    content = read_bytes(path, limit)
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise BadFile(path, None, "", "UTF-16 text; save it as UTF-8")
+    try:
+        text = content.decode("utf-8-sig")  # a byte-order mark, as editors write it, is no part of the text
+    except UnicodeDecodeError as error:
+        raise BadFile(path, None, "", f"not UTF-8 text (byte {error.start})") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _last_line_of(text: str, piece: str) -> int | None:
@@ -277,6 +298,10 @@ class _StrictComposer(Composer):
     def compose_node(self, parent: Any, index: Any) -> Any:
         from ruamel.yaml.events import AliasEvent
 
+        self.values: int = getattr(self, "values", 0) + 1
+        if self.values > MAX_YAML_VALUES:
+            raise MarkedYAMLError(problem=f"more than {MAX_YAML_VALUES} keys and values; at most so many are read",
+                                  problem_mark=self.parser.peek_event().start_mark)
         if self.parser.check_event(AliasEvent):
             event = self.parser.peek_event()
             raise MarkedYAMLError(problem="aliases are not allowed; write the value out", problem_mark=event.start_mark)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import logging
 import re
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,9 +21,11 @@ from sva_bench.world.clearance import clearance
 from sva_bench.world.generate import DENSITY, Family, random_places, random_terrain
 from sva_bench.world.load import world_of
 from sva_bench.world.maps import MapFile, Unknown, read_movingai_map, read_ros_map
-from sva_bench.world.model import Obstacles
-from sva_bench.world.places import NoRoom, Point, field_of, find_places
+from sva_bench.world.model import MapSource, Obstacles
+from sva_bench.world.places import NoRoom, Point, enclosed_beside, field_of, find_places
 from sva_bench.world.schema import KIND
+
+_log = logging.getLogger(__name__)
 
 STATION_STOP_S = 10
 """Time that refuelling takes, as in the shipped worlds."""
@@ -108,7 +110,7 @@ def world_from_map(
         cells, read = read_movingai_map(source.parent, source.name, cell_m)
         section = {"movingai": {"file": f"{name}-map/{read[0].name}", "cell_m": _plain(cell_m)}}
     else:
-        cells, read = read_ros_map(source.parent, source.name, unknown)
+        cells, read = read_ros_map(source.parent, source.name, unknown, anywhere=True)
         section = {"ros": {"file": f"{name}-map/{read[0].name}"} | ({"unknown": unknown} if unknown == "free" else {})}
     try:
         obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes_of(cells), cylinders=np.empty((0, 3)), cells=cells)
@@ -120,7 +122,8 @@ def world_from_map(
     try:
         if base is not None and clearance(obstacles, *base) < radius:
             raise NoRoom("base", 0, 0.0)
-        places, spacing = find_places(field_of(obstacles), base=base, radius_m=radius, stations=stations, pois=pois,
+        field = field_of(obstacles)
+        places, spacing = find_places(field, base=base, radius_m=radius, stations=stations, pois=pois,
                                       spacing_m=spacing_m, seed=seed, key=obstacles.key())
     except NoRoom as error:
         where = "at the base" if error.kind == "base" and base else "on this map"
@@ -128,6 +131,10 @@ def world_from_map(
         raise BadInput(f"{source}: for a robot of radius {radius} m, {said}; choose fewer sites, another base, or "
                        "another map") from None
     progress("placing the sites", 1, 1)
+    if (beside := enclosed_beside(field, places.base, radius)) is not None:
+        area, (x, y) = beside
+        _log.warning("%s: the sites are in a region that reaches the map's rim, maybe outside of all walls; the "
+                     "largest that walls enclose has %.3g m2: --base %g %g", source, area, x, y)
     asked = "" if base is None else f" --base {base[0]:g} {base[1]:g}"
     asked += "" if "ros" in section else f" --cell-m {cell_m:g}"
     asked += " --unknown free" if unknown == "free" else ""
@@ -140,13 +147,8 @@ def world_from_map(
         ("sites", "pois"): f"drawn from what is reached from the base, {spacing:g} m from each other at least"}
     data = {"map": section, "sites": sites_section(places.base, places.stations, places.pois)}
     files = tuple(replace(file, name=f"{name}-map/{file.name}") for file in read)
-    with tempfile.TemporaryDirectory() as folder:  # a world is read with the files that it names
-        for file in files:
-            path = Path(folder, file.name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(file.content)
-        text = with_mission(name, data, remarks, robots=robots, seed=seed, path=Path(folder, target.name),
-                            progress=progress)
+    ground = (obstacles, MapSource(section=section, files=files))
+    text = with_mission(name, data, remarks, robots=robots, seed=seed, path=target, progress=progress, ground=ground)
     return text, files
 
 
@@ -160,7 +162,7 @@ def sites_section(base: Point, stations: tuple[Point, ...], pois: tuple[Point, .
 
 def with_mission(
     name: str, data: Mapping[str, Any], remarks: Mapping[Loc, str], *, robots: int, seed: int, path: Path,
-    progress: Progress,
+    progress: Progress, ground: tuple[Obstacles, MapSource] | None = None,
 ) -> str:
     """The text of a world file whose map and sites are given, with a mission that suits them.
 
@@ -172,6 +174,7 @@ def with_mission(
         seed: Seed of the mission.
         path: Where the file will be: files that it names are found from there.
         progress: Told how far it is.
+        ground: What the files hold that the map names; ``None`` if it names none.
 
     Raises:
         BadFile: If map and sites make no good world.
@@ -184,7 +187,7 @@ def with_mission(
 
     head = {"format": KIND, "name": name, **data}
     robot = {"model": USUAL_MODEL, "incentives": {}}
-    bare = world_of(parse_yaml(pretty_yaml({**head, "robots": {"uv1": robot}}, {}), path))
+    bare = world_of(parse_yaml(pretty_yaml({**head, "robots": {"uv1": robot}}, {}), path), ground=ground)
     (costs,) = plan_costs(bare, "prmstar", progress).values()
     progress("choosing a mission", 0, 1)
     places = key_of(*(f"{site.kind} {site.x_m!r} {site.y_m!r}" for site in bare.sites))
@@ -195,7 +198,7 @@ def with_mission(
         {**head, **proposal.sections(), "failure": "mission", "margin": bare.margin,
          "noise": {"wheel_gain_sd": WHEEL_GAIN_SD}},
         {**remarks, **proposal.remarks(), **dict.fromkeys(_SPACED, "\n")})
-    world_of(parse_yaml(text, path))  # what is written can be read
+    world_of(parse_yaml(text, path), ground=ground)  # what is written can be read
     return text
 
 

@@ -13,12 +13,13 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MODULES = [path.relative_to(PACKAGE).as_posix() for path in FILES]
 
 # What every part may know. Files at the top that know nothing of the others may be known by all.
-EVERYBODYS = {"arrays", "atomic", "complaints", "documents", "errors", "interrupts", "mistaken", "patterns",
-              "printable", "read_back", "safe_path", "seeds"}
+EVERYBODYS = {"arrays", "atomic", "complaints", "documents", "errors", "interrupts", "json_lines", "mistaken",
+              "patterns", "printable", "read_back", "safe_path", "seeds"}
 MAY_KNOW: dict[str, set[str]] = {
     "arrays": set(), "errors": set(), "interrupts": set(), "printable": set(), "safe_path": set(), "mistaken": set(),
-    "atomic": {"errors", "interrupts"}, "patterns": {"errors"}, "complaints": {"errors"},
-    "documents": {"complaints", "errors", "mistaken"}, "read_back": {"documents", "errors"}, "seeds": {"arrays"},
+    "atomic": {"errors", "interrupts"}, "patterns": {"errors"}, "complaints": {"errors"}, "json_lines": {"complaints"},
+    "documents": {"complaints", "errors", "json_lines", "mistaken"}, "read_back": {"documents", "errors"},
+    "seeds": {"arrays"},
     "robot": set(),
     "mission": set(),
     "world": {"robot", "mission.failures"},

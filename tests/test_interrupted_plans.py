@@ -42,4 +42,4 @@ def test_a_mission_that_is_proposed_is_the_same_or_none(tmp_path: Path, monkeypa
     (costs,) = plan_costs(world, "prmstar", lambda *_: None).values()
     monkeypatch.setattr(proposal, "plan_nominal", interrupted(two_stage.plan_nominal))
     with pytest.raises(KeyboardInterrupt):
-        propose_mission(world.sites, costs.cost_s, robots=2, seed=0)
+        propose_mission(world.sites, costs.cost_s, robots=2, seed=0, key=())

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -21,9 +21,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.travel.lattice import lattice_ways, open_parts
 from sva_bench.travel.samples import arc_points, roadmap_samples
-from sva_bench.travel.tangents import tangents, taut
-from sva_bench.world.cells import distance_field
+from sva_bench.travel.tangents import nothing_known, tangents, tangents_of_own, taut
+from sva_bench.world.cells import Cells, distance_field
 from sva_bench.world.model import Obstacles
 from sva_bench.world.near import clearance_checker, keeps_clear, keeps_clearance
 
@@ -38,6 +39,11 @@ _GROWTH = ((1000, 6), (3000, 12), (6000, 24))
 """Milestones, and points on a quarter circle: the roadmap grows until it connects all sites, or to the last of these.
 
 The tangents between arcs make paths short, the milestones make sure of odd places: more of them shorten no path.
+"""
+_CROWD = 10_000
+"""Points on arcs from which on the roadmap does not grow, but is joined by ways on the lattice of the map's cells.
+
+More points and milestones take seconds each time there, and join hardly more: the lattice finds every passage.
 """
 _CELL_M, _CELLS = 0.02, 200_000  # finest cell, and most cells, of the grid that says which sites no path joins
 _EFFORTS = (1, 4, 16)  # by which a planner's samples and steps for one pair grow, until they join it or to the last
@@ -90,12 +96,14 @@ class _Roadmap:
         graph: Length of each edge [m], from the lower number to the higher, shape (v, v).
         at: The vertex of each point that paths are to join.
         checker: What says whether an edge is free.
+        arcs: Points on arcs among its vertices, as ``arc_points`` gives them.
     """
 
     vertices: FloatArray
     graph: csr_array
     at: IntArray
     checker: FloatArray
+    arcs: FloatArray
 
 
 class _ExactValidator(ob.MotionValidator):  # type: ignore[misc]
@@ -128,14 +136,10 @@ class _SampleQueue(ob.ValidStateSampler):  # type: ignore[misc]
 def surely_apart(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> BoolArray:
     """Which points no path can join, however fine the roadmap, shape (n, n).
 
-    Each point of a path is near a place of a lattice, at most half a diagonal away. Places that are nearer to an
-    obstacle than the clearance less that are closed; a path runs by open ones, from neighbour to neighbour. So points
-    in different parts of the open places are apart.
+    By a lattice: each point of a path is near a place of it, which can't be much nearer to an obstacle than the path.
     """
     if obstacles.cells is not None:
-        field = distance_field(obstacles.cells)
-        open_places = field.distance_m >= clearance_m - obstacles.cells.cell_m / 2 * math.sqrt(0.5) - 1e-5
-        at = field.index_of(points)
+        _, mine = open_parts(distance_field(obstacles.cells), clearance_m, points)
     else:
         low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
         cell = max(_CELL_M, math.sqrt(float(np.prod(high - low)) / _CELLS))
@@ -145,8 +149,8 @@ def surely_apart(obstacles: Obstacles, points: FloatArray, clearance_m: float) -
         needed = clearance_m - cell * math.sqrt(0.5) - 1e-6
         open_places = keeps_clearance(obstacles, centres, needed).reshape(tuple(counts))
         at = np.clip(((points - low) / cell).astype(np.int64), 0, counts - 1)
-    parts, _ = label(open_places, structure=np.ones((3, 3)))
-    mine = parts[at[:, 0], at[:, 1]]
+        parts, _ = label(open_places, structure=np.ones((3, 3)))
+        mine = parts[at[:, 0], at[:, 1]].astype(np.int64)
     apart: BoolArray = mine[:, None] != mine[None, :]
     return apart
 
@@ -186,6 +190,8 @@ def _grown(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roa
         missing = mine[:, None] != mine[None, :]
         if not missing.any():
             break
+        if obstacles.cells is not None and len(roadmap.arcs) > _CROWD:
+            return _joined(roadmap, obstacles.cells, points, clearance_m, np.flatnonzero(missing[0]))
         if apart is None:
             apart = surely_apart(obstacles, points, clearance_m)
         if apart[missing].all():
@@ -193,11 +199,28 @@ def _grown(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roa
     return roadmap
 
 
+def _joined(
+    roadmap: _Roadmap, cells: Cells, points: FloatArray, clearance_m: float, goals: IntArray
+) -> _Roadmap:
+    """The same with ways on the lattice from the first point to some others, and lines from them to what they see."""
+    ways = [way for way in lattice_ways(cells, roadmap.checker, clearance_m, points, goals.tolist()) if way is not None]
+    if not ways:
+        return roadmap
+    along = np.concatenate(ways)
+    last = np.cumsum([len(way) for way in ways]) - 1
+    first = np.delete(np.arange(len(along)), last)  # of each edge
+    vertices, graph = _with_edges(roadmap.vertices, roadmap.graph, along, np.column_stack([first, first + 1]))
+    inner = np.unique(np.concatenate([way[1:-1] for way in ways]), axis=0)
+    ends = np.concatenate([_alone(inner), roadmap.arcs])
+    vertices, graph = _with_edges(vertices, graph, ends[:, :2], tangents_of_own(roadmap.checker, ends))
+    return replace(roadmap, vertices=vertices, graph=graph)
+
+
 def _roadmap(
     obstacles: Obstacles, points: FloatArray, clearance_m: float, milestones: int, per_corner: int,
 ) -> _Roadmap:
     si, _ = _space(obstacles, clearance_m)
-    arcs = arc_points(obstacles, clearance_m, per_corner)
+    arcs = arc_points(obstacles, clearance_m, per_corner, points)
     samples = roadmap_samples(obstacles, clearance_m, milestones, arcs)
     si.setValidStateSamplerAllocator(lambda inner: _SampleQueue(inner, samples))
     problem = ob.ProblemDefinition(si)
@@ -212,9 +235,10 @@ def _roadmap(
     total = len(points) + len(samples)
     planner.growRoadmapPtc(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= total))
     checker = clearance_checker(obstacles, clearance_m, _START_SLACK_M)
-    vertices, graph = _with_tangents(*_read_roadmap(si, planner), checker, points, arcs)
+    ends = np.concatenate([_alone(points), arcs])
+    vertices, graph = _with_edges(*_read_roadmap(si, planner), ends[:, :2], tangents(checker, ends))
     at = np.array([int(np.argmin(np.hypot(*(vertices - point).T))) for point in points], dtype=np.int64)
-    return _Roadmap(vertices=vertices, graph=graph, at=at, checker=checker)
+    return _Roadmap(vertices=vertices, graph=graph, at=at, checker=checker, arcs=arcs)
 
 
 def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | None]]:
@@ -223,6 +247,7 @@ def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | N
     lengths, before = dijkstra(roadmap.graph, directed=False, indices=at, return_predecessors=True)
     n = len(points)
     paths: list[list[FloatArray | None]] = [[None] * n for _ in range(n)]
+    known = nothing_known()
     for i in range(n):
         for j in range(i + 1, n):
             if not math.isfinite(lengths[i, at[j]]):
@@ -230,24 +255,33 @@ def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | N
             chain = [at[j]]
             while chain[-1] != at[i]:
                 chain.append(int(before[i, chain[-1]]))
-            path = taut(roadmap.checker, roadmap.vertices[chain[::-1]], _WINDOW)
+            path = taut(roadmap.checker, roadmap.vertices, np.array(chain[::-1]), _WINDOW, known)
             path[0], path[-1] = points[i], points[j]
             paths[i][j], paths[j][i] = path, path[::-1].copy()
     return paths
 
 
-def _with_tangents(
-    vertices: FloatArray, graph: csr_array, checker: FloatArray, points: FloatArray, arcs: FloatArray
+def _alone(points: FloatArray) -> FloatArray:
+    """Points of their own, on no arc, as ``tangents`` takes them."""
+    return np.column_stack([points, np.full((len(points), 2), np.nan), np.zeros(len(points))])
+
+
+def _with_edges(
+    vertices: FloatArray, graph: csr_array, ends: FloatArray, pairs: IntArray
 ) -> tuple[FloatArray, csr_array]:
-    """A roadmap with the tangents between arcs, and between them and the sites; arc points that it lacks are added."""
-    sites = np.column_stack([points, np.full((len(points), 2), np.nan), np.zeros(len(points))])
-    ends = np.concatenate([sites, arcs])
+    """A roadmap with more edges.
+
+    Args:
+        vertices, graph: The roadmap.
+        ends: Where the edges end [m], shape (n, 2); places that the roadmap lacks are added.
+        pairs: Which two of them each edge joins, shape (e, 2).
+    """
     number = {vertex: k for k, vertex in enumerate(map(tuple, vertices.tolist()))}
-    known = np.array([number.get(tuple(end), -1) for end in ends[:, :2].tolist()], dtype=np.int64)
+    known = np.array([number.get(tuple(end), -1) for end in ends.tolist()], dtype=np.int64)
     new = np.flatnonzero(known < 0)
     known[new] = len(vertices) + np.arange(len(new))
-    vertices = np.concatenate([vertices, ends[new, :2]])
-    heads, tails = known[tangents(checker, ends)].T
+    vertices = np.concatenate([vertices, ends[new]])
+    heads, tails = known[pairs].T
     old = graph.tocoo()
     rows, columns = np.concatenate([old.row, heads]), np.concatenate([old.col, tails])
     # Each edge once: a sparse matrix adds up what stands twice.

@@ -9,7 +9,8 @@ from numba import njit
 from scipy.stats import qmc
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.world.cells import Cells, convex_corners
+from sva_bench.travel.lattice import open_parts
+from sva_bench.world.cells import Cells, convex_corners, distance_field
 from sva_bench.world.model import Obstacles
 from sva_bench.world.near import keeps_clearance
 
@@ -17,7 +18,9 @@ _GRAZE_M = 1e-4  # boundary samples keep this far outside, so that edges along t
 _MOST_ARC_POINTS = 40_000  # of a map of 2000 x 2000 cells full of corners
 
 
-def arc_points(obstacles: Obstacles, clearance_m: float, per_corner: int) -> FloatArray:
+def arc_points(
+    obstacles: Obstacles, clearance_m: float, per_corner: int, sites: FloatArray | None = None
+) -> FloatArray:
     """Free points round the corners and circles that shortest paths bend about.
 
     They are the vertices of polygons about the arcs: inscribed ones would leave the ring between their vertices, and
@@ -27,6 +30,8 @@ def arc_points(obstacles: Obstacles, clearance_m: float, per_corner: int) -> Flo
         obstacles: What stands in the way.
         clearance_m: Distance to keep.
         per_corner: Vertices on a quarter circle.
+        sites: What paths are to join [m], shape (n, 2): of too many points on a map, those are left out that no path
+            between them can touch.
 
     Returns:
         x, y, the arc's centre x, y [m], and the sine of half the angle between vertices: within so much of a right
@@ -49,6 +54,11 @@ def arc_points(obstacles: Obstacles, clearance_m: float, per_corner: int) -> Flo
         centres = np.concatenate([centres, np.repeat(obstacles.cylinders[:, :2], len(around), axis=0)])
     arcs = np.column_stack([points, centres, np.full(len(points), math.sin(1.05 * half))])
     arcs = arcs[keeps_clearance(obstacles, points, clearance_m)]
+    if sites is not None and obstacles.cells is not None and len(arcs) > _MOST_ARC_POINTS:
+        field = distance_field(obstacles.cells)
+        parts, mine = open_parts(field, clearance_m, sites)
+        row, column = field.index_of(arcs[:, :2]).T
+        arcs = arcs[np.isin(parts[row, column], np.unique(mine[mine > 0]))]
     return arcs[_thinned(np.ascontiguousarray(arcs[:, :2]), _MOST_ARC_POINTS)]
 
 
@@ -118,11 +128,18 @@ def _along_edges(obstacles: Obstacles, ring: float, count: int) -> FloatArray:
 
 def _thinned(points: FloatArray, count: int) -> IntArray:
     """Indices of at most ``count`` points, none close to another while there are more."""
-    gap = 0.0
-    kept = np.arange(len(points))
-    while len(kept) > count:
-        gap = max(gap * 1.3, 0.01)
-        kept = _apart(points, gap)
+    if len(points) <= count:
+        return np.arange(len(points))
+    # The narrowest of these gaps that leaves no more: first one that is surely wide enough, then by halving.
+    gaps = 0.01 * 1.3 ** np.arange(100)
+    low, high, step = -1, 0, 1
+    kept: IntArray
+    while len(kept := _apart(points, gaps[high])) > count:
+        low, high, step = high, high + step, 2 * step
+    while high - low > 1:
+        middle = (low + high) // 2
+        fewer = _apart(points, gaps[middle])
+        low, high, kept = (low, middle, fewer) if len(fewer) <= count else (middle, high, kept)
     return kept
 
 

@@ -10,18 +10,31 @@ Source:
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.world.near import keeps_clear
+from sva_bench.world.near import keeps_clear, solids_passed
 
-_MOST_PAIRS = 50_000_000  # of points that are looked at: a second or two
+_MOST_PAIRS = 50_000_000  # of points spread evenly, that lie near enough to each other: says how near that is
+_MOST_WORK = 20_000_000  # solids and buckets that segments are held against: about half a second
+_AT_A_TIME = 5_000_000  # of them, before Ctrl-C is listened to
+_EDGE = 100  # what a tangent that is found costs, in this unit: as an edge of the roadmap, later
+_SEEN = 8  # points that are looked at, or squares, for the price of one solid
+_FEW = 2000  # points whose tangents are looked for at once, whatever their length
+_LINES = 1 << 18  # that are remembered
+_RING = 1.4  # else those up to some length, then those up to so much more, and so on
 
 
 def tangents(checker: FloatArray, arcs: FloatArray) -> IntArray:
     """All free tangents; of very many points on arcs, those to points that are not too far away.
+
+    Short ones come first, in rings of growing length, until ``_MOST_WORK`` is done: along the walls of a hatched map
+    every point sees a thousand others. The work is counted, not timed, so the same points have the same tangents on
+    every machine.
 
     Args:
         checker: As ``clearance_checker`` makes it.
@@ -31,82 +44,260 @@ def tangents(checker: FloatArray, arcs: FloatArray) -> IntArray:
     Returns:
         Indices of their ends, shape (k, 2).
     """
-    order = np.argsort(arcs[:, 0], kind="stable")
     x0, y0, x1, y1 = checker[:4]
+    farthest = math.hypot(x1 - x0, y1 - y0)
     # Of points spread evenly, so many partners lie within the circle that there are _MOST_PAIRS.
     longest = math.sqrt((x1 - x0) * (y1 - y0) * 2 * _MOST_PAIRS / math.pi) / max(len(arcs), 1)
-    out = arcs[order, :2] - arcs[order, 2:4]
+    others = np.flatnonzero(~np.isnan(arcs[:, 2]))
+    ends = _ends(arcs[others])
+    squares = _squares(ends[:, :2])
+    found, left = [tangents_of_own(checker, arcs)], _MOST_WORK
+    for near, far in _rings(min(longest, farthest), squares.side, len(arcs)):
+        at = 0
+        while at < len(ends) and left > 0:
+            pairs, at, work = _tangents_of_arcs(
+                checker, ends, squares.starts, squares.items, squares.low, squares.side, squares.counts, at, near, far,
+                min(_AT_A_TIME, left))
+            found.append(others[pairs])
+            left -= work
+    return np.concatenate(found)
+
+
+def tangents_of_own(checker: FloatArray, arcs: FloatArray) -> IntArray:
+    """Those tangents that begin or end at points of their own, as ``tangents``; so much work again at most."""
+    ends, own = _ends(arcs), np.flatnonzero(np.isnan(arcs[:, 2]))
+    found, left = [np.empty((0, 2), dtype=np.int64)], _MOST_WORK
+    x0, y0, x1, y1 = checker[:4]
+    farthest = math.hypot(x1 - x0, y1 - y0)
+    for near, far in _rings(farthest, 0.01 * farthest, len(arcs)):
+        at = 0
+        while at < len(own) and left > 0:
+            pairs, at, work = _tangents_of_own(checker, ends, own, at, near, far, min(_AT_A_TIME, left))
+            found.append(pairs)
+            left -= work
+    return np.concatenate(found)
+
+
+def _ends(arcs: FloatArray) -> FloatArray:
+    """x, y, the direction from the arc's centre, and the squared tolerance; shape (n, 5)."""
+    out = arcs[:, :2] - arcs[:, 2:4]
     out /= np.hypot(out[:, 0], out[:, 1])[:, None]
-    alone = np.isnan(out[:, 0])
-    out[alone] = 0.0  # at right angles to every line: tangent to all
-    ends = np.column_stack([arcs[order, :2], out, arcs[order, 4] ** 2])
-    found: IntArray = order[_tangents(checker, ends, np.flatnonzero(alone), longest)]
-    return found
+    out[np.isnan(out[:, 0])] = 0.0  # points of their own: at right angles to every line, so tangent to all
+    return np.column_stack([arcs[:, :2], out, arcs[:, 4] ** 2])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Squares:
+    """Points by the square of a grid that they lie in.
+
+    Attributes:
+        low: x, y of the grid's lower left corner [m].
+        side: Side of a square [m].
+        counts: Columns and rows.
+        starts: Where the points of each square begin in ``items``; row by row, and one more.
+        items: Indices of the points.
+    """
+
+    low: FloatArray
+    side: float
+    counts: IntArray
+    starts: IntArray
+    items: IntArray
+
+
+def _squares(points: FloatArray) -> _Squares:
+    """About two points a square, were they spread evenly."""
+    low = points.min(axis=0) if len(points) else np.zeros(2)
+    wide, high = (points.max(axis=0) - low).tolist() if len(points) else (0.0, 0.0)
+    side = max(math.sqrt(2 * wide * high / max(len(points), 1)), max(wide, high) / 1000, 1e-3)
+    columns, rows = math.floor(wide / side) + 1, math.floor(high / side) + 1
+    at = np.floor((points - low) / side).astype(np.int64)
+    square = at[:, 1] * columns + at[:, 0]
+    starts = np.concatenate([[0], np.cumsum(np.bincount(square, minlength=columns * rows))])
+    return _Squares(low=low, side=side, counts=np.array([columns, rows]), starts=starts,
+                    items=np.argsort(square, kind="stable"))
+
+
+def _rings(reach_m: float, side_m: float, points: int) -> Iterator[tuple[float, float]]:
+    """Lengths from and to, until the reach; the first ring is a few squares wide at least, and of few points all."""
+    near, far = 0.0, 4 * side_m
+    while far < reach_m and points > _FEW:
+        yield near, far
+        near, far = far, far * _RING
+    yield near, reach_m
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _tangents(checker: FloatArray, ends: FloatArray, own: IntArray, longest: float) -> IntArray:
-    """The same.
+def _tangents_of_own(
+    checker: FloatArray, ends: FloatArray, own: IntArray, first: int, near: float, far: float, most: int
+) -> tuple[IntArray, int, int]:
+    """Free lines between points of their own, and from them to arcs that they touch.
 
     Args:
         checker: As ``clearance_checker`` makes it.
-        ends: x, y, the direction from the arc's centre, and the squared tolerance; in order of x, shape (n, 5).
-        own: Indices of points of their own.
-        longest: Length of tangents between arcs [m].
+        ends: x, y, the direction from the arc's centre, and the squared tolerance, shape (n, 5).
+        own: Indices of points of their own, ascending.
+        first: Which of them to begin with.
+        near, far: Lengths that are looked for: above the one, at most the other [m].
+        most: Work that is enough for now.
+
+    Returns:
+        Indices of the ends, shape (k, 2); which point is next; and the work done.
     """
-    found = np.empty((1024, 2), dtype=np.int64)
-    count = 0
-    for i in range(len(ends)):
-        x, y, nx, ny, slack = ends[i]
-        alone = nx == 0.0 and ny == 0.0
-        j = i - 1
-        before = len(own) - 1  # once the others are too far away, only points of their own are left
-        while True:
-            if j >= 0 and x - ends[j, 0] > longest and not alone:
-                while before >= 0 and own[before] > j:
-                    before -= 1
-                if before < 0:
-                    break
-                j = own[before]
-            if j < 0:
-                break
+    found = np.empty((256, 2), dtype=np.int64)
+    count, work, seen = 0, 0, 0
+    while first < len(own) and work < most:
+        i = own[first]
+        x, y = ends[i, 0], ends[i, 1]
+        for j in range(len(ends)):
             dx, dy = ends[j, 0] - x, ends[j, 1] - y
             squared = dx * dx + dy * dy
+            if squared > far * far or (squared <= near * near and near > 0):
+                continue
             mx, my = ends[j, 2], ends[j, 3]
-            # Within so much of a right angle to the radius a line touches the arc.
-            if ((nx * dx + ny * dy) ** 2 <= slack * squared and (mx * dx + my * dy) ** 2 <= ends[j, 4] * squared
-                    and (squared <= longest * longest or alone or (mx == 0.0 and my == 0.0))
-                    and keeps_clear(checker, x, y, ends[j, 0], ends[j, 1])):
-                if count == len(found):
-                    grown = np.empty((2 * count, 2), dtype=np.int64)
-                    grown[:count] = found
-                    found = grown
-                found[count, 0], found[count, 1] = i, j
-                count += 1
-            j -= 1
-    return found[:count].copy()
+            if (mx * dx + my * dy) ** 2 > ends[j, 4] * squared or (mx == 0.0 and my == 0.0 and j >= i):
+                continue
+            passed = solids_passed(checker, x, y, ends[j, 0], ends[j, 1])
+            work += abs(passed)
+            if passed > 0:
+                found, count = _with(found, count, i, j)
+                work += _EDGE
+        seen += len(ends)
+        work += len(ends) // _SEEN
+        first += 1
+    return found[:count].copy(), first, work
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def taut(checker: FloatArray, path: FloatArray, window: int) -> FloatArray:
+def _tangents_of_arcs(
+    checker: FloatArray, ends: FloatArray, starts: IntArray, items: IntArray, low: FloatArray, side: float,
+    counts: IntArray, first: int, near: float, far: float, most: int,
+) -> tuple[IntArray, int, int]:
+    """Free lines that touch the arcs at both ends.
+
+    Those from a point lie in two narrow cones; only the squares that a cone runs through are looked at.
+
+    Args:
+        checker, near, far, most: As above.
+        ends: As above, of points on arcs only.
+        starts, items, low, side, counts: As in ``_Squares``.
+        first: Which point to begin with.
+
+    Returns:
+        As above.
+    """
+    found = np.empty((256, 2), dtype=np.int64)
+    count, work, seen = 0, 0, 0
+    quad = np.empty((4, 2))
+    columns, rows = counts
+    while first < len(ends) and work < most:
+        i = first
+        x, y, nx, ny, slack = ends[i]
+        sine, cosine = math.sqrt(slack) + 1e-9, math.sqrt(1 - slack) - 1e-9
+        for sign in (-1.0, 1.0):
+            tx, ty = -sign * ny, sign * nx
+            # A quadrangle about the part of the cone that is as far away as asked for.
+            for corner in range(4):
+                turn = sine if corner in (1, 2) else -sine
+                away = near if corner < 2 else far / cosine
+                quad[corner, 0] = x + away * (cosine * tx - turn * ty)
+                quad[corner, 1] = y + away * (cosine * ty + turn * tx)
+            bottom = max(math.floor((quad[:, 1].min() - low[1]) / side - 1e-6), 0)
+            top = min(math.floor((quad[:, 1].max() - low[1]) / side + 1e-6), rows - 1)
+            for row in range(bottom, top + 1):
+                left, right = _span(quad, low[1] + row * side - 1e-6 * side, low[1] + (row + 1) * side + 1e-6 * side)
+                begin = max(math.floor((left - low[0]) / side - 1e-6), 0)
+                end = min(math.floor((right - low[0]) / side + 1e-6), columns - 1)
+                seen += 1
+                if begin > end:
+                    continue
+                for at in range(starts[row * columns + begin], starts[row * columns + end + 1]):
+                    j = items[at]
+                    seen += 1
+                    if j >= i:
+                        continue
+                    dx, dy = ends[j, 0] - x, ends[j, 1] - y
+                    squared = dx * dx + dy * dy
+                    # Within so much of a right angle to the radius a line touches the arc.
+                    if (squared > far * far or (squared <= near * near and near > 0)
+                            or tx * dx + ty * dy < 0.0 or (nx * dx + ny * dy) ** 2 > slack * squared
+                            or (ends[j, 2] * dx + ends[j, 3] * dy) ** 2 > ends[j, 4] * squared):
+                        continue
+                    passed = solids_passed(checker, x, y, ends[j, 0], ends[j, 1])
+                    work += abs(passed)
+                    if passed > 0:
+                        found, count = _with(found, count, i, j)
+                        work += _EDGE
+        work += seen // _SEEN
+        seen %= _SEEN
+        first += 1
+    return found[:count].copy(), first, work
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _span(quad: FloatArray, low: float, high: float) -> tuple[float, float]:
+    """Least and greatest x of a convex quadrangle between two heights; in the wrong order if it has no part there."""
+    left, right = math.inf, -math.inf
+    for k in range(4):
+        ax, ay, bx, by = quad[k, 0], quad[k, 1], quad[(k + 1) % 4, 0], quad[(k + 1) % 4, 1]
+        if max(ay, by) < low or min(ay, by) > high:
+            continue
+        for height, y, x in ((low, ay, ax), (high, by, bx)):
+            if low <= y <= high:
+                left, right = min(left, x), max(right, x)
+            if ay != by and min(ay, by) <= height <= max(ay, by):
+                cut = ax + (bx - ax) * (height - ay) / (by - ay)
+                left, right = min(left, cut), max(right, cut)
+    return left, right
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _with(found: IntArray, count: int, i: int, j: int) -> tuple[IntArray, int]:
+    """A list of pairs with one more."""
+    if count == len(found):
+        grown = np.empty((2 * count, 2), dtype=np.int64)
+        grown[:count] = found
+        found = grown
+    found[count, 0], found[count, 1] = i, j
+    return found, count + 1
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def taut(checker: FloatArray, vertices: FloatArray, chain: IntArray, window: int, known: IntArray) -> FloatArray:
     """The shortest path by way of some of a path's vertices, in their order.
 
     Args:
         checker: As ``clearance_checker`` makes it.
-        path: Vertices [m], shape (n, 2); it keeps the clearance.
+        vertices: Those of the roadmap [m], shape (v, 2).
+        chain: Which of them the path runs through, shape (n,); it keeps the clearance.
         window: How many vertices at most are cut off at a time.
+        known: What was found out about lines between vertices for other paths, as ``nothing_known`` makes it.
     """
-    n = len(path)
+    n = len(chain)
     length = np.full(n, np.inf)
     before = np.zeros(n, dtype=np.int64)
     length[0] = 0.0
     for j in range(1, n):
         for i in range(max(j - window, 0), j):
-            way = length[i] + math.hypot(path[j, 0] - path[i, 0], path[j, 1] - path[i, 1])
-            if way < length[j] and (i == j - 1 or keeps_clear(checker, path[i, 0], path[i, 1], path[j, 0], path[j, 1])):
-                length[j], before[j] = way, i
+            ax, ay, bx, by = vertices[chain[i], 0], vertices[chain[i], 1], vertices[chain[j], 0], vertices[chain[j], 1]
+            way = length[i] + math.hypot(bx - ax, by - ay)
+            if way < length[j]:
+                free = i == j - 1
+                if not free:
+                    line = 2 * (chain[i] * len(vertices) + chain[j])
+                    slot = (line * 0x9E3779B1 >> 12) % len(known)
+                    if known[slot] != line and known[slot] != line + 1:
+                        known[slot] = line + keeps_clear(checker, ax, ay, bx, by)
+                    free = known[slot] == line + 1
+                if free:
+                    length[j], before[j] = way, i
     kept = [n - 1]
     while kept[-1] > 0:
         kept.append(before[kept[-1]])
-    shorter: FloatArray = path[np.array(kept[::-1])]
+    shorter: FloatArray = vertices[chain[np.array(kept[::-1])]]
     return shorter
+
+
+def nothing_known() -> IntArray:
+    """What ``taut`` remembers, at first: twice the number of a line, and one more if it is free; by its place."""
+    return np.full(_LINES, -1, dtype=np.int64)

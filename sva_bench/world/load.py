@@ -48,18 +48,21 @@ def load_world(path: Path) -> World:
     return world_of(read_yaml(path))
 
 
-def world_of(document: Document, folder: Path | None = None) -> World:
+def world_of(
+    document: Document, folder: Path | None = None, ground: tuple[Obstacles, MapSource] | None = None
+) -> World:
     """Resolve a world file's content.
 
     Args:
         document: The content.
         folder: Where the files are that it names; by default where it is itself.
+        ground: What they hold, where that is known already.
 
     Raises:
         BadFile: As ``load_world``.
     """
     file = validate(document, WorldFile, KIND)
-    obstacles, source = _map(document, file.map, folder or document.path.parent)
+    obstacles, source = ground or _map(document, file.map, folder or document.path.parent)
     pois = [f"p{k + 1}" for k in range(file.sites.pois.random)] if isinstance(file.sites.pois, RandomPois) else list(
         file.sites.pois)
     robots = tuple(_robot(document, name, entry, pois) for name, entry in file.robots.items())

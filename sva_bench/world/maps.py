@@ -7,9 +7,11 @@ opaque is unknown, but in raw mode. The map_server of ROS 1 leaves pixels at a t
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 import os
+import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path, PurePosixPath
@@ -19,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sva_bench.arrays import BoolArray
-from sva_bench.documents import Document, read_yaml
+from sva_bench.documents import Document, pretty_yaml, read_bytes, read_yaml
 from sva_bench.errors import BadFile, nearest
 from sva_bench.world.cells import Cells
 from sva_bench.world.images import MAX_CELLS, BadImage, GreyImage, grey_image
@@ -31,6 +33,7 @@ Unknown = Literal["occupied", "free"]
 
 MAX_BYTES = 100_000_000  # 16 million numbers in ASCII, with room to spare
 WIDEST_M, FARTHEST_M = 2000.0, 1e5  # of a world, and from its origin; as for shapes
+_USUAL_UNKNOWN, _MANY = 205, 1e-3  # the level that map_saver writes for unknown; share of cells that is no accident
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
 _MODES: tuple[Mode, ...] = ("trinary", "scale", "raw")
 _YES, _NO = ("true", "yes", "on", "1"), ("false", "no", "off", "0")  # YAML 1.1 has all of them, and ROS reads it
@@ -50,13 +53,17 @@ class MapFile:
     content: bytes
 
 
-def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[Cells, tuple[MapFile, ...]]:
+def read_ros_map(
+    root: Path, name: str, unknown: Unknown = "occupied", *, anywhere: bool = False
+) -> tuple[Cells, tuple[MapFile, ...]]:
     """Read a map of map_server or Nav2.
 
     Args:
         root: The folder that no file may leave.
         name: The map's YAML file, relative to it.
         unknown: What cells count as that are neither occupied nor free.
+        anywhere: Let the image lie outside the folder. The files that are returned fit together all the same: the YAML
+            file names the image beside it.
 
     Returns:
         The grid; and the files that were read, the YAML file first.
@@ -68,7 +75,8 @@ def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[
     document = read_yaml(path)
     if not isinstance(document.data, dict):
         raise document.error((), "expected a map's keys: image, resolution, origin, ...")
-    image_name = _image_name(document, name)
+    elsewhere = _elsewhere(document, root, path) if anywhere else None
+    image_name = _image_name(document, name, elsewhere)
     cell_m = _number(document, "resolution", 1e-4, 100.0)
     origin = _origin(document)
     negate = _flag(document, "negate")
@@ -77,7 +85,7 @@ def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[
         raise document.error(("free_thresh",), f"free_thresh {free} is above occupied_thresh {occupied}; exchange them")
     mode = _mode(document)
     try:
-        image_path = locate(root, image_name)
+        image_path = elsewhere or locate(root, image_name)
     except BadFile as error:
         raise document.error(("image",), f"{error.path}: {error.problem}") from None
     try:
@@ -95,9 +103,47 @@ def read_ros_map(root: Path, name: str, unknown: Unknown = "occupied") -> tuple[
                              f"{WIDEST_M:g} m wide")
     if odd := [key for key in document.data if key not in _KEYS]:
         _log.warning("%s: not used: %s", path, ", ".join(map(repr, odd)))
+    _say_what_is_odd(document, image, value, free)
+    _refuse_no_free_cell(document, solid, int((value < 100 * occupied).sum()), unknown)
     cells = Cells(occupied=solid[::-1], cell_m=cell_m, origin=np.array(origin),
                   unknown=(solid & (value < 100 * occupied))[::-1])
-    return cells, (MapFile(name=_normal(name), content=_content(path)), MapFile(name=image_name, content=content))
+    own = _content(path) if elsewhere is None else naming_image(document, PurePosixPath(image_name).name)
+    return cells, (MapFile(name=_normal(name), content=own), MapFile(name=image_name, content=content))
+
+
+def _say_what_is_odd(document: Document, image: GreyImage, value: NDArray[np.int8], free_thresh: float) -> None:
+    """Notices of what a map hardly means."""
+    path, yaw = document.path, _as_number(document.data["origin"][2]) or 0.0
+    if abs(yaw) > 2 * math.pi:
+        _log.warning("%s: the origin's yaw is %g, more than a turn: it is in radians; %g degrees are %.6g", path, yaw,
+                     yaw, math.radians(yaw))
+    doubtful = (image.level == _USUAL_UNKNOWN) & (value == 0)
+    if (share := float(doubtful.mean())) >= _MANY:
+        _log.warning("%s: %.1f %% of the cells have the grey level %d, which many maps use for unknown, and count as "
+                     "free by free_thresh %g; if they are unknown, write free_thresh: 0.196", path, 100 * share,
+                     _USUAL_UNKNOWN, free_thresh)
+
+
+def _refuse_no_free_cell(document: Document, solid: BoolArray, not_occupied: int, unknown: Unknown) -> None:
+    if not solid.all():
+        return
+    otherwise = "negate, the thresholds and mode"
+    if not_occupied and unknown == "occupied":
+        otherwise = f"whether unknown cells are free (unknown: free; from-map: --unknown free), and {otherwise}"
+    raise document.error((), f"no cell of the map is free: {solid.size - not_occupied} are occupied and {not_occupied} "
+                         f"unknown; look at {otherwise}")
+
+
+def naming_image(document: Document, name: str) -> bytes:
+    """The text of a map's YAML file with another image: its line is replaced, or all of it written anew."""
+    lines = document.text.split("\n")
+    at = (document.line(("image",)) or 1) - 1
+    ending = re.fullmatch(r"image\s*:\s*[^\s'\"#|>&*{\[][^#]*?(\s*#.*)?|image\s*:\s*(?:'[^']*'|\"[^\"]*\")(\s*#.*)?",
+                          lines[at])
+    if ending is None or (at + 1 < len(lines) and lines[at + 1][:1].isspace() and lines[at + 1].strip()):
+        return pretty_yaml({**document.data, "image": name}, {}).encode()
+    lines[at] = f"image: {json.dumps(name, ensure_ascii=False)}{ending[1] or ending[2] or ''}"
+    return "\n".join(lines).encode()
 
 
 def occupancy(
@@ -149,7 +195,8 @@ def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tupl
     """
     path = locate(root, name)
     content = _content(path)
-    lines = content.split(b"\n")
+    # An editor's byte-order mark is no part of the text, and no more lines are taken apart than cells may be.
+    lines = content.removeprefix(b"\xef\xbb\xbf").split(b"\n", MAX_CELLS + 4)
     lines = [line.removesuffix(b"\r") for line in lines]
     while lines and not lines[-1].strip():
         lines.pop()
@@ -184,6 +231,8 @@ def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tupl
         row, column = np.argwhere(strange)[0].tolist()
         raise BadFile(path, row + 5, "", f"column {column + 1}: {chr(letters[row, column])!r} is no terrain; expected "
                       "one of . G S @ O T W")
+    if not free.any():
+        raise BadFile(path, None, "", f"no cell of the map is free: all {free.size} are solid (one of @ O T W)")
     cells = Cells(occupied=~free[::-1], cell_m=cell_m, origin=np.zeros(3))
     return cells, (MapFile(name=_normal(name), content=content),)
 
@@ -218,20 +267,33 @@ def _normal(name: str) -> str:
 
 
 def _content(path: Path) -> bytes:
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise BadFile(path, None, "", f"{size} bytes; at most {MAX_BYTES} are read")
-        return path.read_bytes()
-    except OSError as error:
-        raise BadFile(path, None, "", f"cannot be read: {error.strerror}") from None
+    return read_bytes(path, MAX_BYTES)
 
 
-def _image_name(document: Document, yaml_name: str) -> str:
+def _image_of(document: Document) -> str:
     image = _value(document, "image")
-    if not isinstance(image, str) or not image.strip():
+    if not isinstance(image, str) or not image.strip() or "\0" in image:
         raise document.error(("image",), "expected the name of a PGM, PNG or BMP file")
-    if image.startswith(("/", "~")):
+    return image
+
+
+def _elsewhere(document: Document, root: Path, path: Path) -> Path | None:
+    """Where the image is, if not in the folder."""
+    image = Path(path.parent, _image_of(document))
+    try:
+        if image.resolve().is_relative_to(root.resolve()):
+            return None
+        there, regular = image.exists(), image.is_file()
+    except (OSError, RuntimeError, ValueError):
+        there = regular = False
+    if not regular:
+        raise document.error(("image",), f"{image}: {'not a file' if there else 'no such file'}")
+    return image
+
+
+def _image_name(document: Document, yaml_name: str, elsewhere: Path | None) -> str:
+    image = _image_of(document) if elsewhere is None else elsewhere.name
+    if elsewhere is None and image.startswith(("/", "~")):
         raise document.error(("image",), f"{image[:200]!r} is an absolute path; put the image beside this file and "
                              "name it without folders")
     return _normal(str(PurePosixPath(yaml_name).parent / image))

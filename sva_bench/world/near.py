@@ -87,9 +87,16 @@ def _buckets(
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def keeps_clear(checker: FloatArray, ax: float, ay: float, bx: float, by: float) -> bool:
     """Whether a segment keeps the checker's clearance from all obstacles and the bounds; equal ends make it a point."""
+    return bool(solids_passed(checker, ax, ay, bx, by) > 0)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def solids_passed(checker: FloatArray, ax: float, ay: float, bx: float, by: float) -> int:
+    """The same, and what it took: 1 + the solids and buckets that a segment was held against, negative if too near."""
+    passed = 1
     x0, y0, x1, y1, needed, side = checker[:6]
     if min(min(ax, bx) - x0, min(ay, by) - y0, x1 - max(ax, bx), y1 - max(ay, by)) < needed:
-        return False
+        return -passed
     columns, rows, boxes = int(checker[6]), int(checker[7]), int(checker[8])
     at_cylinders, at_starts, at_items = int(checker[10]), int(checker[11]), int(checker[12])
     if ax > bx:
@@ -110,17 +117,19 @@ def keeps_clear(checker: FloatArray, ax: float, ay: float, bx: float, by: float)
         top = min(max(math.floor((max(ya, yb) - y0) / side + 1e-6), 0), rows - 1)
         for row in range(low, top + 1):
             bucket = at_starts + row * columns + column
+            passed += 1
             for at in range(at_items + int(checker[bucket]), at_items + int(checker[bucket + 1])):
                 k = int(checker[at])
+                passed += 1
                 if k < boxes:
                     b = checker[_HEAD + 6 * k:_HEAD + 6 * k + 6]
                     if segment_box(ax, ay, bx, by, b[0], b[1], b[2], b[3], b[4], b[5], needed) < needed:
-                        return False
+                        return -passed
                 else:
                     c = checker[at_cylinders + 3 * (k - boxes):at_cylinders + 3 * (k - boxes) + 3]
                     if max(point_segment(c[0], c[1], ax, ay, bx, by) - c[2], 0.0) < needed:
-                        return False
-    return True
+                        return -passed
+    return passed
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

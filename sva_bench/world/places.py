@@ -37,6 +37,7 @@ APART_M = 0.5
 _SURE_M = 2e-3  # places are rounded to millimetres, and the roadmap goes about corners in polygons
 _FINEST_M, _PLACES = 0.05, 1_000_000  # finest lattice over shapes, and about how many places of it at most
 _ENCLOSED = 0.25  # share of the largest free region from which on an enclosed one is taken for the inside of a building
+_WORTH_SAYING = 0.05  # share of its region from which on a base outside is told of an enclosed one
 _LOOSE, _TIGHTER, _CLOSEST_M = 0.8, 0.85, 0.25  # spacing tried first, in that of a square grid; then so much less
 _CHUNK = 4096  # places looked at together
 
@@ -142,16 +143,46 @@ def _spacings(widest_m: float) -> list[float]:
     return [round(math.floor(spacing / 0.05 + 1e-9) * 0.05, 2) for spacing in tried]
 
 
+def enclosed_beside(field: DistanceField, base: Point, radius_m: float) -> tuple[float, Point] | None:
+    """An enclosed region beside that of a base which reaches the grid's rim: the base may be outside of all walls.
+
+    Returns:
+        Area of the largest one [m2], and a place near its middle; ``None`` if the base is enclosed itself, or all that
+        is enclosed is small beside its region.
+    """
+    needed = radius_m + CLEARANCE_MARGINS_M[0] + _SURE_M
+    parts, sizes, enclosed = _regions(field, needed)
+    row, column = field.index_of(np.array([base]))[0].tolist()
+    mine = int(parts[row, column])
+    if mine == 0 or enclosed[mine] > 0 or enclosed.max() < _WORTH_SAYING * sizes[mine]:
+        return None
+    return float(enclosed.max()) * (field.cells.cell_m / 2) ** 2, _near_middle(field, parts == int(enclosed.argmax()))
+
+
 def _middle(field: DistanceField, needed_m: float) -> Point | None:
     """The place nearest to the middle of the largest region that is enclosed by more than the grid's rim.
 
     What reaches the rim is the outside of a building's walls, unless all that is enclosed is small beside it.
     """
-    roomy = field.distance_m >= needed_m
-    parts, count = label(roomy)
-    if count == 0:
+    parts, sizes, enclosed = _regions(field, needed_m)
+    if not sizes.any():
         return None
-    sizes = np.bincount(parts.ravel(), minlength=count + 1)
+    best = int(np.argmax(enclosed if enclosed.max() >= _ENCLOSED * sizes.max() else sizes))
+    return _near_middle(field, parts == best)
+
+
+def _near_middle(field: DistanceField, region: BoolArray) -> Point:
+    index = np.argwhere(region)
+    nearest = int(np.argmin(((index - index.mean(axis=0)) ** 2).sum(axis=1)))
+    return _points(field, index[nearest:nearest + 1])[0]
+
+
+def _regions(field: DistanceField, needed_m: float) -> tuple[NDArray[np.int32], IntArray, IntArray]:
+    """Connected regions with so much room, by number from 1; their sizes; and those of the enclosed, 0 for others."""
+    roomy = field.distance_m >= needed_m
+    found, count = label(roomy)
+    parts: NDArray[np.int32] = found.astype(np.int32, copy=False)
+    sizes: IntArray = np.bincount(parts.ravel(), minlength=count + 1).astype(np.int64)
     sizes[0] = 0
     # A wall along the rim is a cell thick at least, which is two steps.
     width = math.floor(needed_m / (field.cells.cell_m / 2) + 1.5) + 1
@@ -159,10 +190,7 @@ def _middle(field: DistanceField, needed_m: float) -> Point | None:
     inner[width:-width, width:-width] = True
     enclosed = sizes.copy()
     enclosed[np.unique(parts[~inner])] = 0
-    best = int(np.argmax(enclosed if enclosed.max() >= _ENCLOSED * sizes.max() else sizes))
-    index = np.argwhere(parts == best)
-    nearest = int(np.argmin(((index - index.mean(axis=0)) ** 2).sum(axis=1)))
-    return _points(field, index[nearest:nearest + 1])[0]
+    return parts, sizes, enclosed
 
 
 def _region_about(field: DistanceField, base: Point, needed_m: float) -> BoolArray:
