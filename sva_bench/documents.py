@@ -167,13 +167,13 @@ def parse_yaml(text: str, path: Path) -> Document:
     return Document(path, _plain(root, path, ()), text, root)
 
 
-def read_json(path: Path) -> Document:
-    """Read a JSON file; NaN, infinities and duplicate keys are refused.
+def read_json(path: Path, most: int = MAX_JSON_BYTES) -> Document:
+    """Read a JSON file of so many bytes at most; NaN, infinities and duplicate keys are refused.
 
     Raises:
         BadFile: If it cannot be read, is too large, or is not JSON.
     """
-    text = _read(path, MAX_JSON_BYTES)
+    text = _read(path, most)
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         found = dict(pairs)

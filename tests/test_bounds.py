@@ -12,11 +12,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.__main__ import run_command_line
+from sva_bench.documents import read_json
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.mission.instance import MOST_SITES, MOST_VEHICLES, read_instance
 from sva_bench.mission.plan import MOST_STOPS, read_plan
 from sva_bench.patterns import MOST_LOOKED_AT, matching
-from sva_bench.read_back import MOST_BYTES, read_bounded
+from sva_bench.read_back import MOST_BYTES
 from sva_bench.sweeps import Sweep, grid_of, seeds_of, sweep_of
 from sva_bench.tables import LEGS, OUTCOMES, pieces_of, write_table
 from tests.worlds_for_tests import SMALL
@@ -141,7 +142,7 @@ def test_a_document_that_is_too_long_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "manifest.json").open("wb") as file:
         file.truncate(MOST_BYTES + 1)  # no blocks of the disk are taken
     with pytest.raises(BadFile, match=f"{MOST_BYTES + 1} bytes; at most {MOST_BYTES} are read"):
-        read_bounded(tmp_path / "manifest.json", MOST_BYTES)
+        read_json(tmp_path / "manifest.json", MOST_BYTES)
 
 
 def test_more_trials_than_fit_into_memory_are_refused(world: Path, capsys: pytest.CaptureFixture[str]) -> None:

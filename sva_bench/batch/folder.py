@@ -14,9 +14,9 @@ from typing import Any
 
 from sva_bench.atomic import by_way_of, why
 from sva_bench.batch.schema import FailuresFile, ManifestFile, SettingsEntry
-from sva_bench.documents import pretty_json, validate
+from sva_bench.documents import pretty_json, read_json, validate
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.read_back import MOST_BYTES, Part, read_bounded, read_ours
+from sva_bench.read_back import MOST_BYTES, Part, read_ours
 
 MANIFEST = "sva-bench/batch-manifest@1"
 FAILURES = "sva-bench/batch-failures@1"
@@ -99,7 +99,7 @@ def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
 def is_batch(folder: Path) -> bool:
     """Whether a folder is that of a batch, whole or not."""
     try:
-        data = read_bounded(folder / "manifest.json", MOST_BYTES).data
+        data = read_json(folder / "manifest.json", MOST_BYTES).data
     except BadFile:
         return next(folder.glob("outcomes-*.parquet"), None) is not None
     return isinstance(data, dict) and str(data.get("format", "")).startswith("sva-bench/batch-manifest@")
@@ -115,7 +115,7 @@ def settings_in(folder: Path) -> tuple[Part, SettingsEntry]:
     path = folder / "manifest.json"
     if not path.exists():
         raise BadInput(f"{folder}: no folder of a batch (manifest.json is missing); choose another")
-    document = read_bounded(path, MOST_BYTES)
+    document = read_json(path, MOST_BYTES)
     if isinstance(document.data, dict) and document.data.get("format") == "sva-bench/manifest@1":
         raise BadInput(f"{folder}: the folder of a run, not of a batch; 'sva-bench report' with this folder writes its "
                        "report again")

@@ -12,10 +12,9 @@ import numpy as np
 from pydantic import Field
 
 from sva_bench.arrays import FloatArray, frozen
-from sva_bench.documents import Bounded, Document, Name, Probability, Section, pretty_json, validate
+from sva_bench.documents import Bounded, Document, Name, Probability, Section, pretty_json, read_json, validate
 from sva_bench.errors import BadFile, nearest
 from sva_bench.mission.failures import FailureProcess, JointState, marginals
-from sva_bench.read_back import read_bounded
 
 KIND = "sva-bench/instance@1"
 MOST_BYTES = 64_000_000
@@ -127,7 +126,7 @@ def read_instance(path: Path) -> Instance:
     Raises:
         BadFile: If it is no valid instance; names line and key.
     """
-    document = read_bounded(path, MOST_BYTES)
+    document = read_json(path, MOST_BYTES)
     _refuse_too_large(path, document.data)
     file = validate(document, _InstanceFile, KIND)
     sites = tuple(file.sites)

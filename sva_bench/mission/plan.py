@@ -9,11 +9,10 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from sva_bench.documents import Name, Number, Section, WholeNumber, dotted, pretty_json, validate
+from sva_bench.documents import Name, Number, Section, WholeNumber, dotted, pretty_json, read_json, validate
 from sva_bench.errors import BadFile, nearest
 from sva_bench.mission.instance import MOST_VEHICLES, Instance
 from sva_bench.printable import all_text
-from sva_bench.read_back import read_bounded
 
 KIND = "sva-bench/plan@1"
 MOST_BYTES = 20_000_000
@@ -118,7 +117,7 @@ def read_routes(path: Path, robots: Sequence[str], sites: Sequence[str]) -> dict
 
 def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFile:
     """A plan file, its names and its size checked."""
-    document = read_bounded(path, MOST_BYTES)
+    document = read_json(path, MOST_BYTES)
     routes = document.data.get("routes") if isinstance(document.data, dict) else None
     if isinstance(routes, dict) and len(routes) > MOST_VEHICLES:
         raise BadFile(path, None, "routes", f"{len(routes)} routes; at most {MOST_VEHICLES} are read")
