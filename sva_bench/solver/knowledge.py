@@ -171,7 +171,7 @@ class Progress:
     def slack(self, gap: float) -> float:
         """By how much another plan must be worth more to be of interest: less is within the gap, or below the next
         value that a plan can have, or rounding."""
-        return max(gap * abs(self.value), (1 - 1e-5) * self.grain, self.rounding / 2)
+        return max(gap * abs(self.value), (1 - 1e-5) * self.grain - 2 * self.rounding, self.rounding / 2)
 
 
 def best_known(goal: Goal, known: Knowledge) -> Orders | None:

@@ -164,6 +164,8 @@ def plan_deterministic(
     known.check(instance)
     clock = limits.clock()
     if nominal is None:
+        if stochastic.status == "interrupted":  # all that there is to begin with: what follows ends at once
+            known.orders[_orders(instance, stochastic, known)] = None
         nominal = plan_nominal(instance, limits, known=known, method=method, cuts=cuts)
     elif nominal.value is None or nominal.bound is None or nominal.status is None:
         raise ValueError("the nominal plan must state its value, bound and status")

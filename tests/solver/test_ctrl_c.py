@@ -105,6 +105,8 @@ def test_ctrl_c_ends_all_solves_of_a_plan(monkeypatch: pytest.MonkeyPatch) -> No
     with deferring_ctrl_c():  # as the command line has it
         plans = plan_deterministic(instance, plan_stochastic(instance))
     assert plans.plan.status == plans.stochastic.status == "interrupted"
+    assert plans.plan.value is not None
+    assert plans.plan.value > 0  # with nothing better, the routes of the first plan
 
 
 def test_labels_stop_growing_when_ctrl_c_is_pressed_or_time_is_up() -> None:

@@ -87,6 +87,7 @@ def correlated(instance: Instance, rng: np.random.Generator) -> Instance:
     names = [v.name for v in instance.vehicles]
     sets = rng.permutation(2 ** len(names))[:int(rng.integers(1, 2 ** len(names) + 1))]
     shares = rng.dirichlet(np.full(len(sets), rng.choice([0.3, 1.0, 5.0])))
+    shares = (shares + 1e-4) / (shares + 1e-4).sum()  # not so small that what a visit earns is rounding
     states = tuple(JointState(probability=float(p), available=frozenset(
         name for k, name in enumerate(names) if bits >> k & 1)) for p, bits in zip(shares, sets, strict=True))
     return replace(instance, joint=states, vehicles=tuple(
@@ -256,6 +257,13 @@ def test_foresight_scales_with_incentives(factor: float) -> None:
         instance = team(seed)
         assert wait_and_see(scaled(instance, factor)) == pytest.approx(
             factor * (wait_and_see(instance) or 0.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [7, 12])
+def test_a_deterministic_plan_is_proved_though_its_grain_is_fine(seed: int) -> None:
+    # Cents at availabilities of 0.25, 0.75 and 0.9: values are multiples of a number hardly above rounding.
+    instance = team(1000 + seed)
+    assert plan_deterministic(instance, plan_stochastic(instance)).plan.status == "optimal"
 
 
 def test_a_plan_that_is_off_by_half_is_not_optimal_however_little_is_earned() -> None:
