@@ -163,6 +163,7 @@ def main() -> None:
     parser.add_argument("--process", choices=["mission", "per_leg"], default="mission")
     told = parser.parse_args()
     print("| noise | world | scenario | interval | " + " | ".join(f"K = {k}" for k in told.rollouts) + " |")
+    shares: dict[tuple[float, str], dict[int, list[float]]] = {}
     for noise in told.noise:
         for name in told.worlds:
             world = load_world(WORLDS / f"{name}.yaml")
@@ -181,11 +182,18 @@ def main() -> None:
                             (low - slack <= truth <= high + slack, high - low, high - low <= slack))
             for (scenario, kind), by in sorted(held.items()):
                 cells = []
-                for rounds in by.values():
+                for rollouts, rounds in by.items():
                     hit, width, flat = np.array(rounds, dtype=np.float64).T
+                    if not flat.all():  # a certainty is no interval
+                        shares.setdefault((noise, kind), {}).setdefault(rollouts, []).append(100 * float(hit.mean()))
                     cells.append(f"{100 * hit.mean():.1f} ({width.mean():.3g}"
                                  + (f", flat {100 * flat.mean():.0f}" if flat.any() else "") + ")")
                 print(f"| {noise:g} | {name} | {scenario} | {kind} | " + " | ".join(cells) + " |", flush=True)
+    print("\nOver worlds and scenarios, the least in brackets:\n")
+    print("| noise | interval | " + " | ".join(f"K = {k}" for k in told.rollouts) + " |")
+    for (noise, kind), by_draws in shares.items():
+        cells = [f"{np.mean(by_draws[k]):.1f} ({min(by_draws[k]):.1f})" if k in by_draws else "" for k in told.rollouts]
+        print(f"| {noise:g} | {kind} | " + " | ".join(cells) + " |")
 
 
 if __name__ == "__main__":
