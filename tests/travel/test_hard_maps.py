@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -112,9 +113,9 @@ def test_no_way_leads_through_a_wall() -> None:
 
 
 def test_a_crowd_of_corners_is_joined_by_the_lattice(monkeypatch: pytest.MonkeyPatch) -> None:
-    cells = cells_of(hatched(240), 0.05)
+    cells = cells_of(hatched(160), 0.05)
     obstacles = obstacles_of(cells)
-    points = places_on(cells, 5, 1)
+    points = places_on(cells, 4, 1)
     usual = plan_paths(obstacles, points, CLEARANCE_M)
     monkeypatch.setattr("sva_bench.travel.roadmap._CROWD", 100)
     monkeypatch.setattr(tangents_module, "_FEW", 10)
@@ -125,7 +126,8 @@ def test_a_crowd_of_corners_is_joined_by_the_lattice(monkeypatch: pytest.MonkeyP
             other = hurried[i][j]
             assert (path is None) == (other is None)
             if path is not None and other is not None:
-                assert path_clearance(obstacles, other) >= CLEARANCE_M - 1e-6
+                checker = clearance_checker(obstacles, CLEARANCE_M, 1e-6)
+                assert all(keeps_clear(checker, *a, *b) for a, b in pairwise(other.tolist()))
                 # A hundredth of the work that is allowed leaves few tangents; still no way is much longer.
                 assert length_of(other) <= 1.25 * length_of(path)
 
