@@ -17,6 +17,7 @@ from sva_bench.assumptions import cross_table
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Drives, Executed, Settings, execute
 from sva_bench.informed import cases_of, is_part, put_together
+from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance, write_instance
 from sva_bench.mission.plan import Plan, write_plan
 from sva_bench.planning import (
@@ -26,6 +27,7 @@ from sva_bench.planning import (
     instance_of,
     plan_costs,
     plan_scenarios,
+    reach_of,
     unlimited,
 )
 from sva_bench.recording.rerun import record
@@ -96,13 +98,14 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
     cases += [case for scenario in world.scenarios if (known := planned[scenario.name].informed) is not None
               for case in cases_of(scenario, known)]
     drives: Drives = {}
+    reach = reach_of(world, costs)
     while True:
         settings = settings_of(world, options)
         with clock.phase("execution"):
             executed = execute(world, costs, cases, settings, executor,
                                lambda done, of: progress("driving routes", done, of), drives)
         executed = _with_informed(world, executed)
-        summary = summarise(world, options, settings, costs, planned, executed)
+        summary = summarise(world, options, settings, costs, planned, executed) | {"reach": reach}
         larger = options.precision.next_size(summary) if options.precision else None
         if larger is None:
             break
@@ -154,10 +157,12 @@ def execute_plans(
     for scenario in world.scenarios:
         # What the routes are worth if fuel and limits allow them: an infeasible plan may be here to be seen failing.
         truth = unlimited(replace(instances[scenario.name], failure=world.execute_failure))
-        judged = [Judged(expected=expected_value(truth, plan), executed=runs[scenario.name, name])
+        judged = [Judged(expected=expected_value(truth, plan), executed=runs[scenario.name, name],
+                         feasible=certify(instances[scenario.name], replace(plan, value=None)).feasible)
                   for name, plan in plans.items()]
         entries.append(comparison_summary(judged, robots, noisy=not world.noise.silent))
-    summary = head(world, options, settings, costs) | {"reproducible": True, "scenarios": entries}
+    summary = head(world, options, settings, costs) | {
+        "reach": reach_of(world, costs), "reproducible": True, "scenarios": entries}
     return _publish(world, options, costs, instances, executed, summary, out, clock, progress,
                     identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
                                         for name, plan in plans.items()}})

@@ -119,8 +119,11 @@ def execute(
     world: WorldArgument,
     plans: Annotated[list[Path], typer.Argument(metavar="PLAN...", help="Plan files (JSON), by hand or from anywhere.",
                                                 show_default=False)],
-    allow_infeasible: Annotated[bool, typer.Option("--allow-infeasible", help="Drive plans that break fuel or limit "
-                                                   "too: seeing them fail is the point.")] = False,
+    allow_infeasible: Annotated[bool, typer.Option("--allow-infeasible", help="Drive plans that break fuel capacity "
+                                                   "or mission limit too: seeing them fail is the point. What no robot "
+                                                   "could drive is refused all the same: unknown sites, legs without a "
+                                                   "way, a POI visited twice, routes that don't begin and end at the "
+                                                   "base.")] = False,
     seed: Seed = 0,
     trials: Trials = 1000,
     rollouts: Rollouts = 8,

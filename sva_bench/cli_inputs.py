@@ -33,7 +33,8 @@ def check_world(
     set_up_logging(verbose)
     loaded = load(world)
     with holding_back_ctrl_c():
-        from sva_bench.planning import out_of_reach, plan_costs
+        from sva_bench.analysis.reach import NOTHING, beyond_reach
+        from sva_bench.planning import plan_costs, reach_of
 
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
@@ -43,13 +44,10 @@ def check_world(
         console.print(f"{cost.times.model.name}: {cost.pairs} travel times of up to {longest:.1f} s, "
                       f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
                       highlight=False)
-    lost = out_of_reach(loaded, costs)
-    for robot, pois in lost.items():
-        console.print(f"{robot} reaches none of {', '.join(pois)} within its fuel and limit, and will never be sent "
-                      "there", highlight=False)
-    useless = all(len(lost.get(robot.name, ())) == len(loaded.pois) for robot in loaded.robots)
-    verdict = "can be read, but no robot reaches any POI: give them more fuel or time" if useless \
-        else "is a good world"
+    reach = reach_of(loaded, costs)
+    for said in beyond_reach({"reach": reach}):
+        console.print(said, highlight=False, markup=False)
+    verdict = f"can be read, but {NOTHING}" if reach["nothing"] else "is a good world"
     counts = {"station": len(loaded.stations), "POI": len(loaded.pois), "robot": len(loaded.robots),
               "scenario": len(loaded.scenarios)}
     console.print(f"{loaded.name} {verdict}: "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -11,13 +12,16 @@ from sva_bench.errors import nearest
 Loc = tuple[str | int, ...]
 
 
-def first_complaint(data: Any, schema: type[BaseModel], error: ValidationError) -> tuple[Loc, str]:
+def first_complaint(
+    data: Any, schema: type[BaseModel], error: ValidationError, written: Callable[[Loc], str | None] = lambda _: None,
+) -> tuple[Loc, str]:
     """Where the first thing to mend stands, and what to change there.
 
     Args:
         data: The document's data.
         schema: The pydantic model that refused it.
         error: How it did.
+        written: How the file writes the scalar at a place; ``None`` where there is none.
     """
     # An unknown key explains a missing one beside it better than the other way round.
     details = sorted(_as_meant(data, error.errors()), key=lambda d: d["type"] != "extra_forbidden")
@@ -36,6 +40,10 @@ def first_complaint(data: Any, schema: type[BaseModel], error: ValidationError) 
         return loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit"
     message = _plainly(detail)
     found = detail["input"]
+    text = written(loc) or (None if found is None else str(found).lower())
+    if detail["type"] == "string_type" and not isinstance(found, dict | list) and text is not None:
+        kind = "nothing" if found is None else "a truth value" if isinstance(found, bool) else "a number"
+        return loc, f"expected a word, and {text} without quotes is {kind}; if it is a name, write '{text}'"
     also = f", found {shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
     if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
         also = f", found the text {shown(found)}" + (": take the quotes away" if _numeric(found) else "")

@@ -85,6 +85,18 @@ class Document:
                 break
         return int(line) + 1
 
+    def written(self, loc: Loc) -> str | None:
+        """How a YAML file writes the scalar at ``loc``; ``None`` where none stands there."""
+        node = self._root
+        for part in loc:
+            if isinstance(node, MappingNode):
+                node = next((v for k, v in node.value if k.value == str(part)), None)
+            elif isinstance(node, SequenceNode) and isinstance(part, int) and part < len(node.value):
+                node = node.value[part]
+            else:
+                return None
+        return str(node.value)[:60] if isinstance(node, ScalarNode) and node.value else None
+
     def changed(self, key: str, value: Any, named: Mapping[Loc, str] | None = None) -> Document:
         """The same with another value at a dotted key, e.g. ``robots.uv2.fuel_capacity_s``; lines stay those read.
 
@@ -233,7 +245,7 @@ def validate(document: Document, schema: type[SectionT], kind: str) -> SectionT:
     try:
         return schema.model_validate(document.data)
     except ValidationError as error:
-        raise document.error(*first_complaint(document.data, schema, error)) from None
+        raise document.error(*first_complaint(document.data, schema, error, document.written)) from None
 
 
 def check_kind(document: Document, kind: str) -> None:

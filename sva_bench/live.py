@@ -13,6 +13,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.analysis.wording import over_few_maps, verdict, with_interval
 from sva_bench.batch.estimates import Estimate
 from sva_bench.batch.run import Progress
@@ -116,6 +117,8 @@ def print_batch(summary: Any, console: Console | None = None) -> None:
     console.print(over_maps(summary["aggregate"], "VSS over maps"))
     if said := over_few_maps(summary["aggregate"]):
         console.print(said, highlight=False)
+    for said in maps_without_reach(summary["units"]):
+        console.print(said, highlight=False, markup=False)
     print_failed(summary["failed"], console)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from sva_bench.analysis.reach import reached
 from sva_bench.assumptions import PlansByProcess
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError
 from sva_bench.execution.execute import Fidelity
@@ -198,6 +199,12 @@ def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list
         if pois:
             lost[vehicle.name] = pois
     return lost
+
+
+def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
+    """What robots cannot reach within fuel and limit, as every summary says it."""
+    return reached(out_of_reach(world, costs), [robot.name for robot in world.robots],
+                   [poi.name for poi in world.pois])
 
 
 def read_plans(

@@ -86,6 +86,8 @@ class Promise(Section):
 
 
 class PlanResult(Promise):
+    feasible: bool = True
+    lost: WholeNumber = 0
     executed: Estimated
     executed_controlled: Estimated
     distribution: Distribution
@@ -199,6 +201,15 @@ class Precise(Section):
     max_trials: WholeNumber
 
 
+class Reach(Section):
+    """What robots cannot reach within fuel and limit."""
+
+    nothing: bool
+    robots: list[Name]
+    pois: list[Name]
+    missed: dict[Name, list[Name]]
+
+
 class Head(Section):
     """What every summary says first."""
 
@@ -209,6 +220,7 @@ class Head(Section):
     fidelity: Fidelity
     failure: Failures
     travel: Travel
+    reach: Reach
     reproducible: bool
 
 

@@ -90,6 +90,7 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 def print_summary(summary: Any) -> None:
     """Print a summary as a table, and what it comes to."""
+    from sva_bench.analysis.reach import infeasible, lost_robots
     from sva_bench.analysis.wording import (
         ASSUMPTION_HEAD,
         answer,
@@ -105,19 +106,23 @@ def print_summary(summary: Any) -> None:
     table = Table(title=f"{summary['world']}, seed {summary['seed']}: {summary['trials']} trials, "
                         f"{summary['rollouts']} rollouts, {summary['fidelity']}", title_justify="left")
     compared = "vss" in scenarios[0]
-    for heading in ("scenario", "plan", "promised", "expected", "executed [95 %]", *scenarios[0]["availability"],
+    judged = any("lost" in plan for plan in scenarios[0]["plans"].values())  # plans from anywhere may lose robots
+    for heading in ("scenario", "plan", *(("robots lost",) if judged else ()), "promised", "expected",
+                    "executed [95 %]", *scenarios[0]["availability"],
                     *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
         table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
     for scenario in scenarios:
         last = list(scenario["plans"])[-1]
         for number, (name, plan) in enumerate(scenario["plans"].items()):
             proof = "" if plan["status"] in ("optimal", None) else f" ({plan['status']})"
+            proof = " (infeasible)" if infeasible(plan) else proof
             worth = ["", "", ""] if compared else []
             if compared and number == 0:
                 vss, evpi = scenario["vss"], scenario["evpi"]
                 worth = [vss_verdict(scenario), f"{vss['modelled']:.1f}", "" if evpi is None else f"{evpi:.1f}"]
             table.add_row(
-                "" if number else scenario["name"], name + proof, f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
+                "" if number else scenario["name"], name + proof, *((lost_robots(plan),) if judged else ()),
+                f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
                 with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()), *worth,
                 end_section=name == last)
     console.print(table)

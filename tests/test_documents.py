@@ -26,6 +26,7 @@ from sva_bench.documents import (
     validate,
 )
 from sva_bench.errors import BadFile, ExitCode, nearest
+from tests.worlds_for_tests import SMALL, world_of
 
 
 class Part(Section):
@@ -214,3 +215,25 @@ def test_pretty_yaml_puts_what_holds_no_mapping_on_a_line_and_remarks_above_it()
     assert pretty_yaml(data, {(): "a map", ("map", "shapes", 1): "posts", ("part",): "\n"}) == (
         "# a map\nmap:\n  shapes:\n    - {wall: [[0, 1], [2.5, 1]]}\n    # posts\n    - {post: [3, 4]}\n\n"
         "part:\n  size_m: 2\n  sub: {}\n")
+
+
+@pytest.mark.parametrize(("written", "kind"), [
+    ("2024", "a number"), ("1e3", "a number"), ("0x10", "a number"), ("true", "a truth value"), ("null", "nothing"),
+])
+def test_a_name_that_yaml_takes_for_something_else_is_told_about_quotes(
+        written: str, kind: str, tmp_path: Path) -> None:
+    said = f"expected a word, and {written} without quotes is {kind}; if it is a name, write '{written}'"
+    for at, text in (("name", SMALL.replace("name: small", f"name: {written}")),
+                     ("robots.uv1.model", SMALL.replace("model: turtlebot2", f"model: {written}", 1)),
+                     ("scenarios.half.joint[0].available[0]", SMALL.replace(
+                         "half: {uv2: 0.5}", f"half: {{joint: [{{probability: 1.0, available: [{written}]}}]}}"))):
+        with pytest.raises(BadFile) as refused:
+            world_of(tmp_path, text)
+        assert (refused.value.key, refused.value.problem) == (at, said)
+    quoted = SMALL.replace("name: small", f"name: '{written}'").replace("p1", f"'{written}'").replace("uv1", "1e3")
+    assert world_of(tmp_path, quoted).name == written
+
+
+def test_a_name_that_is_missing_is_not_told_about_quotes(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="name: expected a word, found nothing"):
+        world_of(tmp_path, SMALL.replace("name: small", "name:"))

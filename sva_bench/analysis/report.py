@@ -12,6 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from sva_bench.analysis.page import figure, heading, note, sentence, table, text, write_page
+from sva_bench.analysis.reach import infeasible, lost_robots, maps_without_reach, nothing_reached
 from sva_bench.analysis.wording import (
     ASSUMPTION_HEAD,
     VSS_PCT,
@@ -88,7 +89,7 @@ def write_report(path: Path, content: Content) -> None:
 
 def _answer(summary: Mapping[str, Any]) -> list[str]:
     lines = []
-    for scenario in summary["scenarios"]:
+    for scenario in [] if nothing_reached(summary) else summary["scenarios"]:
         if "vss" in scenario:
             doubtful = ", ".join(f"{robot} {per_cent(100 * p)}" for robot, p in scenario["availability"].items()
                                  if p < 1)
@@ -114,9 +115,10 @@ def _comparison(scenarios: Scenarios) -> list[str]:
 
 
 def _ranking(scenarios: Scenarios) -> list[str]:
-    rows = [[s["name"], name, optional(plan["expected"]), with_interval(plan["executed"])]
+    rows = [[s["name"], name, "no: fuel or limit" if infeasible(plan) else "yes", lost_robots(plan),
+             optional(plan["expected"]), with_interval(plan["executed"])]
             for s in scenarios for name, plan in s["plans"].items()]
-    parts = [table(["scenario", "plan", "expected", "executed"], rows, words=(0, 1),
+    parts = [table(["scenario", "plan", "feasible", "robots lost", "expected", "executed"], rows, words=(0, 1, 2),
                    caption="What the plans are worth")]
     pairs = [[s["name"], f"{c['a']} − {c['b']}", with_interval(c), adjusted(c)] for s in scenarios
              for c in s["comparisons"]]
@@ -278,6 +280,7 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
+        *(note(said) for said in maps_without_reach(summary["units"])),
         note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, fidelity {summary['fidelity']}; 95 "
              "% intervals in brackets. Over maps, the maps are the sample."),
         *([heading("Given up"), table(["unit", "map", "seed", "reason"], failed, words=(0, 1, 3))] if failed else []),

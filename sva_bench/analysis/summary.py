@@ -26,10 +26,12 @@ class Judged:
     Attributes:
         expected: Closed-form value under the failure process executed.
         executed: Its trials.
+        feasible: Whether it keeps within fuel and limit.
     """
 
     expected: float
     executed: Executed
+    feasible: bool = True
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -157,10 +159,18 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
     return {
         "name": scenario.name,
         "availability": {name: scenario.availability[name] for name in robots},
-        "plans": {judged.executed.case.planner: plan_summary(judged, robots, noisy=noisy) for judged in plans},
+        "plans": {judged.executed.case.planner: {
+            "feasible": judged.feasible, "lost": lost(judged.executed), **plan_summary(judged, robots, noisy=noisy)}
+            for judged in plans},
         "comparisons": comparisons,
         "ranking": ranking({p.executed.case.planner: float(np.mean(totals(p.executed))) for p in plans}, comparisons),
     }
+
+
+def lost(run: Executed) -> int:
+    """How many robot missions of all trials ended along the route: by failing, out of fuel or stuck."""
+    along = (run.end == ENDS.index("failed")) & (run.stops_reached > 0)
+    return int((along | (run.end == ENDS.index("out_of_fuel")) | (run.end == ENDS.index("stuck"))).sum())
 
 
 def ranking(means: Mapping[str, float], comparisons: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from sva_bench.analysis.reach import NOTHING, beyond_reach, infeasible_plans, nothing_reached, warned
+
 
 def answer(summary: Mapping[str, Any]) -> str:
     """In one sentence: which plan is worth more, and by how much."""
     scenarios = summary["scenarios"]
     if not scenarios:
         return "No scenario was executed."
+    if nothing_reached(summary):
+        return f"There is nothing to compare, for {NOTHING}."
     if not all("vss" in scenario for scenario in scenarios):
         if len(scenarios[0]["plans"]) == 1:
             return "One plan: there is nothing to compare it with."
@@ -53,8 +57,12 @@ VSS_PCT = "VSS in %: how much more the stochastic plan collects than the determi
 
 
 def ranked(scenario: Mapping[str, Any]) -> str:
-    """The plans of a scenario from best to worst; those of one rank can't be told apart from what is above them."""
-    return "; ".join(f"{row['rank']}. {row['plan']} {row['mean']:.1f}" for row in scenario["ranking"])
+    """The plans of a scenario from best to worst; those of one rank can't be told apart from what is above them.
+
+    What breaks its limits, and robots that were lost, are said before the figure.
+    """
+    return "; ".join(f"{row['rank']}. {row['plan']}{warned(scenario['plans'][row['plan']])} {row['mean']:.1f}"
+                     for row in scenario["ranking"])
 
 
 def adjusted(comparison: Mapping[str, Any]) -> str:
@@ -86,7 +94,7 @@ def finding(scenario: Mapping[str, Any]) -> str:
 
 def remarks(summary: Mapping[str, Any]) -> list[str]:
     """What the answer leaves out: what its percentages are of, how little it rests on, and what else was asked for."""
-    said = []
+    said = [*beyond_reach(summary), *infeasible_plans(summary)]
     compared = [s["vss"] for s in summary["scenarios"] if "vss" in s and not s["vss"]["same_plan"]]
     if any(vss["executed_pct"] is not None for vss in compared):
         said.append(VSS_PCT)

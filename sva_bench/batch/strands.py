@@ -10,7 +10,7 @@ from sva_bench.batch.grid import Grid, Point, options_at
 from sva_bench.batch.jobs import DriveJob, Job, PlansJob, TravelTimesJob, TrialsJob
 from sva_bench.bench import settings_of
 from sva_bench.execution.execute import Case, drives_ahead
-from sva_bench.planning import Options, Planned
+from sva_bench.planning import Options, Planned, reach_of
 from sva_bench.tally import head, known_ahead, proved
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.world.model import World
@@ -61,4 +61,5 @@ def facts_of(
             "same_plan": plans.stochastic.drives_like(plans.deterministic),
             **{figure: known[figure] for figure in ("vss_mean_value", "ws", "evpi", "value_of_process")}})
     return head(world, options, settings_of(world, options), costs) | {
+        "reach": reach_of(world, costs),
         "reproducible": proved(planned), "scenarios": scenarios}

@@ -1,0 +1,129 @@
+"""What cannot be reached, and plans that break their limits, are told on terminal, page and in the summary."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached
+from sva_bench.bench import Run, execute_plans, run
+from sva_bench.planning import Options, plan_costs, read_plans
+from sva_bench.terminal import print_summary
+from tests.test_cli import sva_bench, world_file
+from tests.worlds_for_tests import SMALL, world_of
+
+QUICK = Options(trials=20, rollouts=2, fidelity="kinematic")
+NOTHING = "no robot reaches any POI: give them more fuel or time"
+DRY = SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 1")
+
+
+def run_of(folder: Path, text: str) -> Run:
+    return run(world_of(folder, text), QUICK, folder / "runs", None, lambda *_: None)
+
+
+def told(done: Run, capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
+    """What terminal and page say, on one line each."""
+    capsys.readouterr()
+    print_summary(done.summary)
+    return tuple(" ".join(text.split()) for text in (  # type: ignore[return-value]
+        capsys.readouterr().out, (done.folder / "report.html").read_text()))
+
+
+def test_where_nothing_is_reached_table_page_and_summary_say_what_check_says(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    done = run_of(tmp_path, DRY)
+    assert done.summary["reach"] == {
+        "nothing": True, "robots": ["uv1", "uv2"], "pois": ["p1", "p2", "p3", "p4"],
+        "missed": {robot: ["p1", "p2", "p3", "p4"] for robot in ("uv1", "uv2")}}
+    for text in told(done, capsys):
+        assert NOTHING in text
+        assert "changes nothing here" not in text
+        assert "is best either way" not in text
+    checked = sva_bench("world", "check", world_file(tmp_path, DRY), cwd=tmp_path)
+    assert NOTHING in " ".join(checked.stdout.split())
+
+
+@pytest.mark.parametrize("limit", ["mission_limit_s: 120", "fuel_capacity_s: 60"])
+def test_a_robot_that_reaches_nothing_is_named(
+        limit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    done = run_of(tmp_path, SMALL.replace(limit, limit.split()[0] + " 1", 1))
+    assert done.summary["reach"]["robots"] == ["uv1"]
+    for text in told(done, capsys):
+        assert "uv1 reaches no POI within its fuel and limit, and stays home." in text
+        assert NOTHING not in text
+
+
+def test_pois_that_no_robot_reaches_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # p3 is the remotest: 30 s of driving suffice for the others, there and back.
+    done = run_of(tmp_path, SMALL.replace("mission_limit_s: 120", "mission_limit_s: 24"))
+    missed = done.summary["reach"]["pois"]
+    assert missed
+    assert len(missed) < 4
+    for text in told(done, capsys):
+        assert f"No robot reaches {' and '.join(missed)}." in text
+
+
+def test_where_everything_is_reached_nothing_is_said(tmp_path: Path) -> None:
+    done = run_of(tmp_path, SMALL)
+    assert done.summary["reach"] == {"nothing": False, "robots": [], "pois": [], "missed": {}}
+    assert beyond_reach(done.summary) == []
+    assert beyond_reach({}) == []  # a summary from before
+
+
+def test_many_pois_are_counted_not_listed() -> None:
+    pois = [f"p{k}" for k in range(50)]
+    said = beyond_reach({"reach": reached({"uv1": pois[:40]}, ["uv1", "uv2"], pois)})
+    assert said == [f"uv1 reaches none of {', '.join(pois[:20])} and 20 more within its fuel and limit, and will never "
+                    "be sent there."]
+
+
+def test_a_map_of_a_batch_where_nothing_is_reached_is_named(tmp_path: Path) -> None:
+    (tmp_path / "dry.yaml").write_text(DRY.replace("name: small", "name: dry"))
+    quick = ("--trials", 20, "--rollouts", 2, "--fidelity", "kinematic", "--workers", 1, "--cache", tmp_path / "cache")
+    done = sva_bench("batch", world_file(tmp_path), tmp_path / "dry.yaml", *quick, "--out", "b", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    said = f"On 1 map (dry) {NOTHING}, or leave it out."
+    assert said in " ".join(done.stdout.split())
+    assert said in (tmp_path / "b" / "report.html").read_text()
+    units = json.loads((tmp_path / "b" / "summary.json").read_text())["units"]
+    assert {unit["world"]: unit["reach"]["nothing"] for unit in units} == {"small": False, "dry": True}
+    assert maps_without_reach([unit for unit in units if unit["world"] == "small"]) == []
+
+
+def executed(folder: Path, plans: dict[str, dict[str, list[str]]]) -> Run:
+    """Plans executed, whether they keep within fuel and limit or not."""
+    world = world_of(folder, SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 30").replace("{uv2: 0.5}",
+                                                                                                  "{uv2: 0.0}"))
+    paths = {}
+    for name, routes in plans.items():
+        paths[name] = folder / f"{name}.json"
+        paths[name].write_text(json.dumps({"format": "sva-bench/plan@1", "routes": routes}))
+    costs = plan_costs(world, "prmstar", lambda *_: None)
+    read = read_plans(world, costs, paths, allow_infeasible=True)
+    return execute_plans(world, read, QUICK, folder / "runs", None, lambda *_: None, costs)
+
+
+def test_a_plan_that_breaks_its_limits_is_told_before_its_figure(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    done = executed(tmp_path, {"dry": {"uv1": ["base", "p1", "p2", "p3", "p4", "base"]}, "good": {"uv1": [
+        "base", "p1", "base"], "uv2": ["base", "p4", "base"]}})
+    plans = done.summary["scenarios"][0]["plans"]
+    # Robots: uv1 runs dry in each of 20 trials, uv2 stays home. A robot that fails at the base is not lost on the way.
+    assert {name: (plan["feasible"], plan["lost"]) for name, plan in plans.items()} == {
+        "dry": (False, 20), "good": (True, 0)}
+    assert plans["good"]["ends"]["failed"] == 20
+    terminal, page = told(done, capsys)
+    for text in (terminal, page):
+        assert "dry (infeasible, 20 of 40 robot missions lost) " in text
+        assert "dry is infeasible: fuel or mission limit would be broken." in text
+        assert "good (" not in text.split("dry is infeasible")[0].split("nominal")[0]
+    assert "dry (infeasible) │ 20 of 40" in terminal
+    assert "no: fuel or limit" in page
+
+
+def test_help_says_what_allow_infeasible_covers(tmp_path: Path) -> None:
+    said = " ".join(sva_bench("execute", "--help", cwd=tmp_path).stdout.replace("│", " ").split())
+    assert "break fuel capacity or mission limit" in said
+    assert "unknown sites" in said
