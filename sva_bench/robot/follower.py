@@ -97,11 +97,15 @@ def wrap(angle: float) -> float:
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _edge_at(arc: FloatArray, s: float) -> int:
-    """Index of the edge on which arc length ``s`` lies."""
-    k = 0
-    while k < len(arc) - 2 and arc[k + 1] <= s:
-        k += 1
-    return k
+    """Index of the edge on which arc length ``s`` lies: by halves, for paths through mazes have thousands."""
+    low, high = 0, len(arc) - 2
+    while low < high:
+        middle = (low + high) // 2
+        if arc[middle + 1] <= s:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
