@@ -36,17 +36,20 @@ def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
 
 def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
     """In how many trials a robot's mission ended which way, for each end."""
-    doubtful = 0 < _availability(run, robot) < 1
+    availability = _availability(run, robot)
+    doubtful = 0 < availability < 1
     reached = exposure_of([r for r in run.margins if r.robot == robot], run.incentive.shape[1], noisy=noisy).ends[robot]
     by_noise = np.isin(run.end[:, robot], [ENDS.index(end) for end in UNHAPPY])
     figures: dict[End, Figure] = {}
     for end in ENDS:
         happened = run.end[:, robot] == ENDS.index(end)
         if end in UNHAPPY:
-            drawn, bounds = np.zeros_like(happened), (-float(reached[UNHAPPY.index(end)]), 0.0)
+            drawn, most = np.zeros_like(happened), 0.0 if availability <= 0 else float(reached[UNHAPPY.index(end)])
+            bounds = -most, 0.0
         else:  # what the draw alone would have made of it; noise takes from both
             drawn = happened | by_noise & (run.available[:, robot] == (end == "home"))
-            bounds = 0.0, min(1.0, float(reached.sum()))
+            possible = doubtful if end == "failed" else availability > 0
+            bounds = 0.0, min(1.0, float(reached.sum())) if possible else 0.0
         sure = float(drawn.min()), float(drawn.max())
         taken = drawn.astype(np.float64) - happened
         figures[end] = figure_of(drawn.astype(np.float64), (0.0, 1.0) if doubtful and end not in UNHAPPY else sure,

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import beta
 
-from sva_bench.analysis.statistics import bounded_mean
+from sva_bench.analysis.figures import end_figures
+from sva_bench.analysis.statistics import bounded_mean, estimate
 from sva_bench.analysis.summary import (
     Judged,
     ScenarioResult,
@@ -174,6 +175,18 @@ def test_ends_are_counted_by_robot_with_their_intervals() -> None:
     assert 0 < low < 0.25 < high < 1
     assert summary["distribution"]["least"] == 90.0
     assert summary["distribution"]["cvar10"] == 90.0
+
+
+def test_an_end_that_cannot_happen_has_no_interval_to_speak_of() -> None:
+    # uv1 is always available: it can't fail by draw, whatever noise does. uv2 never is: it can't run dry.
+    certain = Scenario(name="S4", availability={"uv1": 1.0, "uv2": 0.0})
+    run = executed([[100, 0]] * 8, [["home", "failed"]] * 8, [100.0, 60.0], promised=100.0, rollouts=8)
+    figures = [end_figures(replace(run, case=replace(run.case, scenario=certain)), m, noisy=True) for m in (0, 1)]
+    assert estimate(figures[0]["failed"]).interval == (0.0, 0.0)
+    assert estimate(figures[1]["failed"]).interval == (1.0, 1.0)
+    assert estimate(figures[1]["out_of_fuel"]).interval == (0.0, 0.0)
+    low, high = estimate(figures[0]["home"]).interval or (1.0, 1.0)
+    assert low < high == 1.0  # near running dry
 
 
 def test_one_trial_has_figures_and_no_intervals() -> None:
