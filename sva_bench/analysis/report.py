@@ -72,7 +72,7 @@ def write_report(path: Path, content: Content) -> None:
         note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, "
              f"{number(summary['rollouts'], 'noise draw')}, fidelity {summary['fidelity']}, seed {summary['seed']}; "
              f"planned under {summary['failure']['plan']}, executed under {summary['failure']['execute']} failures. "
-             "Incentive in the units of the world file; 95 % intervals in brackets, by noise draw."),
+             "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
         *_charts(scenarios, compared=compared),
         *_world(content.world),
         *_over_trials(scenarios),
