@@ -34,6 +34,7 @@ UNIT_TRIALS_PHYSICS = 10
 """A trial in physics takes seconds, a settled one microseconds; a unit should take seconds."""
 
 MOST_SEEDS = 100_000
+_MANY = 100  # worlds and variants from which on reading them takes seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +215,8 @@ def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
     refuse_too_many(count * len(planners), len(seeds), options.trials, unit_trials)
     points: list[Point] = []
     for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
-        progress("reading worlds", number, count)
+        if count >= _MANY:
+            progress("reading worlds", number, count)
         for planner in planners:
             parts = [*variant, *([f"planner={planner}"] if len(planners) > 1 else [])]
             points.append(Point(world=world, planner=planner, variant="; ".join(parts)))

@@ -123,7 +123,8 @@ def over_few_maps(rows: Sequence[Mapping[str, Any]]) -> str:
         return ""
     if fewest == 1:
         return "From one map there is no interval over maps, however many seeds it has: nothing tells how maps differ."
-    return f"Student's t interval over {fewest} maps: with few maps it is wide, even where the VSS of each is positive."
+    return f"Over {fewest} maps only: the interval is wide, even where the VSS of each is positive, and what one map " \
+        "in ten shows may not be among them."
 
 
 def assumption_rows(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:

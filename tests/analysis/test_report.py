@@ -223,7 +223,7 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
     text = (tmp_path / "report.html").read_text()
     assert ">variant<" in text
     assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
-    assert "interval over 2 maps" in text
+    assert "Over 2 maps only" in text
     assert {label: len(points) for label, points in drawn.items()} == {
         f"{name} (x={x})": 2 for name in ("half", "safe") for x in (1, 2)}
 
@@ -242,8 +242,8 @@ def test_two_equal_plans_are_called_the_same_and_not_a_matter_of_luck(finished: 
 def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished: Run) -> None:
     assert any("only 4 noise draws" in said for said in remarks(finished.summary))
     assert not any("noise draws" in said for said in remarks({**finished.summary, "rollouts": 16}))
-    assert over_few_maps([{"maps": 5}]) == ""
-    assert "over 4 maps" in over_few_maps([{"maps": 5}, {"maps": 4}])
+    assert over_few_maps([{"maps": 10}]) == ""
+    assert "Over 9 maps only" in over_few_maps([{"maps": 10}, {"maps": 9}])
 
 
 def test_a_percentage_over_fewer_maps_says_over_how_many() -> None:

@@ -147,7 +147,7 @@ def test_a_folder_that_cannot_be_written_to_is_told_and_loses_nothing(tmp_path: 
     (tmp_path / "file").write_text("", encoding="utf-8")
     refused = sva_bench(*command, "--out", tmp_path / "file", cwd=tmp_path)
     assert refused.returncode == 2
-    assert "cannot be written to" in refused.stderr
+    assert "this is no folder" in refused.stderr
     assert "Traceback" not in refused.stderr
 
 

@@ -125,7 +125,7 @@ def test_a_run_keeps_the_maps_files_and_is_another_run_with_another_map(tmp_path
 def test_the_complaint_of_a_door_too_narrow_says_which_robot_would_fit(tmp_path: Path) -> None:
     # The door is two cells of 0.5 m wide; a path keeps 0.03 m beside the robot at least.
     world = two_rooms(tmp_path)
-    wide = replace(world.robots[0].model, radius_m=0.49)
+    wide = replace(world.robots[0].model, radius_m=0.49, track_m=0.5)
     with pytest.raises(UnreachableSite, match=r"that gets there has a radius of 0\.469 m") as caught:
         plan_travel_times(world, wide)
     assert caught.value.destinations == ("r1", "p2")
@@ -134,7 +134,7 @@ def test_the_complaint_of_a_door_too_narrow_says_which_robot_would_fit(tmp_path:
 
 def test_where_nothing_is_reached_the_base_is_told_to_move(tmp_path: Path) -> None:
     world = two_rooms(tmp_path, WORLD.replace("[1, 2.5]", "[4, 1.8]"))  # all sites but the base are beyond the door
-    wide = replace(world.robots[0].model, radius_m=0.49)
+    wide = replace(world.robots[0].model, radius_m=0.49, track_m=0.5)
     with pytest.raises(BadFile, match="no path from 'base' to 'r1', 'p1', 'p2'") as caught, about(
             tmp_path / "world.yaml"):
         plan_travel_times(world, wide)
