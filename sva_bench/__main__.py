@@ -29,10 +29,12 @@ _ends: list[int] = []
 def main() -> None:
     """Run the command line."""
     _hear_signals()
+    import atexit
     import signal
 
     from sva_bench import streams
 
+    atexit.register(_end_undisturbed)  # first, to be called last
     output = streams.take_over()
     code = run_command_line(sys.argv[1:])
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
@@ -57,13 +59,15 @@ def run_command_line(arguments: Sequence[str]) -> int:
 
     from sva_bench.cli import app
     from sva_bench.errors import ExitCode, Interrupted, SvaBenchError
+    from sva_bench.interrupts import as_ctrl_c
     from sva_bench.printable import printable
     from sva_bench.terminal import messages
 
     try:
         if signal.getsignal(signal.SIGINT) is _end_at_once:  # from now on there is something to be kept or cleared away
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        result = app(list(arguments), standalone_mode=False)
+        with as_ctrl_c(SvaBenchError, TyperException, typer.Abort):
+            result = app(list(arguments), standalone_mode=False)
         sys.stdout.flush()
     except Interrupted as kept:
         messages.print(escape(str(kept)), highlight=False, soft_wrap=True)
@@ -128,6 +132,14 @@ def _hear_signals() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _end_like_ctrl_c)
+
+
+def _end_undisturbed() -> None:
+    """Ignore signals while the interpreter takes itself apart: it forgets our handlers, but not what is ignored."""
+    import signal
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _end_at_once(*_: object) -> None:
