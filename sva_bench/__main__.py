@@ -24,6 +24,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
 _INTERRUPTED = 130
 _ends: list[int] = []
 """Signals that asked this process to end, other than Ctrl-C."""
+_codes: list[int] = []
+"""The exit code, once it is known."""
 
 
 def main() -> None:
@@ -34,7 +36,7 @@ def main() -> None:
 
     from sva_bench import streams
 
-    atexit.register(_end_undisturbed)  # first, to be called last
+    atexit.register(_end)  # first, to be called last
     output = streams.take_over()
     code = run_command_line(sys.argv[1:])
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
@@ -45,7 +47,7 @@ def main() -> None:
         sys.stderr.write(f"error: standard output cannot be written to ({output.lost}); what was to stand there is "
                          "lost\n")
         code = 2
-    exec("")  # Python forgets that Ctrl-C came while a library had text executed, and ends with our code, not by SIGINT
+    _codes.append(code)
     sys.exit(code)
 
 
@@ -134,12 +136,16 @@ def _hear_signals() -> None:
             signal.signal(number, _end_like_ctrl_c)
 
 
-def _end_undisturbed() -> None:
-    """Ignore signals while the interpreter takes itself apart: it forgets our handlers, but not what is ignored."""
-    import signal
+def _end() -> None:
+    """End with the exit code of the command, once all is done that others want done at the end.
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
+    To take the interpreter apart, with all that was loaded, takes up to a second; and it forgets our handlers first, so
+    that a signal would meanwhile end it with another code.
+    """
+    if _codes:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_codes[0])
 
 
 def _end_at_once(*_: object) -> None:

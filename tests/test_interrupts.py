@@ -8,6 +8,8 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from threading import Thread
@@ -180,7 +182,7 @@ def test_errors_that_are_ours_and_errors_without_ctrl_c_stay_what_they_are() -> 
 
 def test_what_is_cleared_away_is_not_cut_short_however_long_it_takes() -> None:
     cleared = []
-    with pytest.raises(KeyboardInterrupt), as_ctrl_c():
+    with pytest.raises(KeyboardInterrupt), as_ctrl_c():  # noqa: PT012
         try:
             press()
         finally:
@@ -206,3 +208,23 @@ def test_once_it_was_heard_it_is_not_pressed_again() -> None:
 def test_pressed_and_swallowed_at_the_very_end_it_is_raised_there() -> None:
     with pytest.raises(KeyboardInterrupt), as_ctrl_c(), contextlib.suppress(KeyboardInterrupt):
         press()
+
+
+AT_THE_END = """
+import os, signal, sys
+from sva_bench.__main__ import main
+
+class TakenApart:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+
+sys.taken_apart = TakenApart()
+sys.argv = ["sva-bench", "--version"]
+main()
+"""
+
+
+def test_a_signal_at_the_very_end_does_not_change_the_exit_code() -> None:
+    done = subprocess.run([sys.executable, "-c", AT_THE_END], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("sva-bench ")
