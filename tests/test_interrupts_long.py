@@ -174,10 +174,10 @@ class Undisturbed:
     seconds: float
 
 
-def undisturbed(command: Command, folder: Path) -> Undisturbed:
-    """What the command writes when it is left alone, and how long it takes when all is compiled that it calls."""
+def undisturbed(command: Command, folder: Path, *, warm: bool) -> Undisturbed:
+    """What the command writes when it is left alone, and how long it takes: warm, when all is compiled already."""
     prepared(folder)
-    for _ in range(2):
+    for _ in range(1 + warm):
         again(folder)
         before = time.monotonic()
         process = start(command, folder)
@@ -194,12 +194,12 @@ def moments(draw: random.Random, count: int, whole_s: float) -> list[float]:
 LONG = [pytest.param(name, MOMENTS, marks=pytest.mark.long) for name in COMMANDS]
 
 
-@pytest.mark.parametrize(("name", "count"), [("run, kinematic", 2), *LONG])
+@pytest.mark.parametrize(("name", "count"), [("run, rollout", 2), ("batch", 2), *LONG])
 def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
     name: str, count: int, tmp_path: Path
 ) -> None:
     command, draw = COMMANDS[name], random.Random(f"ctrl-c {name}")
-    alone = undisturbed(command, tmp_path / "alone")
+    alone = undisturbed(command, tmp_path / "alone", warm=count == MOMENTS)
     folder = prepared(tmp_path / "disturbed")
     there = False  # whether there is a result that must not be lost
     for number, moment in enumerate(moments(draw, count, alone.seconds)):
@@ -228,12 +228,12 @@ def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
     finish(command, folder, alone)
 
 
-@pytest.mark.parametrize(("name", "count"), [("plan", 2), *LONG])
+@pytest.mark.parametrize(("name", "count"), [("plan", 2), ("execute", 2), *LONG])
 def test_a_kill_at_any_moment_leaves_a_whole_result_or_none_and_blocks_nothing(
     name: str, count: int, tmp_path: Path
 ) -> None:
     command, draw = COMMANDS[name], random.Random(f"kill {name}")
-    alone = undisturbed(command, tmp_path / "alone")
+    alone = undisturbed(command, tmp_path / "alone", warm=count == MOMENTS)
     folder = prepared(tmp_path / "disturbed")
     for number, moment in enumerate(moments(draw, count, alone.seconds)):
         process = start(command, folder)
