@@ -24,15 +24,19 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
 _INTERRUPTED = 130
 _ends: list[int] = []
 """Signals that asked this process to end, other than Ctrl-C."""
+_codes: list[int] = []
+"""The exit code, once it is known."""
 
 
 def main() -> None:
     """Run the command line."""
     _hear_signals()
+    import atexit
     import signal
 
     from sva_bench import streams
 
+    atexit.register(_end)  # first, to be called last
     output = streams.take_over()
     code = run_command_line(sys.argv[1:])
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
@@ -43,7 +47,7 @@ def main() -> None:
         sys.stderr.write(f"error: standard output cannot be written to ({output.lost}); what was to stand there is "
                          "lost\n")
         code = 2
-    exec("")  # Python forgets that Ctrl-C came while a library had text executed, and ends with our code, not by SIGINT
+    _codes.append(code)
     sys.exit(code)
 
 
@@ -57,13 +61,15 @@ def run_command_line(arguments: Sequence[str]) -> int:
 
     from sva_bench.cli import app
     from sva_bench.errors import ExitCode, Interrupted, SvaBenchError
+    from sva_bench.interrupts import as_ctrl_c
     from sva_bench.printable import printable
     from sva_bench.terminal import messages
 
     try:
         if signal.getsignal(signal.SIGINT) is _end_at_once:  # from now on there is something to be kept or cleared away
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        result = app(list(arguments), standalone_mode=False)
+        with as_ctrl_c(SvaBenchError, TyperException, typer.Abort):
+            result = app(list(arguments), standalone_mode=False)
         sys.stdout.flush()
     except Interrupted as kept:
         messages.print(escape(str(kept)), highlight=False, soft_wrap=True)
@@ -128,6 +134,18 @@ def _hear_signals() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _end_like_ctrl_c)
+
+
+def _end() -> None:
+    """End with the exit code of the command, once all is done that others want done at the end.
+
+    To take the interpreter apart, with all that was loaded, takes up to a second; and it forgets our handlers first, so
+    that a signal would meanwhile end it with another code.
+    """
+    if _codes:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_codes[0])
 
 
 def _end_at_once(*_: object) -> None:

@@ -18,7 +18,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from sva_bench.errors import BadInput
-from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.interrupts import hear_ctrl_c, holding_back_ctrl_c
 
 _LEFT = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d+)(?:-\d+)?\.(?P<kind>tmp|old)", re.DOTALL)
 _LONGEST = 200  # of a name's bytes in a draft's name, which is at most 255 long
@@ -53,6 +53,7 @@ def draft_file(path: Path, way_out: str = "choose another place") -> Iterator[Pa
             remove_left_behind(target.parent, lambda name: name == _short(target.name))
             begun = _Draft(target, folder=False)
         yield begun.path
+        hear_ctrl_c()  # a library that writes may have swallowed it, and left something out
         _to_disk(begun.path)
         os.replace(begun.path, target)
         _to_disk(target.parent)
@@ -76,6 +77,7 @@ def draft_folder(target: Path, way_out: str = "choose another place") -> Iterato
             target.parent.mkdir(parents=True, exist_ok=True)
             begun = _Draft(target, folder=True)
         yield begun.path
+        hear_ctrl_c()
         for folder, _, names in os.walk(begun.path, topdown=False):
             for name in names:
                 _to_disk(Path(folder, name))

@@ -14,6 +14,7 @@ from sva_bench.cli_inputs import instance_app, world_app
 from sva_bench.cli_plans import certify, plan, times
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.loading import load_libraries
 from sva_bench.options import (
     AsCsv,
     AsJson,
@@ -94,7 +95,7 @@ def run(
     asked = None if precision is None else precision_of(precision, max_trials, trials, rollouts)
     check_folder(out, "--out")
     loaded = load(world, scenario, margin, plan_failure, execute_failure)
-    # After the world is read: an error in the file is said at once.
+    load_libraries()  # after the world is read: an error in the file is said at once
     with holding_back_ctrl_c():
         from sva_bench.bench import run as run_bench
         from sva_bench.planning import Options
@@ -149,6 +150,7 @@ def execute(
     check_folder(out, "--out")
     named = by_name(plans)
     loaded = load(world, scenario, margin, execute_failure=execute_failure)
+    load_libraries()
     with holding_back_ctrl_c():
         from sva_bench.bench import execute_plans
         from sva_bench.planning import Options, plan_costs, read_plans

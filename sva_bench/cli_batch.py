@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.loading import load_libraries
 from sva_bench.options import (
     AsJson,
     ExecuteFailure,
@@ -97,6 +98,7 @@ def over(
     Nothing that is done is lost, whatever happens: --resume goes on.
     """
     set_up_logging(verbose)
+    load_libraries()
     with holding_back_ctrl_c():
         from sva_bench.batch.grid import batch_name
         from sva_bench.sweeps import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
@@ -130,6 +132,7 @@ def retry(
 ) -> None:
     """Take up again what failed or was not done; worlds and settings are those in the folder."""
     set_up_logging(verbose)
+    load_libraries()
     with holding_back_ctrl_c():
         from sva_bench.batch.folder import settings_in
         from sva_bench.batch.grid import grid_of

@@ -13,15 +13,23 @@ Once pressed it stays so until the outermost block ends: whatever is begun in th
 once. The outermost block raises it at its end unless somebody heard it. Outside of all blocks nothing is changed;
 blocks do nothing outside of the main thread, where Python raises no ``KeyboardInterrupt``, or where Ctrl-C is ignored.
 
+Libraries may swallow what is raised in a callback, or answer it with an error of their own. So it is raised again soon,
+until somebody has heard it; never while it is on its way, where that would cut short what is cleared away. The command
+line runs each command in such a block (``as_ctrl_c``).
+
 Compiled code that takes long looks at ``flag`` (``solver/looking.py``) and ends early, with a result of no use: the end
 of the block around it raises before anybody uses it.
 """
 
 from __future__ import annotations
 
+import _thread
 import signal
+import sys
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -30,6 +38,8 @@ _AGAIN_S = 0.05
 _flag = bytearray(1)  # shared with compiled code, so it stays one and the same object
 _blocks: list[bool] = []  # whether Ctrl-C is heard; the innermost last
 _before: Callable[[int, FrameType | None], Any] | None = None
+_reminding = _thread.allocate_lock()
+_reminds = _reminded = False  # whether a thread presses it again, and whether it has since the handler ran
 
 
 def flag() -> bytearray:
@@ -44,7 +54,7 @@ def pressed() -> bool:
 
 def hear_ctrl_c() -> None:
     """Raise what was pressed and not heard yet, if it is heard here: for loops, in case a callback swallowed it."""
-    if pressed() and _flag[0] == _PRESSED and _blocks[-1]:
+    if pressed() and _flag[0] == _PRESSED and _blocks[-1] and not _on_its_way():
         raise KeyboardInterrupt
 
 
@@ -52,6 +62,27 @@ def heard_ctrl_c() -> None:
     """Say that somebody acts upon it: no need to raise it in the end."""
     if pressed():
         _flag[0] = _HEARD
+
+
+@contextmanager
+def as_ctrl_c(*meant: type[Exception]) -> Iterator[None]:
+    """A block that hears Ctrl-C, whatever a library makes of it that is at work just then.
+
+    Args:
+        meant: Errors that are ours, and stay what they are.
+
+    Raises:
+        KeyboardInterrupt: If Ctrl-C was pressed and nobody has acted upon it, at the latest at the end.
+    """
+    with deferring_ctrl_c(), hearing_ctrl_c():
+        try:
+            yield
+        except meant:
+            raise
+        except Exception:
+            if _flag[0] == _PRESSED and pressed():
+                raise KeyboardInterrupt from None
+            raise
 
 
 class _Block:
@@ -94,8 +125,9 @@ class _Block:
             if kind is None:
                 hear_ctrl_c()
             return
-        due = _flag[0] == _PRESSED
-        _flag[0] = _NOT
+        with _reminding:  # from here on nobody presses it again
+            due = _flag[0] == _PRESSED
+            _flag[0] = _NOT
         _blocks.pop()
         signal.signal(signal.SIGINT, _before)
         if kind is None and (due or _flag[0] != _NOT):
@@ -124,26 +156,53 @@ class holding_back_ctrl_c(_Block):
 
 
 def _on_ctrl_c(signum: int, frame: FrameType | None) -> None:
+    global _reminded
+    again, _reminded = _reminded, False
+    if again and _flag[0] != _PRESSED:
+        return  # somebody has heard meanwhile
     if not _blocks:  # between two
         if _before is not None:
             _before(signum, frame)
         return
     if _flag[0] == _NOT:
         _flag[0] = _PRESSED
-    if _blocks[-1]:
+    if not (_blocks[-1] or (len(_blocks) > 1 and _blocks[-2] and _compiling(frame))):
+        return
+    _remind()
+    in_llvm = frame is not None and "llvmlite" in frame.f_code.co_filename  # its callbacks swallow it: once more soon
+    if not (in_llvm or _on_its_way()):
         raise KeyboardInterrupt
-    if len(_blocks) > 1 and _blocks[-2] and _compiling(frame):
-        if frame is not None and "llvmlite" in frame.f_code.co_filename:  # a callback would swallow it: once more soon
-            again = threading.Timer(_AGAIN_S, _once_more)
-            again.daemon = True
-            again.start()
-        else:
-            raise KeyboardInterrupt
 
 
-def _once_more() -> None:
-    if _flag[0] == _PRESSED:
-        signal.raise_signal(signal.SIGINT)
+def _on_its_way() -> bool:
+    """Whether a ``KeyboardInterrupt`` is being handled by some caller: clearing away should not be cut short by it."""
+    error = sys.exception()
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__context__
+    return False
+
+
+def _remind() -> None:
+    """Have Ctrl-C pressed again, and again, until it is heard."""
+    global _reminds
+    with _reminding:
+        begun, _reminds = _reminds, True
+    if not begun:
+        _thread.start_new_thread(_press_again, ())
+
+
+def _press_again() -> None:
+    global _reminds, _reminded
+    while True:
+        time.sleep(_AGAIN_S)
+        with _reminding:
+            if _flag[0] != _PRESSED:
+                _reminds = False
+                return
+            _reminded = True
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
 def _compiling(frame: FrameType | None) -> bool:

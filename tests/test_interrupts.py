@@ -8,12 +8,16 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from threading import Thread
 
 import pytest
 
 from sva_bench.interrupts import (
+    as_ctrl_c,
     deferring_ctrl_c,
     flag,
     hear_ctrl_c,
@@ -144,3 +148,83 @@ def test_other_threads_and_ignored_signals_are_left_alone() -> None:
             press()
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def wait_for_ctrl_c() -> None:
+    time.sleep(60)
+    pytest.fail("it was not raised again")
+
+
+def test_what_a_library_has_swallowed_is_raised_again_soon() -> None:
+    with pytest.raises(KeyboardInterrupt), as_ctrl_c():  # noqa: PT012
+        with contextlib.suppress(KeyboardInterrupt):
+            press()
+        wait_for_ctrl_c()
+
+
+def test_an_error_that_a_library_made_of_it_is_ctrl_c_all_the_same() -> None:
+    with pytest.raises(KeyboardInterrupt), as_ctrl_c(ValueError):  # noqa: PT012
+        try:
+            press()
+        except KeyboardInterrupt:
+            raise SystemError("returned a result with an exception set") from None
+
+
+def test_errors_that_are_ours_and_errors_without_ctrl_c_stay_what_they_are() -> None:
+    with pytest.raises(ValueError, match="ours"), as_ctrl_c(ValueError):  # noqa: PT012
+        try:
+            press()
+        except KeyboardInterrupt:
+            raise ValueError("ours") from None
+    with pytest.raises(SystemError, match="theirs"), as_ctrl_c(ValueError):
+        raise SystemError("theirs")
+
+
+def test_what_is_cleared_away_is_not_cut_short_however_long_it_takes() -> None:
+    cleared = []
+    with pytest.raises(KeyboardInterrupt), as_ctrl_c():  # noqa: PT012
+        try:
+            press()
+        finally:
+            for _ in range(4):  # it is pressed again meanwhile, by itself and by somebody in a hurry
+                time.sleep(0.05)
+                press()
+                with holding_back_ctrl_c():
+                    cleared.append("some")
+    assert cleared == ["some"] * 4
+
+
+def test_once_it_was_heard_it_is_not_pressed_again() -> None:
+    with as_ctrl_c():
+        try:
+            with hearing_ctrl_c():
+                press()
+        except KeyboardInterrupt:
+            pass
+        time.sleep(0.15)
+    time.sleep(0.15)
+
+
+def test_pressed_and_swallowed_at_the_very_end_it_is_raised_there() -> None:
+    with pytest.raises(KeyboardInterrupt), as_ctrl_c(), contextlib.suppress(KeyboardInterrupt):
+        press()
+
+
+AT_THE_END = """
+import os, signal, sys
+from sva_bench.__main__ import main
+
+class TakenApart:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+
+sys.taken_apart = TakenApart()
+sys.argv = ["sva-bench", "--version"]
+main()
+"""
+
+
+def test_a_signal_at_the_very_end_does_not_change_the_exit_code() -> None:
+    done = subprocess.run([sys.executable, "-c", AT_THE_END], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("sva-bench ")

@@ -30,6 +30,7 @@ from sva_bench.analysis.wording import (
     vss_verdict,
     with_interval,
 )
+from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.world.model import World
 
 _ENDS = ("home", "failed", "out_of_fuel", "late", "stuck")
@@ -129,7 +130,8 @@ def _ranking(scenarios: Scenarios) -> list[str]:
 
 
 def _charts(scenarios: Scenarios, *, compared: bool) -> list[str]:
-    from sva_bench.analysis import charts  # matplotlib takes its time to load, and only a page needs it
+    with holding_back_ctrl_c():
+        from sva_bench.analysis import charts  # matplotlib takes its time to load, and only a page needs it
 
     plans = list(scenarios[0]["plans"])
     shown = ["stochastic", "deterministic"] if compared else plans[:4]
@@ -149,7 +151,8 @@ def _charts(scenarios: Scenarios, *, compared: bool) -> list[str]:
 
 
 def _over_trials(scenarios: Scenarios) -> list[str]:
-    from sva_bench.analysis import charts
+    with holding_back_ctrl_c():
+        from sva_bench.analysis import charts
 
     keys = ("least", "cvar10", "q05", "q25", "q50", "q75", "q95", "greatest")
     rows = [[s["name"], name, *(f"{plan['distribution'][key]:.1f}" for key in keys)]
@@ -196,7 +199,8 @@ def _ends(scenarios: Scenarios) -> list[str]:
 
 
 def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
-    from sva_bench.analysis import charts
+    with holding_back_ctrl_c():
+        from sva_bench.analysis import charts
 
     planned, driven = (np.asarray(legs[key], dtype=np.float64) for key in ("planned_s", "driven_s"))
     parts = [heading("Time and fuel, planned against driven")]
@@ -223,7 +227,8 @@ def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
 
 
 def _world(world: World) -> list[str]:
-    from sva_bench.analysis.drawing import Overlays, draw_world, for_page
+    with holding_back_ctrl_c():
+        from sva_bench.analysis.drawing import Overlays, draw_world, for_page
 
     picture = for_page(draw_world(world, "svg", Overlays()).decode(), "world", f"The world {world.name} from above")
     return [heading("The world"), figure(picture, f"{world.name}: {len(world.stations)} stations, {len(world.pois)} "
@@ -259,7 +264,8 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
         path: Where to.
         summary: Content of the batch's ``summary.json``.
     """
-    from sva_bench.analysis import charts
+    with holding_back_ctrl_c():
+        from sva_bench.analysis import charts
 
     rows, varied = summary["aggregate"], any(summary["variants"])
     over = [[*([row["variant"]] if varied else []), row["scenario"], str(row["maps"]), with_interval(row["vss"]),

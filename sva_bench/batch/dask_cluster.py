@@ -16,6 +16,7 @@ from sva_bench.batch.digest import code_digest
 from sva_bench.batch.guarded import GuardedWorker
 from sva_bench.batch.jobs import Job
 from sva_bench.errors import BadInput
+from sva_bench.interrupts import holding_back_ctrl_c
 
 _CONNECT_S = 10.0
 _LOST_S = 60.0
@@ -28,7 +29,8 @@ class DaskCluster:
 
     def __init__(self, address: str, caps: Caps) -> None:
         try:
-            from distributed import Client
+            with holding_back_ctrl_c():
+                from distributed import Client
         except ImportError:
             raise BadInput("--dask: distributed isn't installed; pip install 'sva-bench[dask]'") from None
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters of it is said by us

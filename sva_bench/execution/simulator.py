@@ -15,6 +15,7 @@ from types import TracebackType
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
 from sva_bench.robot.model import CASTERS_AT, RobotModel
 from sva_bench.robot.twin import patience_steps
@@ -80,7 +81,7 @@ class Simulator:
                 fixedTimeStep=1.0 / CONTROL_HZ, numSubSteps=_SUBSTEPS, numSolverIterations=_ITERATIONS,
                 solverResidualThreshold=_residual(model), deterministicOverlappingPairs=1, physicsClientId=self._client)
             pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
-            with _quiet():
+            with deferring_ctrl_c(), _quiet():  # or it might come while both outputs lead nowhere
                 self._build_world(obstacles)
             self._body = self._build_robot(pose)
         except BaseException:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from sva_bench.atomic import write_file
 from sva_bench.errors import BadFile, BadInput, ExitCode, SvaBenchError
+from sva_bench.interrupts import holding_back_ctrl_c
 
 LAVAPIPE = Path("/usr/share/vulkan/icd.d/lvp_icd.x86_64.json")  # Mesa's Vulkan driver that needs no graphics card
 _DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
@@ -144,7 +145,8 @@ def _picture(path: Path, picture: Path, at_s: float | None) -> None:
         raise BadInput(f"{picture} is no name for a picture: let it end in .png")
     verify(path)
     environment = {**drawing_environment(os.environ), "RUST_LOG": "error"}  # notices would cover the picture
-    from sva_bench.recording import rerun  # takes half a second to import: only once it is needed
+    with holding_back_ctrl_c():
+        from sva_bench.recording import rerun  # takes half a second to import: only once it is needed
 
     port = _free_port()
     command = [*program(), "--headless", "--hide-welcome-screen", "--window-size", _PICTURE_SIZE, *_at(port)]

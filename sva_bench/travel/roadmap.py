@@ -21,6 +21,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.interrupts import deferring_ctrl_c, pressed
 from sva_bench.travel.lattice import lattice_ways, open_parts
 from sva_bench.travel.samples import arc_points, roadmap_samples
 from sva_bench.travel.tangents import nothing_known, tangents, tangents_of_own, taut
@@ -168,6 +169,7 @@ def _space(obstacles: Obstacles, clearance_m: float) -> tuple[Any, Callable[[flo
     def free(ax: float, ay: float, bx: float, by: float) -> bool:
         return bool(keeps_clear(checker, ax, ay, bx, by))
 
+    free(*obstacles.bounds_m[:2].tolist() * 2)  # is compiled here, where Ctrl-C may be raised, not within OMPL
     si.setStateValidityChecker(lambda s: free(s[0], s[1], s[0], s[1]))
     si.setMotionValidator(_ExactValidator(si, free))
     si.setup()
@@ -231,9 +233,10 @@ def _roadmap(
     planner = og.PRMstar(si)
     planner.setProblemDefinition(problem)
     planner.setup()
-    planner.solve(ob.plannerAlwaysTerminatingCondition())  # inserts the sites; a Python condition would deadlock here
     total = len(points) + len(samples)
-    planner.growRoadmapPtc(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= total))
+    with deferring_ctrl_c():  # OMPL calls back, and is no place for exceptions
+        planner.solve(ob.plannerAlwaysTerminatingCondition())  # inserts the sites; a Python condition would deadlock
+        planner.growRoadmapPtc(ob.PlannerTerminationCondition(lambda: pressed() or planner.milestoneCount() >= total))
     checker = clearance_checker(obstacles, clearance_m, _START_SLACK_M)
     ends = np.concatenate([_alone(points), arcs])
     vertices, graph = _with_edges(*_read_roadmap(si, planner), ends[:, :2], tangents(checker, ends))
@@ -349,17 +352,19 @@ def _query(
         search.setNumSamples(1000 * effort)
     search.setProblemDefinition(problem)
     search.setup()
-    search.solve(_after(calls))
+    with deferring_ctrl_c():
+        search.solve(_after(calls))
     if not problem.hasExactSolution():  # solve() is true for an approximate one too, which ends short
         return None
     path = problem.getSolutionPath()
-    simplifier.simplifyMax(path)
+    with deferring_ctrl_c():
+        simplifier.simplifyMax(path)
     vertices = np.array([(s[0], s[1]) for s in path.getStates()])
     vertices[0], vertices[-1] = start, goal
     return vertices
 
 
 def _after(calls: int) -> Any:
-    """A termination condition that counts how often it is asked: never the clock."""
+    """A termination condition that counts how often it is asked: never the clock. Ctrl-C ends it too."""
     asked = iter(range(calls))
-    return ob.PlannerTerminationCondition(lambda: next(asked, None) is None)
+    return ob.PlannerTerminationCondition(lambda: next(asked, None) is None or pressed())
