@@ -118,13 +118,13 @@ class ColumnGeneration:
         self.cuts: tuple[SubsetRow, ...] = ()
         self._counter = Counter((), n)
         self._counts: dict[tuple[int, tuple[int, ...]], FloatArray] = {}
-        rates = np.abs(self.goal.weights)  # the most that a visit can earn; of a measure of risk no more than all of it
-        if self.goal.risk is not None:
-            rates = rates + self.goal.risk.measure.weight * self.goal.risk.outcomes.incentives
+        rates = self.goal.rates()
         self._most = float(rates.max(initial=0.0))
         longest = sum(graph.limit_s for graph in self.graphs)
         self.penalty = 10.0 * (float(rates.max(axis=0, initial=0.0).sum()) + self.goal.driving * longest) or 1.0
         self._sizes = sizes_of(self.goal.floors)
+        if self.goal.risk is not None:  # columns of its own stand in all rows
+            self._sizes[:] = self._sizes.max(initial=0.0)
 
     @property
     def priced(self) -> int:

@@ -111,7 +111,7 @@ class Master:
         side: The decisions.
         pois: POIs with a row.
         floors: Least sum of each floor.
-        sizes: Size of each floor's row, shape (floors,).
+        sizes: Size of each floor's row, shape (floors,); all the same under a measure of risk.
         cuts: How many cuts there are; of the routes a cut counts, one is in use at most.
         counted: How often each cut counts a route, shape (cuts,).
         penalty: What a unit of a required visit, or of a floor in units of its size, costs if it is missed.
@@ -138,6 +138,7 @@ class Master:
         missed = [self._row[j] for j in sorted(self.side.required)]
         missed += [] if self.risk else list(range(first, rows))
         costs, entries = self.risk.costs() if self.risk else (np.zeros(0), np.zeros((len(self.floors), 0)))
+        costs = costs * self.sizes.max(initial=0.0)  # in units of the rows, so that tolerances are relative
         self.penalties, self.others = len(missed), len(missed) + len(costs)
         own = {row: k for k, row in enumerate(missed)}
         build = RowBuilder()
@@ -147,7 +148,7 @@ class Master:
             build.add([], [], -np.inf, float(unit.count))
         for k, floor in enumerate(self.floors):
             used = np.flatnonzero(entries[k])
-            columns, values = self.penalties + used, entries[k][used] / self.sizes[k]
+            columns, values = self.penalties + used, entries[k][used]
             if not self.risk:
                 columns, values = np.array([own[first + k]]), np.ones(1)
             build.add(columns, values, float(floor / self.sizes[k]), np.inf)

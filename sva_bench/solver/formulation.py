@@ -139,6 +139,18 @@ class Goal:
             self.risk.outcomes, incentives=np.where(reach, self.risk.outcomes.incentives, 0.0)))
         return replace(self, weights=np.where(reach, self.weights, 0.0), risk=risk)
 
+    def essential(self) -> Goal:
+        """The same goal but for a constant, without what no plan can change of its measure of risk."""
+        if self.risk is None:
+            return self
+        risk = self.risk.essential()
+        return replace(self, risk=risk, floors=() if risk is None else risk.floors())
+
+    def rates(self) -> FloatArray:
+        """The most that the visit of vehicle m to site j can earn, or cost, shape (M, n)."""
+        rates: FloatArray = np.abs(self.weights) * self.chances()[:, None]
+        return rates if self.risk is None else rates + self.risk.rates()
+
     def rewarded(self) -> BoolArray:
         """Whether the visit of vehicle m to site j counts anywhere, shape (M, n)."""
         counts: BoolArray = self.weights != 0

@@ -157,6 +157,7 @@ class Progress:
     seconds: dict[str, float] = field(default_factory=dict)
     grain: float = 0.0  # every plan's value is a multiple of it; 0 = unknown
     rounding: float = 0.0  # a bound that is above the value by no more is the value
+    constant: float = 0.0  # part of every plan's value that is left out here; gaps are relative to all of it
 
     def tighten(self, bound: float) -> None:
         """Take up an upper bound, and round it down to a value that a plan can have."""
@@ -166,12 +167,13 @@ class Progress:
 
     def closed(self, gap: float) -> bool:
         """Whether nothing is left to prove."""
-        return self.bound - self.value <= max(gap * abs(self.value), self.rounding)
+        return self.bound - self.value <= max(gap * abs(self.value + self.constant), self.rounding)
 
     def slack(self, gap: float) -> float:
         """By how much another plan must be worth more to be of interest: less is within the gap, or below the next
         value that a plan can have, or rounding."""
-        return max(gap * abs(self.value), (1 - 1e-5) * self.grain - 2 * self.rounding, self.rounding / 2)
+        return max(gap * abs(self.value + self.constant), (1 - 1e-5) * self.grain - 2 * self.rounding,
+                   self.rounding / 2)
 
 
 def best_known(goal: Goal, known: Knowledge) -> Orders | None:
@@ -246,7 +248,7 @@ def trivial_bound(goal: Goal) -> float:
         return 0.0
     bound = float(np.maximum(goal.weights.max(axis=0), 0.0).sum())
     if goal.risk is not None and goal.risk.measure.kind == "cvar":
-        bound += goal.risk.measure.weight * float(goal.risk.outcomes.incentives.max(axis=0).sum())
+        bound += float(goal.risk.rates().max(axis=0).sum())
     return bound
 
 

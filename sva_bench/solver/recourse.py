@@ -22,6 +22,9 @@ from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
 from sva_bench.solver.refuelling import Road
 
+LEAST_AVAILABILITY = 1e-4
+"""Of the vehicle that is there most often: below it what is lost is as good as all that is earned."""
+
 
 def refuse_free_legs(instance: Instance) -> None:
     """Refuse an instance in which a leg costs nothing.
@@ -35,6 +38,22 @@ def refuse_free_legs(instance: Instance) -> None:
             i, j = (instance.sites[k] for k in free[0])
             raise BadInput(f"instance {instance.name}: {vehicle.name} drives {i} -> {j} for nothing, and the paper's "
                            "second stage needs costs above 0; use the method auto or expected")
+
+
+def refuse_seldom_available(instance: Instance, availability: float) -> None:
+    """Refuse an instance whose vehicles are hardly ever there: nearly all that a plan earns is then lost again, and
+    the difference of the two, in which HiGHS rounds, is all that it is worth.
+
+    Args:
+        instance: The instance.
+        availability: The greatest one of its vehicles.
+
+    Raises:
+        BadInput: If it is above 0, but too small.
+    """
+    if 0 < availability < LEAST_AVAILABILITY:
+        raise BadInput(f"instance {instance.name}: no vehicle's availability is above {availability:g}, and the "
+                       f"paper's second stage is exact from {LEAST_AVAILABILITY:g}; use the method auto or expected")
 
 
 class EquivalentModel(DirectedModel):

@@ -53,15 +53,57 @@ class Risk:
     Attributes:
         measure: The measure.
         outcomes: The outcomes.
+        constant: What it adds to every plan's value besides, weight included: a gap counts in the value with it.
     """
 
     measure: RiskMeasure
     outcomes: Outcomes
+    constant: float = 0.0
 
     def times(self, factor: float) -> Risk:
         """The same measure with incentives in another unit."""
         return Risk(measure=replace(self.measure, target=self.measure.target * factor),
-                    outcomes=self.outcomes.times(factor))
+                    outcomes=self.outcomes.times(factor), constant=self.constant * factor)
+
+    def essential(self) -> Risk | None:
+        """The same measure but for ``constant``, over the outcomes that can pay; ``None`` where no plan changes it.
+
+        An outcome that pays nothing whatever is driven may have nearly all the probability: beside it the others'
+        share, which is all that a plan can change, would be rounding. Without it the tail of ``cvar`` begins among the
+        others, with the rest of its probability. What exceeds the target is of no use to ``excess``, and cut off.
+        """
+        measure, outcomes = self.measure, self.outcomes
+        probability = outcomes.probability / math.fsum(outcomes.probability)
+        pays = outcomes.available @ outcomes.incentives.any(axis=1) > 0
+        chance = min(math.fsum(probability[pays]), 1.0)
+        if measure.kind == "excess":
+            lost = self.constant - measure.weight * measure.target * math.fsum(probability[~pays])
+            measure = replace(measure, weight=measure.weight * chance)
+            left = chance if measure.target > 0 else 0.0
+            incentives = np.minimum(outcomes.incentives, measure.target)
+        else:
+            lost, left, incentives = self.constant, chance - measure.beta, outcomes.incentives
+            if left > 0:
+                measure = replace(measure, weight=measure.weight * left / (1 - measure.beta),
+                                  beta=measure.beta / chance)
+        if left <= 0 or measure.weight == 0:
+            return None
+        return Risk(measure=measure, constant=lost, outcomes=replace(
+            outcomes, incentives=incentives, probability=probability[pays] / chance,
+            available=outcomes.available[pays]))
+
+    def rates(self) -> FloatArray:
+        """The most that a visit by vehicle m to site j can add to the measure, weight included, shape (M, n)."""
+        share, earned = self.outcomes.probability @ self.outcomes.available, self.outcomes.incentives
+        if self.measure.kind == "excess":
+            earned = np.minimum(earned, self.measure.target)
+        else:
+            share = np.minimum(share / (1.0 - self.measure.beta), 1.0)
+        return self.measure.weight * share[:, None] * earned
+
+    def floors(self) -> tuple[tuple[FloatArray, float], ...]:
+        """Weights and right side of each outcome's row."""
+        return tuple((there[:, None] * self.outcomes.incentives, self.side) for there in self.outcomes.available)
 
     def of(self, sums: FloatArray) -> float:
         """Value of the measure, without its weight, for sums of incentives by vehicle, shape (M,)."""
@@ -69,9 +111,11 @@ class Risk:
         if self.measure.kind == "excess":
             return -float(self.outcomes.probability @ np.maximum(self.measure.target - paid, 0.0))
         tail = 1.0 - self.measure.beta
-        order = np.argsort(paid, kind="stable")
-        before = np.concatenate([[0.0], np.cumsum(self.outcomes.probability[order])[:-1]])
-        share = np.clip(tail - before, 0.0, self.outcomes.probability[order])
+        # From the best outcome down: those that pay may have so little probability that 1 less it is 1.
+        order = np.argsort(-paid, kind="stable")
+        better = np.concatenate([[0.0], np.cumsum(self.outcomes.probability[order])[:-1]])
+        share = self.outcomes.probability[order]
+        share = share - np.clip(self.measure.beta - better, 0.0, share)
         return float(share @ paid[order]) / tail
 
     @property

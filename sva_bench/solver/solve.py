@@ -83,10 +83,14 @@ def _solve(
     rewarded = goal.rewarded()
     scopes = [scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles)]
     goal = goal.within(np.array([scope.legs.any(axis=0) for scope in scopes]).reshape(goal.weights.shape))
+    constant = 0.0
+    if goal.risk is not None:
+        goal = goal.essential()
+        constant = 0.0 if goal.risk is None else goal.risk.constant
     factor = factor_of(goal)
     goal = goal.times(factor)
     progress = Progress(orders=start, value=value_of(goal, known.roads, start), bound=trivial_bound(goal),
-                        grain=grain_of(goal), rounding=ROUNDING * most_of_a_visit(goal))
+                        grain=grain_of(goal), rounding=ROUNDING * most_of_a_visit(goal), constant=factor * constant)
     if method == "auto":
         method = choice(instance, scopes, goal)
     try:
@@ -138,12 +142,12 @@ def _search_and_prove(
 
 
 def _searched(goal: Goal) -> FloatArray:
-    """What the heuristic maximises: the goal, or under a measure of risk the expected incentive."""
+    """What the heuristic maximises: the goal, or in place of a measure of risk what it takes the mean of."""
     if goal.risk is None:
         return goal.weights
     outcomes = goal.risk.outcomes
-    expected: FloatArray = outcomes.incentives * (outcomes.probability @ outcomes.available)[:, None]
-    return expected
+    return goal.weights + goal.risk.measure.weight * outcomes.incentives * (
+        outcomes.probability @ outcomes.available)[:, None]
 
 
 def _model(

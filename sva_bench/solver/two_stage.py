@@ -22,7 +22,7 @@ from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, 
 from sva_bench.solver.lshaped import Cuts
 from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
-from sva_bench.solver.recourse import refuse_free_legs
+from sva_bench.solver.recourse import refuse_free_legs, refuse_seldom_available
 from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.risk import Risk, RiskMeasure
 from sva_bench.solver.solve import TWO_STAGE, Method, solve
@@ -47,7 +47,7 @@ TIE = 1e-6
 MOST_SUBSETS = 16
 """Subsets of uncertain vehicles up to which the value of perfect information is worked out unasked."""
 _FLOOR = 1e-8  # relative; keeps a known optimum feasible when its value becomes a constraint
-_ROUNDING = 1e-12  # relative; of sums of incentives
+_ROUNDING = 1e-12  # relative; of sums of incentives, and of availabilities that are the same
 _STATUSES: tuple[Status, ...] = ("optimal", "feasible", "time_limit", "interrupted")  # best first
 
 
@@ -124,8 +124,7 @@ def _averse(instance: Instance, measure: RiskMeasure) -> Goal:
     if measure.weight == 0:
         return Goal(weights=weights)
     risk = Risk(measure=measure, outcomes=outcomes)
-    return Goal(weights=weights, risk=risk, floors=tuple(
-        (there[:, None] * outcomes.incentives, risk.side) for there in outcomes.available))
+    return Goal(weights=weights, risk=risk, floors=risk.floors())
 
 
 def plan_nominal(
@@ -269,6 +268,7 @@ def _greatest(
         certain = bool((availability == 1).all())
         sets = {frozenset(v.name for v in instance.vehicles): 1.0} if certain else possible(instance)
         refuse_free_legs(instance)
+        refuse_seldom_available(instance, scale)
         return solve(instance, goal, known, clock, gap, method, outcomes_of(instance, sets, scale or 1.0), cuts)
     return _once(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap, method)
 
@@ -303,7 +303,7 @@ class _Ties:
         best = _sum(self._incentives, nominal)
         self._floor = best - _FLOOR * abs(best)
         spread = availability - availability.min(initial=1.0)
-        self._equal = float(spread.max(initial=0.0)) < 1e-12
+        self._equal = float(spread.max(initial=0.0)) <= _ROUNDING * float(availability.max(initial=0.0))
         self._shares = np.zeros(len(spread)) if self._equal else spread / spread.max()
 
     def solutions(self, interrupted: bool) -> tuple[Solution | None, Solution | None, Solution | None]:

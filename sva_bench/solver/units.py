@@ -5,6 +5,12 @@ Two steps. Where an instance comes in, its incentives become multiples of its ow
 the power of two that brings the most that one visit can earn near ``LARGEST`` (``factor_of``), which loses nothing.
 Constants that are compared with values anywhere in the solver are meant in these units, where the best plan of a goal
 without negative weights is worth ``LARGEST / 2`` at least.
+
+What a visit can earn has all that multiplies its incentive in it: availability, the chance to get there, its share in
+a measure of risk (``Goal.rates``). So what is guaranteed of an optimal plan is relative to what the goal can pay, not
+to its incentives: no plan is better by more than the gap, or by ``ROUNDING`` of the most that one visit can earn. The
+latter is less than the gap but for goals with negative weights, and for measures of risk whose best plan is worth less
+than a thousandth of what one of its visits could earn: a ``cvar`` of 0, say, that no plan can raise.
 """
 
 from __future__ import annotations
@@ -80,10 +86,7 @@ def factor_of(goal: Goal) -> float:
 
 def most_of_a_visit(goal: Goal) -> float:
     """The most that one visit can earn, or cost."""
-    rates = np.abs(goal.weights) * goal.chances()[:, None]
-    if goal.risk is not None:
-        rates = rates + goal.risk.measure.weight * goal.risk.outcomes.incentives
-    return float(rates.max(initial=0.0))
+    return float(goal.rates().max(initial=0.0))
 
 
 def _power_below(most: float) -> float:

@@ -110,11 +110,10 @@ def risk_optimum(instance: Instance, measure: RiskMeasure) -> float:
         if measure.kind == "excess":
             bad = -sum(max(measure.target - x, 0.0) * p for x, p in paid)
         else:
-            left = tail = 1 - measure.beta
-            bad = 0.0
-            for x, p in paid:
-                bad += x * min(p, left) / tail
-                left -= min(p, left)
+            bad, spare = 0.0, measure.beta
+            for x, p in reversed(paid):  # from the best one: 1 less a tiny probability is rounding
+                bad += x * (p - min(p, spare)) / (1 - measure.beta)
+                spare -= min(p, spare)
         best = max(best, (1 - measure.weight) * mean + measure.weight * bad)
     return best
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.mission.instance import Instance
@@ -20,7 +21,7 @@ from sva_bench.solver import solve as solving
 from sva_bench.solver.heuristic import Found
 from sva_bench.solver.lshaped import Cuts
 from sva_bench.solver.risk import RiskMeasure
-from sva_bench.solver.solve import Method
+from sva_bench.solver.solve import TWO_STAGE, Method
 from sva_bench.solver.two_stage import (
     SolveLimits,
     plan_averse,
@@ -30,7 +31,7 @@ from sva_bench.solver.two_stage import (
     wait_and_see,
 )
 from sva_bench.solver.units import common_unit, in_own_units
-from tests.solver.oracle import random_instance, risk_optimum
+from tests.solver.oracle import per_leg_optimum, random_instance, risk_optimum, truth
 
 Solve = Callable[[Instance, float], Plan]
 """Makes a plan of an instance whose incentives, and targets, have been multiplied by a factor."""
@@ -87,7 +88,6 @@ def correlated(instance: Instance, rng: np.random.Generator) -> Instance:
     names = [v.name for v in instance.vehicles]
     sets = rng.permutation(2 ** len(names))[:int(rng.integers(1, 2 ** len(names) + 1))]
     shares = rng.dirichlet(np.full(len(sets), rng.choice([0.3, 1.0, 5.0])))
-    shares = (shares + 1e-4) / (shares + 1e-4).sum()  # not so small that what a visit earns is rounding
     states = tuple(JointState(probability=float(p), available=frozenset(
         name for k, name in enumerate(names) if bits >> k & 1)) for p, bits in zip(shares, sets, strict=True))
     return replace(instance, joint=states, vehicles=tuple(
@@ -226,6 +226,38 @@ def test_plans_under_a_measure_of_risk_over_many_joint_distributions(seed: int) 
 @pytest.mark.parametrize("seed", range(7000, 8500))
 def test_the_method_alone_finds_them_over_many_joint_distributions(seed: int) -> None:
     check_joint_risk(seed)
+
+
+@pytest.mark.parametrize("most", [1e-8, 1e-12])
+def test_plans_are_the_best_however_seldom_anybody_is_available(most: float) -> None:
+    # What a plan is worth is next to nothing beside an incentive, but all that there is.
+    for seed in (0, 10, 19):
+        made = random_instance(seed)
+        rng = np.random.default_rng((seed, 9))
+        instance = replace(made, vehicles=tuple(
+            replace(v, availability=most * float(rng.choice([1.0, 0.3, 0.01]))) for v in made.vehicles))
+        along = replace(instance, failure="per_leg")
+        stochastic = plan_stochastic(instance)
+        best = truth(instance)
+        measures = (RiskMeasure(kind="cvar", beta=0.0), RiskMeasure(kind="cvar", weight=0.3), RiskMeasure(kind="cvar"),
+                    RiskMeasure(kind="excess", weight=0.3), RiskMeasure(kind="excess", target=35.0),
+                    RiskMeasure(kind="excess", weight=0.3, target=10 * most))
+        found = [(stochastic, best.stochastic), (plan_stochastic(along), per_leg_optimum(along)),
+                 *((plan_averse(instance, m), risk_optimum(instance, m)) for m in measures)]
+        for plan, want in found:
+            assert plan.status == "optimal"
+            assert plan.value == pytest.approx(want, rel=1.1e-6, abs=0.0)
+            assert plan.bound == pytest.approx(want, rel=2.1e-6, abs=0.0)
+        ties = plan_deterministic(instance, stochastic)
+        assert (ties.most, ties.least) == pytest.approx((best.most, best.least), rel=1e-6, abs=0.0)
+
+
+def test_the_second_stage_of_the_paper_is_refused_where_next_to_nobody_is_available() -> None:
+    made = random_instance(10)
+    instance = replace(made, vehicles=tuple(replace(v, availability=1e-8) for v in made.vehicles))
+    for method in TWO_STAGE:
+        with pytest.raises(BadInput, match="use the method auto or expected"):
+            plan_stochastic(instance, method=method)
 
 
 def test_a_required_visit_under_a_measure_of_risk_ends_the_search() -> None:
