@@ -124,7 +124,7 @@ def shorten(tables: Tables, orders: Orders) -> Orders:
             if length[m]:
                 straighten(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
                            tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
-                           np.zeros((4, FRONT)), spare, sums)
+                           np.zeros((4, FRONT)), spare, sums, stop_mark())
     return _as_orders(array, length)
 
 

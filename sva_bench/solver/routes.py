@@ -16,6 +16,7 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.formulation import SLACK_S
+from sva_bench.solver.looking import look, stop_mark
 from sva_bench.solver.preprocess import shortest_paths
 
 FRONT = 12
@@ -73,7 +74,8 @@ def tables_of(instance: Instance) -> Tables:
         if len(stations) and vehicle.fuel_capacity_s < vehicle.mission_limit_s:
             chain = shortest_paths(quickest[k][np.ix_(stations, stations)], -1)
             with deferring_ctrl_c():
-                found, first[k], last[k] = _ways(fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k])
+                found, first[k], last[k] = _ways(fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k],
+                                                 stop_mark())
             first[k] += offset
             last[k] += offset
             offset += len(found)
@@ -85,7 +87,7 @@ def tables_of(instance: Instance) -> Tables:
 
 
 @njit(cache=True)
-def _ways(fuel, time, chain, stations, capacity, quickest):
+def _ways(fuel, time, chain, stations, capacity, quickest, stop):
     """The ways over stations that no other beats in all three respects, by increasing time; lowers ``quickest``."""
     n, count = len(fuel), len(stations)
     first, last = np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
@@ -94,6 +96,8 @@ def _ways(fuel, time, chain, stations, capacity, quickest):
     some = np.empty((count * count, 3))
     for a in range(n):
         for b in range(n):
+            if look(stop):  # with a thousand stations each of so many pairs has a million ways
+                return found[:0].copy(), np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
             first[a, b] = size
             number = 0
             for k in range(count):

@@ -100,7 +100,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
                 for m in range(vehicles):
                     k = kind[m]
                     straighten(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
-                               limit[k], weights[m], survival[m], scratch, spare, sums)
+                               limit[k], weights[m], survival[m], scratch, spare, sums, stop)
                     for j in range(n):
                         allowed[m, j] = weights[m, j] > 0
                 factor[:] = 1.0
@@ -272,10 +272,11 @@ def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel
 
 @njit(cache=True)
 def straighten(order, length, base, fuel, time, first, last, hops, capacity, limit, weights, survival, scratch, spare,
-               sums):
+               sums, stop):
     """Reverse parts of a route and move up to three POIs of it, in place, as long as that gains value or time.
 
-    On a long route only such changes are tried as are quicker without refuels.
+    On a long route only such changes are tried as are quicker without refuels. Ends early, with a route that is as
+    good as before or better, once ``stop`` is not 0.
     """
     now = route_time(order, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
     earned = worth(order, length, weights, survival) if survival < 1.0 else 0.0
@@ -283,7 +284,7 @@ def straighten(order, length, base, fuel, time, first, last, hops, capacity, lim
     ahead, back = sums[0], sums[1]
     _sums(order, length, base, time, ahead, back)
     improved = True
-    while improved:
+    while improved and not look(stop):
         improved = False
         for i in range(length):
             for j in range(i + 1, length):

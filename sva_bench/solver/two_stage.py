@@ -26,7 +26,7 @@ from sva_bench.solver.recourse import refuse_free_legs, refuse_seldom_available
 from sva_bench.solver.refuelling import quickest
 from sva_bench.solver.risk import Risk, RiskMeasure
 from sva_bench.solver.solve import TWO_STAGE, Method, solve
-from sva_bench.solver.units import in_own_units
+from sva_bench.solver.units import in_own_units, in_unit
 
 __all__ = [
     "DeterministicPlans",
@@ -110,7 +110,8 @@ def plan_averse(
     clock = limits.clock()
     warn_of_unreachable(instance)
     own, unit = in_own_units(instance)
-    solution = solve(own, _averse(own, replace(measure, target=measure.target / unit)), known, clock, limits.gap)
+    in_own = replace(measure, target=in_unit(measure.target, unit))
+    solution = solve(own, _averse(own, in_own), known, clock, limits.gap)
     value = value_of(_averse(instance, measure), known.roads, solution.orders)
     return _finish(instance, measure.kind, solution.orders, known, value=value,
                    bound=value + unit * (solution.bound - solution.value), status=solution.status,

@@ -22,6 +22,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.formulation import Goal
 
@@ -69,12 +70,23 @@ def in_own_units(instance: Instance) -> tuple[Instance, float]:
         units = round(largest / step)
         scaled, top = np.rint(relative * units), float(units)
     else:
-        mantissa, exponent = np.frexp(relative)
-        scaled, top = np.ldexp(np.rint(np.ldexp(mantissa, _BITS)), exponent - _BITS), 1.0
+        scaled, top = _without_noise(relative), 1.0
     factor = _power_below(top)
     own = replace(instance, vehicles=tuple(
         replace(v, incentives=row) for v, row in zip(instance.vehicles, scaled * factor, strict=True)))
     return own, max(largest / (top * factor), math.ulp(0.0))
+
+
+def in_unit(value: float, unit: float) -> float:
+    """What is compared with incentives, such as a target, in the unit that an instance's own are in."""
+    return float(_without_noise(np.array([value / unit]))[0])
+
+
+def _without_noise(values: FloatArray) -> FloatArray:
+    """Values rounded to 11 digits, shape as given."""
+    mantissa, exponent = np.frexp(values)
+    rounded: FloatArray = np.ldexp(np.rint(np.ldexp(mantissa, _BITS)), exponent - _BITS)
+    return rounded
 
 
 def factor_of(goal: Goal) -> float:

@@ -21,7 +21,7 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.generate import Family, random_instance
 from sva_bench.mission.instance import Instance, write_instance
 from sva_bench.mission.plan import Plan, read_plan
-from sva_bench.solver import branch_and_cut, column_generation, heuristic, lshaped
+from sva_bench.solver import branch_and_cut, column_generation, heuristic, lshaped, routes
 from sva_bench.solver.graph import graph_of, neighbours
 from sva_bench.solver.listing import counts
 from sva_bench.solver.preprocess import scope_of
@@ -153,3 +153,18 @@ def test_the_command_line_writes_the_plan_and_ends_with_130(tmp_path: Path) -> N
     assert json.loads(plan.read_text(encoding="utf-8"))["status"] == "interrupted"
     assert certify(hard(), read_plan(plan, hard())).reasons == ()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["i.json", "p.json"]
+
+
+def test_ctrl_c_ends_the_search_for_ways_over_very_many_stations(monkeypatch: pytest.MonkeyPatch) -> None:
+    # 600 stations: each of 360 000 pairs of sites has as many ways.
+    rng = np.random.default_rng(0)
+    at = rng.uniform(0, 100, size=(602, 2))
+    fuel = np.hypot(*(at[:, None] - at[None]).transpose(2, 0, 1))
+    made = hard(pois=2, vehicles=1).vehicles[0]
+    instance = Instance(
+        name="stations", sites=tuple(f"s{k}" for k in range(602)), base=0, stations=tuple(range(1, 601)),
+        stop_s=np.zeros(602), vehicles=(replace(
+            made, fuel_capacity_s=150.0, mission_limit_s=1000.0, fuel_s=fuel, incentives=np.eye(602)[601]),))
+    at_call(monkeypatch, routes, "_ways")
+    with pytest.raises(KeyboardInterrupt):
+        routes.tables_of(instance)
