@@ -100,9 +100,13 @@ def over(
     set_up_logging(verbose)
     load_libraries()
     with holding_back_ctrl_c():
+        from sva_bench.batch.cache import default_folder
         from sva_bench.batch.grid import batch_name
         from sva_bench.sweeps import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 
+    if not dry_run:  # before worlds are read: with their variants, that takes its time
+        check_folder(out or Path("runs"), "--out")
+        check_folder(cache or default_folder(), "--cache")
     sweep = sweep_of(worlds, Sweep(
         seeds=seeds_of(seed) if seed else None, trials=trials, rollouts=rollouts, fidelity=fidelity,
         planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
