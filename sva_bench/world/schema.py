@@ -138,7 +138,8 @@ class Sites(Section):
 class Figures(Section):
     """Figures of a robot that isn't built in; the model itself checks how they go together.
 
-    Smaller hulls, wheels and tracks than these are lost in what physics takes for contact.
+    Smaller hulls, wheels and tracks than these are lost in what physics takes for contact; with less turn acceleration
+    a robot takes a second to mend the heading errors that it may stop with, more than 1 % of many a leg.
     """
 
     radius_m: Annotated[Positive, Field(ge=0.05, le=5)]
@@ -148,7 +149,7 @@ class Figures(Section):
     max_speed_m_s: Annotated[Positive, Field(ge=0.02, le=20)]
     max_turn_rad_s: Annotated[Positive, Field(ge=0.05, le=20)]
     acceleration_m_s2: Annotated[Positive, Field(ge=0.02, le=20)]
-    turn_acceleration_rad_s2: Annotated[Positive, Field(ge=0.05, le=100)]
+    turn_acceleration_rad_s2: Annotated[Positive, Field(ge=0.1, le=100)]
 
 
 class Drawn(Section):
