@@ -75,8 +75,9 @@ def run(
     precision: Annotated[str | None, typer.Option(
         metavar="PCT%", help="Go on with more trials and noise draws until the interval of the executed VSS is within "
         "so many per cent of the stochastic plan's mean.", show_default="none")] = None,
-    max_trials: Annotated[int, typer.Option(min=1, max=10_000_000, help="With --precision: trials at which to stop all "
-                                                                        "the same.")] = 100_000,
+    max_trials: Annotated[int | None, typer.Option(
+        min=1, max=10_000_000, help="With --precision: trials at which to stop all the same.",
+        show_default="100000")] = None,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -92,7 +93,9 @@ def run(
         from sva_bench.precision import precision_of
 
     set_up_logging(verbose)
-    asked = None if precision is None else precision_of(precision, max_trials, trials, rollouts)
+    if precision is None and max_trials is not None:
+        raise BadInput("--max-trials belongs to --precision; --trials says how many there are without it")
+    asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts)
     check_folder(out, "--out")
     loaded = load(world, scenario, margin, plan_failure, execute_failure)
     load_libraries()  # after the world is read: an error in the file is said at once

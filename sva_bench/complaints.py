@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -70,10 +71,9 @@ def _plainly(detail: Any) -> str:
 
 def _numeric(text: str) -> bool:
     try:
-        float(text)
+        return math.isfinite(float(text))
     except ValueError:
         return False
-    return True
 
 
 _PLAINLY = {  # what pydantic says of its own types, said of the file

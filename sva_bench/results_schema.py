@@ -49,6 +49,14 @@ class Estimated(Section):
     mean: Figure
     ci95: Interval | None
 
+    @model_validator(mode="after")
+    def _within(self) -> Estimated:
+        if self.ci95 is not None:
+            slack = 1e-9 * max(abs(self.mean), 1e-300)
+            if not self.ci95[0] - slack <= self.mean <= self.ci95[1] + slack:
+                raise ValueError(f"ci95: the mean, {self.mean:g}, lies outside")
+        return self
+
 
 class Shared(Section):
     share: Share
@@ -172,6 +180,10 @@ class ScenarioResults(Section):
         if "vss" in told:
             if self.vss is None or not {"stochastic", "deterministic"} <= set(self.plans):
                 raise ValueError("a scenario with 'vss' has the plans 'stochastic' and 'deterministic'")
+            s, d = (self.plans[name].executed.mean for name in ("stochastic", "deterministic"))
+            if abs(self.vss.executed.mean - (s - d)) > 1e-6 * max(abs(s), abs(d)):
+                raise ValueError("vss.executed.mean: expected what the stochastic plan collects beyond the other, "
+                                 f"{s - d:g}, found {self.vss.executed.mean:g}")
             missing = {"evpi", "ws", "vss_mean_value", "vss_mean_value_executed", "value_of_process"} - told
             if missing:
                 raise ValueError(f"the key {min(missing)!r} is missing; add it")

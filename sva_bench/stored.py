@@ -93,11 +93,15 @@ def read_content(folder: Path) -> Content:
     first = summary.scenarios[0]
     for key, found, known in (
             (("world",), [summary.world], [world.name]),
+            (("seed",), [str(summary.seed)], [str(manifest.seed)]),
             (("scenarios", 0, "availability"), list(first.availability), [robot.name for robot in world.robots]),
             (("scenarios",), [s.name for s in summary.scenarios], [s.name for s in world.scenarios])):
         if found != known:
             raise document.error(key, f"not of the world in manifest.json: expected {_some(known)}, found "
                                  f"{_some(found)}")
+    for number, (told_of, scenario) in enumerate(zip(summary.scenarios, world.scenarios, strict=True)):
+        if told_of.availability != dict(scenario.availability):
+            raise document.error(("scenarios", number, "availability"), "not that of the world in manifest.json")
     plans = {(s.name, name): plan.executed.mean for s in summary.scenarios for name, plan in s.plans.items()}
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
              "robot": frozenset(first.availability), "end": frozenset(ENDS), "fidelity": frozenset((summary.fidelity,))}

@@ -214,7 +214,14 @@ def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
     count = len(sweep.worlds) * math.prod(map(len, vary.values()))
     refuse_too_many(count * len(planners), len(seeds), options.trials, unit_trials)
     points: list[Point] = []
+    alike: dict[str, str] = {}
     for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
+        # Availabilities under robots: are those of scenarios that don't say otherwise, and of nothing else.
+        effective = replace(world, map_source=None, robots=tuple(replace(r, availability=1.0) for r in world.robots))
+        before = alike.setdefault(digest(effective), "; ".join(variant))
+        if before != "; ".join(variant):
+            _log.warning("%s: %s changes nothing against %s: its scenarios, or other keys, say otherwise", world.name,
+                         "; ".join(variant), before)
         if count >= _MANY:
             progress("reading worlds", number, count)
         for planner in planners:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from sva_bench.analysis.moments import figure_of
 from sva_bench.analysis.statistics import estimate
 from sva_bench.errors import BadInput
 from sva_bench.precision import Precision, half_width_pct, precision_of
+from tests.test_cli import sva_bench
 
 
 def summary(ci95: list[float] | None, mean: float, trials: int = 100, rollouts: int = 8) -> dict[str, Any]:
@@ -66,3 +68,9 @@ def test_stopping_when_precise_enough_costs_little_coverage() -> None:
         sizes.append(k)
     assert held / rounds >= 0.92
     assert min(sizes) < np.median(sizes)
+
+
+def test_most_trials_without_a_precision_are_refused(tmp_path: Path) -> None:
+    done = sva_bench("run", "w.yaml", "--max-trials", 5, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--max-trials belongs to --precision" in done.stderr

@@ -213,3 +213,13 @@ def test_a_dry_run_counts_what_is_left(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "1 units, 200 rows" in done.stdout
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small.world.yaml"]
+
+
+def test_a_key_that_scenarios_overrule_is_told_to_change_nothing(
+        tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = world(tmp_path)
+    grid_of(Sweep(worlds=(path,), vary={"noise.wheel_gain_sd": [0.0, 0.02]}))
+    assert "changes nothing" not in caplog.text
+    ruled = {"s": {"uv1": 1.0, "uv2": 0.5}}
+    grid_of(Sweep(worlds=(path,), vary={"scenarios": [ruled], "robots.uv2.availability": [0.3, 0.7]}))
+    assert "robots.uv2.availability=0.7 changes nothing" in caplog.text

@@ -140,6 +140,18 @@ def spoil(folder: Path, what: str) -> None:
         for scenario in summary["scenarios"]:
             del scenario["vss"]["executed"]
         (folder / "summary.json").write_text(json.dumps(summary))
+    else:  # a figure that contradicts another
+        summary = json.loads((folder / "summary.json").read_text())
+        scenario = next(s for s in summary["scenarios"] if not s["vss"]["same_plan"])
+        if what == "vss":
+            scenario["vss"]["executed"] = {"mean": 99.6, "ci95": [90.0, 110.0]}
+        elif what == "interval":
+            scenario["plans"]["stochastic"]["executed"]["ci95"] = [1e5, 1e6]
+        elif what == "availability":
+            scenario["availability"]["uv2"] = 0.77
+        else:
+            summary["seed"] += 7
+        (folder / "summary.json").write_text(json.dumps(summary))
 
 
 @pytest.mark.parametrize(("what", "said"), [
@@ -148,6 +160,10 @@ def spoil(folder: Path, what: str) -> None:
     ("foreign", r"outcomes\.parquet: incentive: these aren't the trials of summary\.json: half, stochastic"),
     ("missing", r"legs\.parquet: no table of ours"),
     ("older", r"summary\.json:\d+: scenarios\[0\]\.vss\.executed: the key 'executed' is missing; add it"),
+    ("vss", r"vss\.executed\.mean: expected what the stochastic plan collects beyond the other"),
+    ("interval", r"executed: ci95: the mean, .* lies outside"),
+    ("availability", r"availability: not that of the world in manifest\.json"),
+    ("seed", r"seed: not of the world in manifest\.json: expected 0, found 7"),
 ])
 def test_a_spoilt_run_folder_is_told_and_its_report_left_as_it_was(folder: Path, what: str, said: str) -> None:
     spoil(folder, what)
@@ -223,7 +239,7 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
     text = (tmp_path / "report.html").read_text()
     assert ">variant<" in text
     assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
-    assert "Over 2 maps only" in text
+    assert "all maps agree there is no interval" in text
     assert {label: len(points) for label, points in drawn.items()} == {
         f"{name} (x={x})": 2 for name in ("half", "safe") for x in (1, 2)}
 
@@ -242,8 +258,10 @@ def test_two_equal_plans_are_called_the_same_and_not_a_matter_of_luck(finished: 
 def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished: Run) -> None:
     assert any("only 4 noise draws" in said for said in remarks(finished.summary))
     assert not any("noise draws" in said for said in remarks({**finished.summary, "rollouts": 16}))
-    assert over_few_maps([{"maps": 10}]) == ""
-    assert "Over 9 maps only" in over_few_maps([{"maps": 10}, {"maps": 9}])
+    sure = {"vss": {"mean": 1.0, "ci95": [0.0, 2.0]}}
+    assert over_few_maps([{"maps": 10, **sure}]) == ""
+    assert "Over 9 maps only" in over_few_maps([{"maps": 10, **sure}, {"maps": 9, **sure}])
+    assert "all maps agree" in over_few_maps([{"maps": 2, "vss": {"mean": 1.0, "ci95": None}}])
 
 
 def test_a_percentage_over_fewer_maps_says_over_how_many() -> None:
