@@ -228,7 +228,7 @@ def read_plans(
             never = certify(unlimited(instance), replace(plan, value=None)).reasons if allow_infeasible else ()
             if never or not allow_infeasible:
                 raise InfeasiblePlan(path, never or certificate.reasons)
-            _log.warning("%s is infeasible, and driven all the same: %s", path, "; ".join(certificate.reasons))
+            _log.warning("%s is infeasible, and used all the same: %s", path, "; ".join(certificate.reasons))
         plans[name] = plan
     return plans
 

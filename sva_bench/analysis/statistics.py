@@ -1,4 +1,4 @@
-"""Means, shares and tails with intervals: exact where outcomes are rare, paired, and clustered by noise draw."""
+"""Means and tails of trials, with intervals that hold where bad noise draws are rare."""
 
 from __future__ import annotations
 
@@ -80,9 +80,9 @@ def controlled(figure: Figure, expected: float) -> Estimate:
     Source:
         A control variate with the slope of 1, which is right where noise takes nothing: Lavenberg & Welch (1981).
     """
-    taken = _taken_interval(figure, 1)
     if not len(figure.taken.counts):
         return estimate(figure)
+    taken = _taken_interval(figure, 1)
     mean = expected - figure.mean_taken
     if taken is None:
         return Estimate(mean=mean, interval=None)

@@ -42,7 +42,7 @@ class Exposure:
 
 
 def exposure_of(margins: Sequence[Margins], robots: int, *, noisy: bool) -> Exposure:
-    """What each robot might lose; of several routes of one robot, the most.
+    """What each robot might lose; of several routes of one robot, the most; of one that was never driven, all of it.
 
     Args:
         margins: Margins of the routes that are driven.
@@ -51,9 +51,8 @@ def exposure_of(margins: Sequence[Margins], robots: int, *, noisy: bool) -> Expo
     """
     incentive, ends = np.zeros(robots), np.zeros((robots, len(UNHAPPY)))
     for route in margins:
-        if not route.leg_s.size:
-            continue
-        fuel, late, stuck = _shares(route, noisy=noisy)
+        nothing_known = (np.ones(len(route.worth)),) * 3
+        fuel, late, stuck = _shares(route, noisy=noisy) if len(route.leg_s) else nothing_known
         lost = np.minimum(fuel + late + stuck, 1.0)
         m = route.robot
         incentive[m] = max(incentive[m], float(route.worth @ lost))

@@ -50,7 +50,7 @@ def _share(scenario: Mapping[str, Any]) -> str:
 
 _MOST_NAMED = 6
 FEW_MAPS = 10
-"""Maps below which an interval over them wants a word of caution: Student's t is wide and shaky there."""
+"""Maps below which an interval over them wants a word of caution: it is wide and shaky there."""
 FEW_DRAWS = 16
 """Noise draws below which an interval is mostly about draws that were not met."""
 VSS_PCT = "VSS in %: how much more the stochastic plan collects than the deterministic one, in per cent of the former."

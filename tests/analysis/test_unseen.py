@@ -46,7 +46,10 @@ def test_a_team_has_margins_of_whole_routes_one_for_each_draw() -> None:
     assert margins.leg_s[:, 0].tolist() == [7.0, 8.0]
     (none,) = margins_of_team([ORDERS], {})
     assert none.leg_s.shape == (0, 4)
-    assert exposure_of([none], 1, noisy=True).incentive.tolist() == [0.0]
+    # Nothing is known of a route that no trial had driven: all of its 80 may be lost, to any end.
+    for noisy in (True, False):
+        assert exposure_of([none], 1, noisy=noisy).incentive.tolist() == [80.0]
+        assert exposure_of([none], 1, noisy=noisy).ends.tolist() == [[1.0, 1.0, 1.0]]
 
 
 def test_the_share_below_is_bounded_as_tables_of_normal_tolerance_limits_have_it() -> None:
