@@ -214,12 +214,12 @@ def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
     count = len(sweep.worlds) * math.prod(map(len, vary.values()))
     refuse_too_many(count * len(planners), len(seeds), options.trials, unit_trials)
     points: list[Point] = []
-    alike: dict[str, str] = {}
+    alike: dict[tuple[int, str], str] = {}
+    told: set[str] = set()
     for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
-        # Availabilities under robots: are those of scenarios that don't say otherwise, and of nothing else.
-        effective = replace(world, map_source=None, robots=tuple(replace(r, availability=1.0) for r in world.robots))
-        before = alike.setdefault(digest(effective), "; ".join(variant))
-        if before != "; ".join(variant):
+        before = alike.setdefault(_effective(world), "; ".join(variant))
+        if before != "; ".join(variant) and world.name not in told:  # once: there may be thousands
+            told.add(world.name)
             _log.warning("%s: %s changes nothing against %s: its scenarios, or other keys, say otherwise", world.name,
                          "; ".join(variant), before)
         if count >= _MANY:
@@ -264,6 +264,16 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
             yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure),
                             held),
                    [f"{key}={json.dumps(value)}" for key, value in values.items()])
+
+
+def _effective(world: World) -> tuple[int, str]:
+    """What of a world trials depend on; equal obstacles are one object (``_sharing``).
+
+    Availabilities under ``robots:`` are those of scenarios that don't say otherwise, and of nothing else.
+    """
+    robots = [replace(robot, availability=1.0) for robot in world.robots]
+    return id(world.obstacles), digest(world.name, world.sites, robots, world.scenarios, world.plan_failure,
+                                       world.execute_failure, world.margin, world.noise)
 
 
 def _sharing(world: World, held: dict[str, World]) -> World:
