@@ -30,8 +30,8 @@ from sva_bench.execution.execute import (
 from sva_bench.execution.outcome import ENDS, Assignment, End, settle
 from sva_bench.mission.failures import NEVER, FailureProcess
 from sva_bench.mission.plan import Route
-from sva_bench.planning import Options, plan_costs, plan_scenarios
-from sva_bench.tally import expected_value
+from sva_bench.study.planning import Options, plan_costs, plan_scenarios
+from sva_bench.study.summing import expected_value
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World
 

@@ -16,7 +16,7 @@ from scipy.stats import t as student_t
 
 from sva_bench.analysis.statistics import sample_mean
 from sva_bench.arrays import FloatArray
-from sva_bench.mission.generate import random_instance
+from sva_bench.generate.instances import random_instance
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_deterministic, plan_nominal, plan_stochastic
 
 FAMILIES: tuple[Literal["A", "B", "C"], ...] = ("A", "B", "C")

@@ -21,7 +21,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from sva_bench.arrays import BoolArray, FloatArray
-from sva_bench.world.cells import Cells, convex_corners, cover, distance_field
+from sva_bench.geometry.cells import Cells, convex_corners, cover, distance_field
 from sva_bench.world.places import NoRoom, Places, find_places
 
 CELLS = 1000

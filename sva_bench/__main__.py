@@ -34,7 +34,7 @@ def main() -> None:
     import atexit
     import signal
 
-    from sva_bench import streams
+    from sva_bench.cli import streams
 
     atexit.register(_end)  # first, to be called last
     output = streams.take_over()
@@ -59,11 +59,11 @@ def run_command_line(arguments: Sequence[str]) -> int:
     from rich.markup import escape
     from typer.exceptions import TyperException
 
-    from sva_bench.cli import app
+    from sva_bench.cli.app import app
+    from sva_bench.cli.terminal import messages
     from sva_bench.errors import ExitCode, Interrupted, SvaBenchError
+    from sva_bench.files.printable import printable
     from sva_bench.interrupts import as_ctrl_c
-    from sva_bench.printable import printable
-    from sva_bench.terminal import messages
 
     try:
         if signal.getsignal(signal.SIGINT) is _end_at_once:  # from now on there is something to be kept or cleared away
@@ -80,7 +80,7 @@ def run_command_line(arguments: Sequence[str]) -> int:
     except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
         from pydantic import ValidationError  # --help should not wait for it
 
-        from sva_bench.complaints import of_an_option
+        from sva_bench.files.complaints import of_an_option
 
         if isinstance(error.__cause__, ValidationError):
             error.message = of_an_option(error.__cause__)
@@ -107,8 +107,8 @@ def _unforeseen(error: Exception) -> int:
 
     from rich.markup import escape
 
+    from sva_bench.cli.terminal import messages
     from sva_bench.errors import ExitCode
-    from sva_bench.terminal import messages
 
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
         # Results name themselves; what is left are temporary files, and not all of their errors know where they were.

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from sva_bench import atomic
 from sva_bench.__main__ import run_command_line
-from sva_bench.atomic import draft_file, draft_folder, remove_left_behind, write_file
 from sva_bench.batch.folder import writing
 from sva_bench.errors import BadInput
-from sva_bench.runs import run_folder, tidy
+from sva_bench.files import atomic
+from sva_bench.files.atomic import draft_file, draft_folder, remove_left_behind, write_file
+from sva_bench.storage.run_folder import run_folder, tidy
 
 NAME = "small-seed0-0123abcd"
 
@@ -146,7 +146,7 @@ def test_two_processes_of_one_id_write_drafts_of_their_own(tmp_path: Path) -> No
 def test_a_writer_that_is_killed_leaves_what_the_next_one_removes(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
     path.write_text("old")
-    script = ("import os, signal, sys; from pathlib import Path; from sva_bench.atomic import draft_file\n"
+    script = ("import os, signal, sys; from pathlib import Path; from sva_bench.files.atomic import draft_file\n"
               "with draft_file(Path(sys.argv[1])) as draft:\n"
               "    draft.write_text('ne'); os.kill(os.getpid(), signal.SIGKILL)")
     done = subprocess.run([sys.executable, "-c", script, str(path)], check=False)
@@ -199,6 +199,6 @@ def test_a_full_disk_that_nobody_foresaw_is_bad_input_that_names_the_place(
     def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", file)
 
-    monkeypatch.setattr("sva_bench.cli.app", full)
+    monkeypatch.setattr("sva_bench.cli.app.app", full)
     assert run_command_line(["run"]) == 2
     assert said in capsys.readouterr().err

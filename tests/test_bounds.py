@@ -12,14 +12,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.documents import read_json
+from sva_bench.batch.sweep import Sweep, grid_of, seeds_of, sweep_of
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.files.documents import read_json
+from sva_bench.files.patterns import MOST_LOOKED_AT, matching
+from sva_bench.files.read_back import MOST_BYTES
 from sva_bench.mission.instance import MOST_SITES, MOST_VEHICLES, read_instance
 from sva_bench.mission.plan import MOST_STOPS, read_plan
-from sva_bench.patterns import MOST_LOOKED_AT, matching
-from sva_bench.read_back import MOST_BYTES
-from sva_bench.sweeps import Sweep, grid_of, seeds_of, sweep_of
-from sva_bench.tables import LEGS, OUTCOMES, pieces_of, write_table
+from sva_bench.storage.tables import LEGS, OUTCOMES, pieces_of, write_table
 from tests.worlds_for_tests import SMALL
 
 TINY: dict[str, Any] = {
@@ -77,7 +77,7 @@ def test_seeds_are_bounded_in_number_and_size(world: Path) -> None:
 def test_a_pattern_that_leads_through_the_whole_machine_is_refused(
     pattern: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sva_bench.patterns.MOST_LOOKED_AT", 2000)  # the machine of a test may be small
+    monkeypatch.setattr("sva_bench.files.patterns.MOST_LOOKED_AT", 2000)  # the machine of a test may be small
     with pytest.raises(BadInput, match="narrow the pattern"):
         matching(Path(pattern), 1000)
     assert MOST_LOOKED_AT <= 1_000_000

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.terminal import set_up_logging
+from sva_bench.cli.terminal import set_up_logging
 from tests.worlds_for_tests import SMALL
 
 QUIET = SMALL.replace("wheel_gain_sd: 0.01", "wheel_gain_sd: 0.0")

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import Field
 
-from sva_bench.documents import (
+from sva_bench.errors import BadFile, ExitCode, nearest
+from sva_bench.files.documents import (
     MAX_YAML_BYTES,
     Bounded,
     Loc,
@@ -25,7 +26,6 @@ from sva_bench.documents import (
     read_yaml,
     validate,
 )
-from sva_bench.errors import BadFile, ExitCode, nearest
 from tests.worlds_for_tests import SMALL, world_of
 
 

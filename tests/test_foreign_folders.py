@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.analysis import report
+from sva_bench.report import run_page as report
 from tests.worlds_for_tests import SMALL
 
 QUICK = ("--trials", "6", "--rollouts", "2", "--fidelity", "kinematic", "--workers", "1")
@@ -121,8 +121,8 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Charts take most of the time of a report; that they hold is tried with every kind of figure below."""
     monkeypatch.setattr(report, "_charts", lambda *_, **__: [])
     monkeypatch.setattr(report, "_world", lambda *_: [])
-    monkeypatch.setattr("sva_bench.analysis.charts.distributions", lambda *_: "")
-    monkeypatch.setattr("sva_bench.analysis.charts.legs_driven", lambda *_: "")
+    monkeypatch.setattr("sva_bench.report.charts.distributions", lambda *_: "")
+    monkeypatch.setattr("sva_bench.report.charts.legs_driven", lambda *_: "")
 
 
 COUNTS = [120, pytest.param(3000, marks=pytest.mark.long)]
@@ -164,8 +164,8 @@ def test_a_batch_folder_with_anything_anywhere_is_gone_on_with_or_gives_one_erro
 ) -> None:
     # Nothing is computed: what is left to do is given up at once.
     monkeypatch.setattr("sva_bench.batch.conductor.Conductor.run", lambda *_: None)
-    monkeypatch.setattr("sva_bench.batch.engines.LocalProcesses.__init__", lambda *_: None)
-    monkeypatch.setattr("sva_bench.batch.engines.LocalProcesses.close", lambda *_: None)
+    monkeypatch.setattr("sva_bench.workers.local.LocalProcesses.__init__", lambda *_: None)
+    monkeypatch.setattr("sva_bench.workers.local.LocalProcesses.close", lambda *_: None)
     monkeypatch.setattr("sva_bench.batch.run.write_batch_report", lambda path, _: path.write_text(""))
     folder, work = folders["batch"], tmp_path / "work"
     shutil.copytree(folder, work)

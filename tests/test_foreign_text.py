@@ -16,13 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.analysis.charts import boxes_of
-from sva_bench.analysis.page import text as text_of_a_page
+from sva_bench.cli.terminal import results, set_up_logging
 from sva_bench.errors import BadFile
+from sva_bench.files.printable import is_text, printable
 from sva_bench.mission.instance import read_instance
 from sva_bench.mission.plan import read_plan
-from sva_bench.printable import is_text, printable
-from sva_bench.terminal import results, set_up_logging
+from sva_bench.report.charts import boxes_of
+from sva_bench.report.page import text as text_of_a_page
 from tests.test_bounds import TINY
 from tests.worlds_for_tests import SMALL
 

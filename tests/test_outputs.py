@@ -15,7 +15,7 @@ from PIL import Image
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
-from sva_bench.outputs import check_folder, check_output
+from sva_bench.files.outputs import check_folder, check_output
 from tests.test_cli import TINY, sva_bench
 from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sva_bench.analysis.moments import figure_of
+from sva_bench.analysis.precision import Precision, half_width_pct, precision_of
 from sva_bench.analysis.statistics import estimate
 from sva_bench.errors import BadInput
-from sva_bench.precision import Precision, half_width_pct, precision_of
 from tests.test_cli import sva_bench
 
 

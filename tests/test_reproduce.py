@@ -11,8 +11,8 @@ import pytest
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Settings
-from sva_bench.planning import NOMINAL, nominal_scenario
-from sva_bench.reproduce import rewards, rewards_page, runtimes, simulation, simulation_page, three_vehicles
+from sva_bench.paper.simulation import rewards, rewards_page, runtimes, simulation, simulation_page, three_vehicles
+from sva_bench.study.planning import NOMINAL, nominal_scenario
 from tests.worlds_for_tests import SMALL, world_of
 
 SETTINGS = Settings(seed=0, trials=400, rollouts=4, fidelity="kinematic")

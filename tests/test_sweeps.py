@@ -12,9 +12,9 @@ from sva_bench.batch.cache import Cache
 from sva_bench.batch.estimates import estimates
 from sva_bench.batch.folder import begin, settings_in
 from sva_bench.batch.grid import grid_of as grid_from
+from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
+from sva_bench.cli.options import Planner
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.options import Planner
-from sva_bench.sweeps import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 from tests.test_cli import sva_bench
 from tests.worlds_for_tests import SMALL
 

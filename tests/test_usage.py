@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.seal import refuse_others, sealed
+from sva_bench.files.seal import refuse_others, sealed
 from tests.test_cli import TINY
 from tests.worlds_for_tests import SMALL
 
@@ -111,7 +111,7 @@ def test_a_world_that_was_edited_is_not_written_over_unless_that_is_wanted(
 
 @pytest.mark.parametrize("change", [lambda text: text.replace("\n", "\r\n"), lambda text: "\ufeff" + text])
 def test_line_ends_and_byte_order_marks_are_no_edits(change: object, tmp_path: Path) -> None:
-    from sva_bench.seal import refuse_edited
+    from sva_bench.files.seal import refuse_edited
 
     assert callable(change)
     path = tmp_path / "w.yaml"

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from sva_bench.errors import BadInput, ExitCode
-from sva_bench.workers import WorkerLost, count_of, local_workers
+from sva_bench.workers.pool import WorkerLost, count_of, local_workers
 
 SCRIPT = """
 import multiprocessing, os, signal
 from concurrent.futures import ProcessPoolExecutor
-from sva_bench.workers import local_workers
+from sva_bench.workers.pool import local_workers
 
 submit = ProcessPoolExecutor.submit
 
@@ -59,7 +59,7 @@ def test_a_worker_without_memory_is_told_of_with_what_to_change() -> None:
 
 
 HELPED = """
-from sva_bench.workers import local_workers
+from sva_bench.workers.pool import local_workers
 if __name__ == "__main__":
     with local_workers(2) as executor:
         print(executor.submit(abs, -1).result())

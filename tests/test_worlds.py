@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.documents import parse_yaml
 from sva_bench.errors import BadInput
+from sva_bench.files.documents import parse_yaml
+from sva_bench.generate.mission import SCENARIOS, propose_mission
+from sva_bench.generate.terrain import Family, random_places
+from sva_bench.generate.worlds import random_world
 from sva_bench.mission.instance import Instance
-from sva_bench.planning import Options, instance_of, plan_costs, plan_scenarios
-from sva_bench.proposal import SCENARIOS, propose_mission
-from sva_bench.solver.refuelling import quickest
+from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.two_stage import knowledge_of, plan_nominal
-from sva_bench.tally import expected_value
-from sva_bench.world.generate import Family, random_places
+from sva_bench.study.planning import Options, instance_of, plan_costs, plan_scenarios
+from sva_bench.study.summing import expected_value
 from sva_bench.world.load import world_of
 from sva_bench.world.model import Obstacles, Site, World
-from sva_bench.worlds import random_world
 from tests.test_cli import sva_bench
 
 FAMILIES: tuple[Family, ...] = get_args(Family)

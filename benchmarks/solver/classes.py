@@ -12,10 +12,10 @@ from statistics import median
 
 import numpy as np
 
-from sva_bench.mission.generate import Family, random_instance
+from sva_bench.generate.instances import Family, random_instance
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.heuristic import search
-from sva_bench.solver.routes import tables_of
+from sva_bench.solver.routes.fronts import tables_of
+from sva_bench.solver.routes.heuristic import search
 from sva_bench.solver.two_stage import SolveLimits, plan_stochastic
 
 

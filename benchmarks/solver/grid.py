@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import get_args
 
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.mission.generate import random_instance
+from sva_bench.generate.instances import random_instance
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, Status
 from sva_bench.solver.solve import Method

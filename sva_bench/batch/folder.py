@@ -12,11 +12,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sva_bench.atomic import by_way_of, why
 from sva_bench.batch.schema import FailuresFile, ManifestFile, SettingsEntry
-from sva_bench.documents import pretty_json, read_json, validate
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.read_back import MOST_BYTES, Part, read_ours
+from sva_bench.files.atomic import by_way_of, why
+from sva_bench.files.documents import pretty_json, read_json, validate
+from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 
 MANIFEST = "sva-bench/batch-manifest@1"
 FAILURES = "sva-bench/batch-failures@1"

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from sva_bench import __version__
-from sva_bench.batch.digest import digest
 from sva_bench.batch.schema import PointEntry, SettingsEntry
 from sva_bench.errors import BadInput
-from sva_bench.planning import Options
-from sva_bench.read_back import Part
+from sva_bench.files.digest import digest
+from sva_bench.files.read_back import Part
 from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.study.planning import Options
 from sva_bench.world.load import world_as_dict, world_of
 from sva_bench.world.model import World
 

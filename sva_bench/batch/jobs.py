@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.batch.digest import digest
 from sva_bench.batch.shards import Facts, Shard, shard_of
 from sva_bench.execution.execute import (
     Case,
@@ -21,11 +20,12 @@ from sva_bench.execution.execute import (
     settle_trials,
 )
 from sva_bench.execution.outcome import Driven
+from sva_bench.files.digest import digest
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
-from sva_bench.planning import Options, Planned, instance_of, plan_scenarios
 from sva_bench.robot.model import RobotModel
+from sva_bench.study.planning import Options, Planned, instance_of, plan_scenarios
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import PlannerName
 from sva_bench.travel.times import TravelTimes, plan_travel_times

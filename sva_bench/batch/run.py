@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sva_bench.analysis.report import write_batch_report
 from sva_bench.batch.aggregates import aggregate, entry_of, joined, summary_of
 from sva_bench.batch.cache import Cache
 from sva_bench.batch.conductor import Conductor, Hooks
-from sva_bench.batch.engines import Engine
 from sva_bench.batch.folder import (
     Failure,
     begin,
@@ -29,7 +27,9 @@ from sva_bench.batch.folder import (
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.shards import Note, Shard, read_note, unit_of
 from sva_bench.batch.strands import Strand, strand
-from sva_bench.documents import pretty_json
+from sva_bench.files.documents import pretty_json
+from sva_bench.report.run_page import write_batch_report
+from sva_bench.workers.local import Engine
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from sva_bench.analysis.unseen import UNHAPPY
-from sva_bench.documents import Name, Number, Section, WholeNumber
 from sva_bench.execution.execute import Fidelity
 from sva_bench.execution.outcome import ENDS
-from sva_bench.results_schema import MOST_ROLLOUTS, MOST_TRIALS, Facts, Words
+from sva_bench.files.documents import Name, Number, Section, WholeNumber
+from sva_bench.storage.results_schema import MOST_ROLLOUTS, MOST_TRIALS, Facts, Words
 from sva_bench.travel.roadmap import PlannerName
 
 MOST_SEED = 10**18 - 1

@@ -15,12 +15,12 @@ from pydantic import ValidationError
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.schema import NoteFile
 from sva_bench.batch.tallies import Tally, tally_as_dict, tally_from, tally_of
-from sva_bench.complaints import first_complaint
-from sva_bench.documents import dotted
 from sva_bench.errors import BadFile
 from sva_bench.execution.execute import Executed, Settings
-from sva_bench.outcome_table import constant, outcome_table
-from sva_bench.tables import SHARDS, read_note_of, write_table
+from sva_bench.files.complaints import first_complaint
+from sva_bench.files.documents import dotted
+from sva_bench.storage.outcome_table import constant, outcome_table
+from sva_bench.storage.tables import SHARDS, read_note_of, write_table
 from sva_bench.world.model import World
 
 Facts = Mapping[str, Any]

@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.execution.engines.bullet import Simulator, downsampled
 from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.outcome import ENDS, Assignment, Driven, Outcome, Trace, settle, trace_of
-from sva_bench.execution.simulator import Simulator, downsampled
 from sva_bench.mission.failures import NEVER, draw_failures
 from sva_bench.mission.plan import Plan, Route
 from sva_bench.robot.follower import Stretch

@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import Field
 
 from sva_bench.arrays import FloatArray, frozen
-from sva_bench.documents import Bounded, Document, Name, Probability, Section, pretty_json, read_json, validate
 from sva_bench.errors import BadFile, nearest
+from sva_bench.files.documents import Bounded, Document, Name, Probability, Section, pretty_json, read_json, validate
 from sva_bench.mission.failures import FailureProcess, JointState, marginals
 
 KIND = "sva-bench/instance@1"

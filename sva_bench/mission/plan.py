@@ -9,10 +9,10 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from sva_bench.documents import Name, Number, Section, WholeNumber, dotted, pretty_json, read_json, validate
 from sva_bench.errors import BadFile, nearest
+from sva_bench.files.documents import Name, Number, Section, WholeNumber, dotted, pretty_json, read_json, validate
+from sva_bench.files.printable import all_text
 from sva_bench.mission.instance import MOST_VEHICLES, Instance
-from sva_bench.printable import all_text
 
 KIND = "sva-bench/plan@1"
 MOST_BYTES = 20_000_000

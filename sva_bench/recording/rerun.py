@@ -17,8 +17,8 @@ from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
 from sva_bench.arrays import FloatArray
-from sva_bench.atomic import by_way_of
 from sva_bench.execution.outcome import Trace
+from sva_bench.files.atomic import by_way_of
 from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Story, story_of
 from sva_bench.world.model import Obstacles, World
 

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
-from sva_bench.atomic import write_file
 from sva_bench.errors import BadFile, BadInput, ExitCode, SvaBenchError
+from sva_bench.files.atomic import write_file
 from sva_bench.interrupts import holding_back_ctrl_c
 
 LAVAPIPE = Path("/usr/share/vulkan/icd.d/lvp_icd.x86_64.json")  # Mesa's Vulkan driver that needs no graphics card

@@ -12,7 +12,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c, heard_ctrl_c, pressed
-from sva_bench.solver.formulation import LinearModel, Rows
+from sva_bench.solver.program import LinearModel, Rows
 
 _LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
 _LOOK_S = 0.1  # between two looks whether Ctrl-C was pressed

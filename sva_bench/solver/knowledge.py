@@ -13,12 +13,12 @@ from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.interrupts import hear_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Status
-from sva_bench.solver.cuts import Cut
-from sva_bench.solver.formulation import Goal
-from sva_bench.solver.heuristic import Orders
-from sva_bench.solver.heuristic import value_of as rewards
-from sva_bench.solver.refuelling import Road, quickest, road_of
-from sva_bench.solver.routes import Tables, tables_of
+from sva_bench.solver.flow.cuts import Cut
+from sva_bench.solver.program import Goal
+from sva_bench.solver.routes.fronts import Tables, tables_of
+from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import value_of as rewards
+from sva_bench.solver.routes.refuelling import Road, quickest, road_of
 from sva_bench.solver.units import common_unit
 
 Routes = tuple[tuple[int, ...], ...]

@@ -12,12 +12,13 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.interrupts import deferring_ctrl_c, hearing_ctrl_c
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.branch_and_cut import FlowModel, prove_by_cuts
-from sva_bench.solver.branch_and_price import BranchAndPrice
-from sva_bench.solver.column_generation import ColumnGeneration
-from sva_bench.solver.expected import DirectedModel
-from sva_bench.solver.formulation import Goal
-from sva_bench.solver.heuristic import Orders, search, shorten
+from sva_bench.solver.columns.branch_and_price import BranchAndPrice
+from sva_bench.solver.columns.column_generation import ColumnGeneration
+from sva_bench.solver.flow.branch_and_cut import FlowModel, prove_by_cuts
+from sva_bench.solver.flow.expected import DirectedModel
+from sva_bench.solver.flow.lshaped import Cuts, prove_by_duals
+from sva_bench.solver.flow.recourse import EquivalentModel
+from sva_bench.solver.flow.undirected import UndirectedModel, serves
 from sva_bench.solver.knowledge import (
     Clock,
     Knowledge,
@@ -30,12 +31,11 @@ from sva_bench.solver.knowledge import (
     trivial_bound,
     value_of,
 )
-from sva_bench.solver.lshaped import Cuts, prove_by_duals
 from sva_bench.solver.outcomes import Outcomes
-from sva_bench.solver.packing import Route
 from sva_bench.solver.preprocess import Scope, scope_of
-from sva_bench.solver.recourse import EquivalentModel
-from sva_bench.solver.undirected import UndirectedModel, serves
+from sva_bench.solver.program import Goal
+from sva_bench.solver.routes.heuristic import Orders, search, shorten
+from sva_bench.solver.routes.packing import Route
 from sva_bench.solver.units import ROUNDING, factor_of, most_of_a_visit
 
 Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]

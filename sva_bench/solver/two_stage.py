@@ -15,16 +15,16 @@ from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Objective, Plan, Status
-from sva_bench.solver.formulation import Goal
-from sva_bench.solver.heuristic import Orders
-from sva_bench.solver.heuristic import value_of as rewards
+from sva_bench.solver.flow.lshaped import Cuts
+from sva_bench.solver.flow.recourse import refuse_free_legs, refuse_seldom_available
 from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of, value_of
-from sva_bench.solver.lshaped import Cuts
 from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
-from sva_bench.solver.recourse import refuse_free_legs, refuse_seldom_available
-from sva_bench.solver.refuelling import quickest
+from sva_bench.solver.program import Goal
 from sva_bench.solver.risk import Risk, RiskMeasure
+from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import value_of as rewards
+from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.solve import TWO_STAGE, Method, solve
 from sva_bench.solver.units import in_own_units, in_unit
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.world.cells import Cells, DistanceField, distance_field
-from sva_bench.world.near import keeps_clear
+from sva_bench.geometry.buckets import keeps_clear
+from sva_bench.geometry.cells import Cells, DistanceField, distance_field
 
 _SURELY = 1 + 1e-6  # times the clearance, in single precision, is the clearance at least
 _AT_A_TIME = 1_000_000  # places that are looked at before Ctrl-C is listened to

@@ -21,13 +21,13 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.geometry.buckets import clearance_checker, keeps_clear, keeps_clearance
+from sva_bench.geometry.cells import Cells, distance_field
 from sva_bench.interrupts import deferring_ctrl_c, pressed
 from sva_bench.travel.lattice import lattice_ways, open_parts
 from sva_bench.travel.samples import arc_points, roadmap_samples
 from sva_bench.travel.tangents import nothing_known, tangents, tangents_of_own, taut
-from sva_bench.world.cells import Cells, distance_field
 from sva_bench.world.model import Obstacles
-from sva_bench.world.near import clearance_checker, keeps_clear, keeps_clearance
 
 PlannerName = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
 """Planners that are sound and give the same paths in every process; ``benchmarks/planners.py`` compares them.

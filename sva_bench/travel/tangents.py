@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.world.near import keeps_clear, solids_passed
+from sva_bench.geometry.buckets import keeps_clear, solids_passed
 
 _MOST_PAIRS = 50_000_000  # of points spread evenly, that lie near enough to each other: says how near that is
 _MOST_WORK = 20_000_000  # solids and buckets that segments are held against: about half a second

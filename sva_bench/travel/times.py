@@ -11,13 +11,13 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray, frozen_int
 from sva_bench.errors import SvaBenchError
+from sva_bench.geometry.distances import clearance
+from sva_bench.geometry.passages import widest_passage
 from sva_bench.robot.follower import Stretch, stretches
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import drive
 from sva_bench.travel.roadmap import PlannerName, plan_paths
-from sva_bench.world.clearance import clearance
 from sva_bench.world.model import World
-from sva_bench.world.passages import widest_passage
 from sva_bench.world.places import CLEARANCE_MARGINS_M as CLEARANCE_MARGINS_M
 
 _log = logging.getLogger(__name__)

@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 
 from sva_bench.arrays import FloatArray, frozen
+from sva_bench.geometry.cells import Cells
 from sva_bench.mission.failures import FailureProcess, JointState
 from sva_bench.robot.model import RobotModel
 from sva_bench.seeds import key_of
-from sva_bench.world.cells import Cells
-from sva_bench.world.maps import MapFile
+from sva_bench.world.maps.ros import MapFile
 
 SiteKind = Literal["base", "station", "poi"]
 

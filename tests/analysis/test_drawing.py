@@ -15,15 +15,15 @@ from matplotlib.image import imread
 from numpy.testing import assert_array_equal
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.analysis.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world, frame_of
-from sva_bench.analysis.labels import place_labels
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.simulator import obstacles_urdf
-from sva_bench.world.cells import bounds_of, boxes_of
-from sva_bench.world.generate import Family, random_places, random_terrain
-from sva_bench.world.maps import read_ros_map
+from sva_bench.execution.engines.bullet import obstacles_urdf
+from sva_bench.generate.terrain import Family, random_places, random_terrain
+from sva_bench.geometry.buckets import clearances
+from sva_bench.geometry.cells import bounds_of, boxes_of
+from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world, frame_of
+from sva_bench.report.labels import place_labels
+from sva_bench.world.maps.ros import read_ros_map
 from sva_bench.world.model import Obstacles, World
-from sva_bench.world.near import clearances
 from tests.oracles.distances import points_clearance
 from tests.world.maps_for_tests import write_ros_map
 from tests.worlds_for_tests import SMALL, world_of

@@ -19,7 +19,7 @@ import pytest
 from sva_bench.batch.folder import begin, settings_in, shard_path, write_maps
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.planning import Options
+from sva_bench.study.planning import Options
 from tests.test_batch import rows_of
 from tests.test_cli import sva_bench
 from tests.world.test_map_worlds import two_rooms
@@ -31,9 +31,9 @@ POST = "- {cylinder: [4.4, 3.2], radius_m: 0.3}"
 # physics engine, as it is started.
 SABOTAGE = """
 import sys
-if "sva_bench.batch.worker" in sys.orig_argv:
+if "sva_bench.workers.far_end" in sys.orig_argv:
     import ctypes, time
-    from sva_bench.execution.simulator import Simulator
+    from sva_bench.execution.engines.bullet import Simulator
     start = Simulator.__init__
     def sabotaged(self, obstacles, *others):
         if len(obstacles.cylinders) == 2:

@@ -18,11 +18,11 @@ from hypothesis.extra import numpy as arrays
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.batch.cache import Cache
-from sva_bench.batch.codec import NotOfType, decoded, encoded
 from sva_bench.batch.jobs import PlansJob, TravelTimesJob
 from sva_bench.errors import BadInput
 from sva_bench.execution.outcome import Driven
-from sva_bench.planning import Options
+from sva_bench.files.codec import NotOfType, decoded, encoded
+from sva_bench.study.planning import Options
 from sva_bench.travel.fuel import fuel_costs
 from tests.worlds_for_tests import world_of
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sva_bench.batch.digest import digest
+from sva_bench.files.digest import digest
 from tests.worlds_for_tests import SMALL, world_of
 
 

@@ -14,9 +14,9 @@ from typing import Any, ClassVar
 
 import pytest
 
-from sva_bench.batch.answers import Answer, Caps, Done, Failed
-from sva_bench.batch.engines import LocalProcesses
 from sva_bench.errors import BadInput
+from sva_bench.workers.answers import Answer, Caps, Done, Failed
+from sva_bench.workers.local import LocalProcesses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,9 +87,9 @@ def test_what_befalls_a_job_is_told_and_the_next_one_runs(
 
 ORPHANS = """
 import sys, time
-from sva_bench.batch.answers import Caps
-from sva_bench.batch.engines import LocalProcesses
-from sva_bench.workers import local_workers
+from sva_bench.workers.answers import Caps
+from sva_bench.workers.local import LocalProcesses
+from sva_bench.workers.pool import local_workers
 from tests.batch.test_engines import Deed
 
 if __name__ == "__main__":

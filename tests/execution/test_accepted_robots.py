@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from sva_bench.arrays import FloatArray
-from sva_bench.documents import parse_yaml
 from sva_bench.errors import BadFile
 from sva_bench.execution.execute import DriveTask, drive_route
+from sva_bench.files.documents import parse_yaml
 from sva_bench.robot.follower import CONTROL_HZ, stretches
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.travel.times import plan_travel_times

@@ -11,9 +11,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
+from sva_bench.execution.engines.bullet import downsampled
 from sva_bench.execution.execute import DriveTask, Fidelity, Leg, drive_route
 from sva_bench.execution.outcome import Driven
-from sva_bench.execution.simulator import downsampled
 from sva_bench.robot.follower import CONTROL_HZ, stretches
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.travel.roadmap import plan_paths

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sva_bench.mission.generate import Family, random_instance
+from sva_bench.generate.instances import Family, random_instance
 from sva_bench.mission.instance import instance_as_dict
 from sva_bench.solver.preprocess import is_metric
 

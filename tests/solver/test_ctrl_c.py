@@ -16,19 +16,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sva_bench.generate.instances import Family, random_instance
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.certify import certify
-from sva_bench.mission.generate import Family, random_instance
 from sva_bench.mission.instance import Instance, write_instance
 from sva_bench.mission.plan import Plan, read_plan
-from sva_bench.solver import branch_and_cut, column_generation, heuristic, lshaped, routes
-from sva_bench.solver.graph import graph_of, neighbours
-from sva_bench.solver.listing import counts
+from sva_bench.solver.columns import column_generation
+from sva_bench.solver.columns.graph import graph_of, neighbours
+from sva_bench.solver.columns.listing import counts
+from sva_bench.solver.columns.pricing import Priced, price
+from sva_bench.solver.columns.subset_row import tolls_of
+from sva_bench.solver.flow import branch_and_cut, lshaped
 from sva_bench.solver.preprocess import scope_of
-from sva_bench.solver.pricing import Priced, price
 from sva_bench.solver.risk import RiskMeasure
+from sva_bench.solver.routes import fronts as routes
+from sva_bench.solver.routes import heuristic
 from sva_bench.solver.solve import Method
-from sva_bench.solver.subset_row import tolls_of
 from sva_bench.solver.two_stage import plan_averse, plan_deterministic, plan_stochastic
 
 SOON_S = 0.2  # from the outside: compiled code keeps this process from doing anything

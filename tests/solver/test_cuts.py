@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sva_bench.mission.generate import random_instance
+from sva_bench.generate.instances import random_instance
 from sva_bench.mission.instance import Instance
-from sva_bench.solver import branch_and_price, column_generation
-from sva_bench.solver.columns import Column
-from sva_bench.solver.enumeration import routes_above
-from sva_bench.solver.graph import graph_of
+from sva_bench.solver.columns import branch_and_price, column_generation
+from sva_bench.solver.columns.enumeration import routes_above
+from sva_bench.solver.columns.graph import graph_of
+from sva_bench.solver.columns.master import Column
+from sva_bench.solver.columns.pricing import price
+from sva_bench.solver.columns.subset_row import Counter, SubsetRow, separate, tolls_of
 from sva_bench.solver.preprocess import scope_of
-from sva_bench.solver.pricing import price
-from sva_bench.solver.subset_row import Counter, SubsetRow, separate, tolls_of
 from sva_bench.solver.two_stage import plan_stochastic
 from tests.solver import oracle
 

@@ -18,9 +18,9 @@ from sva_bench.mission.failures import JointState, marginals
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver import solve as solving
-from sva_bench.solver.heuristic import Found
-from sva_bench.solver.lshaped import Cuts
+from sva_bench.solver.flow.lshaped import Cuts
 from sva_bench.solver.risk import RiskMeasure
+from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.solve import TWO_STAGE, Method
 from sva_bench.solver.two_stage import (
     SolveLimits,

@@ -24,14 +24,15 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState
 from sva_bench.mission.instance import Instance, Vehicle, read_instance
 from sva_bench.mission.plan import Plan
-from sva_bench.solver import branch_and_cut, column_generation
 from sva_bench.solver import solve as solving
-from sva_bench.solver.expected import euler_walk
-from sva_bench.solver.heuristic import Found
+from sva_bench.solver.columns import column_generation
+from sva_bench.solver.flow import branch_and_cut
+from sva_bench.solver.flow.expected import euler_walk
 from sva_bench.solver.highs import Outcome, maximise
 from sva_bench.solver.knowledge import SolveLimits
 from sva_bench.solver.preprocess import is_metric, scope_of
-from sva_bench.solver.refuelling import quickest, road_of
+from sva_bench.solver.routes.heuristic import Found
+from sva_bench.solver.routes.refuelling import quickest, road_of
 from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,

@@ -11,14 +11,14 @@ import pytest
 
 from benchmarks.hard_maps import FAMILY, write_world
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.geometry.buckets import clearance_checker, keeps_clear
+from sva_bench.geometry.cells import Cells, cover
 from sva_bench.travel import tangents as tangents_module
 from sva_bench.travel.lattice import lattice_ways
 from sva_bench.travel.roadmap import plan_paths
 from sva_bench.travel.samples import arc_points
 from sva_bench.travel.tangents import tangents
-from sva_bench.world.cells import Cells, cover
 from sva_bench.world.load import load_world
-from sva_bench.world.near import clearance_checker, keeps_clear
 from tests.oracles.distances import path_clearance
 from tests.oracles.worlds import random_obstacles
 from tests.travel.test_maps import places_on

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from sva_bench.arrays import FloatArray
+from sva_bench.geometry.buckets import keeps_clear
 from sva_bench.interrupts import as_ctrl_c
 from sva_bench.travel import roadmap
-from sva_bench.world.near import keeps_clear
 from tests.worlds_for_tests import world_of
 
 CALLS = 200

@@ -13,8 +13,8 @@ from numpy.testing import assert_array_equal
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from sva_bench import options
 from sva_bench.arrays import FloatArray
+from sva_bench.cli import options
 from sva_bench.travel.roadmap import PlannerName, plan_paths, roadmap_edges
 from sva_bench.world.model import Obstacles
 from tests.oracles.distances import path_clearance

@@ -15,9 +15,9 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import BoolArray, FloatArray
-from sva_bench.execution.simulator import obstacles_urdf
-from sva_bench.recording.story import story_of
-from sva_bench.world.cells import (
+from sva_bench.execution.engines.bullet import obstacles_urdf
+from sva_bench.geometry.buckets import clearances, keeps_clearance
+from sva_bench.geometry.cells import (
     Cells,
     TooRagged,
     bounds_of,
@@ -27,8 +27,8 @@ from sva_bench.world.cells import (
     cover,
     distance_field,
 )
+from sva_bench.recording.story import story_of
 from sva_bench.world.model import Obstacles
-from sva_bench.world.near import clearances, keeps_clearance
 from tests.recording.missions import WORLD as LINE
 from tests.recording.missions import trace
 from tests.world.maps_for_tests import write_ros_map

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sva_bench.world.clearance import clearance, segment_distance
+from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear, keeps_clearance, open_heading
+from sva_bench.geometry.distances import clearance, segment_distance
 from sva_bench.world.model import Obstacles
-from sva_bench.world.near import clearance_checker, clearances, keeps_clear, keeps_clearance, open_heading
 from tests.oracles.distances import points_clearance, segment_clearance
 from tests.oracles.worlds import random_obstacles
 

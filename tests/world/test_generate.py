@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from sva_bench.errors import BadInput
-from sva_bench.travel.roadmap import surely_apart
-from sva_bench.world.generate import (
+from sva_bench.generate.mazes import maze_walls
+from sva_bench.generate.rooms import room_walls
+from sva_bench.generate.terrain import (
     APART_M,
     DENSITY,
     PASSAGE_M,
@@ -19,8 +20,7 @@ from sva_bench.world.generate import (
     random_places,
     random_terrain,
 )
-from sva_bench.world.mazes import maze_walls
-from sva_bench.world.rooms import room_walls
+from sva_bench.travel.roadmap import surely_apart
 from tests.oracles.distances import points_clearance, segment_clearance
 
 FAMILIES: tuple[Family, ...] = get_args(Family)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from sva_bench.errors import BadFile
-from sva_bench.world.images import grey_image
-from sva_bench.world.maps import Mode, occupancy, read_movingai_map, read_ros_map, solid_cells
+from sva_bench.world.maps.images import grey_image
+from sva_bench.world.maps.ros import Mode, occupancy, read_movingai_map, read_ros_map, solid_cells
 from tests.world.maps_for_tests import YAML, shared_map, write_pgm, write_ros_map
 
 SPECTRUM = np.arange(256, dtype=np.uint8)[None]

@@ -15,9 +15,9 @@ import pytest
 from PIL import Image
 
 from sva_bench.errors import BadFile
-from sva_bench.world.cells import boxes_of
-from sva_bench.world.images import MAX_CELLS
-from sva_bench.world.maps import read_movingai_map, read_ros_map
+from sva_bench.geometry.cells import boxes_of
+from sva_bench.world.maps.images import MAX_CELLS
+from sva_bench.world.maps.ros import read_movingai_map, read_ros_map
 from tests.world.maps_for_tests import YAML
 
 LONGEST_S, MOST_MB, LONGEST_COMPLAINT = 5.0, 1000, 600

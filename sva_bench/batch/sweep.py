@@ -1,0 +1,285 @@
+"""Sweeps: what the command line or a ``sweep.yaml`` asks for, as a grid of worlds, variants and seeds."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import Field
+
+from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
+from sva_bench.batch.schema import Seed
+from sva_bench.cli.loading import adapted
+from sva_bench.cli.options import FailureProcess, Fidelity, Planner
+from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
+from sva_bench.files.digest import digest
+from sva_bench.files.documents import Document, Loc, Name, Number, Section, parse_yaml, read_yaml, validate
+from sva_bench.files.patterns import has_pattern, matching
+from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.study.planning import Options, Progress
+from sva_bench.world.model import World
+from sva_bench.world.variants import option_of, world_with
+
+_log = logging.getLogger(__name__)
+
+KIND = "sva-bench/sweep@1"
+UNIT_TRIALS = 10_000
+UNIT_TRIALS_PHYSICS = 10
+"""A trial in physics takes seconds, a settled one microseconds; a unit should take seconds."""
+
+MOST_SEEDS = 100_000
+_MANY = 100  # worlds and variants from which on reading them takes seconds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """What a batch is asked for; ``None`` = not said.
+
+    Attributes:
+        worlds: World files.
+        seeds: Seeds of failures and noise.
+        trials, rollouts, fidelity, unit_trials: As for ``Options`` and ``Grid``.
+        planners: How paths are planned.
+        scenarios: Only these.
+        margin, plan_failure, execute_failure: In place of the worlds' own.
+        evpi: Work out the value of perfect information however long it takes.
+        time_limit_s, gap: When a solve may stop.
+        vary: Values by dotted key of a world file.
+        file: The sweep file, of which ``vary`` and ``scenarios`` are, unless told otherwise.
+        told: Names of the settings that the command line told.
+    """
+
+    worlds: tuple[Path, ...] = ()
+    seeds: tuple[int, ...] | None = None
+    trials: int | None = None
+    rollouts: int | None = None
+    fidelity: Fidelity | None = None
+    unit_trials: int | None = None
+    planners: tuple[Planner, ...] | None = None
+    scenarios: tuple[str, ...] | None = None
+    margin: float | None = None
+    plan_failure: FailureProcess | None = None
+    execute_failure: FailureProcess | None = None
+    evpi: bool | None = None
+    time_limit_s: float | None = None
+    gap: float | None = None
+    vary: Mapping[str, Sequence[Any]] | None = None
+    file: Document | None = None
+    told: frozenset[str] = frozenset()
+
+    def wrong(self, setting: str, loc: Loc, option: str, problem: str) -> SvaBenchError:
+        """What is wrong with a setting, said of the option, or of the place in the file that asks for it."""
+        if self.file is None or setting in self.told:
+            return BadInput(f"{option}: {problem}")
+        return self.file.error(loc, problem)
+
+
+class _SweepFile(Section):
+    format: Literal["sva-bench/sweep@1"]
+    worlds: list[str] = Field(min_length=1, max_length=MOST_POINTS)
+    seeds: Annotated[list[Seed | str], Field(max_length=MOST_SEEDS)] | Seed | str | None = None
+    trials: int | None = Field(default=None, ge=1, le=10_000_000)
+    rollouts: int | None = Field(default=None, ge=1, le=100_000)
+    fidelity: Fidelity | None = None
+    unit_trials: int | None = Field(default=None, ge=1)
+    planners: list[Planner] | None = Field(default=None, min_length=1)
+    scenarios: list[Name] | None = Field(default=None, min_length=1)
+    margin: Number | None = Field(default=None, ge=0, le=1)
+    plan_failure: FailureProcess | None = None
+    execute_failure: FailureProcess | None = None
+    evpi: bool | None = None
+    time_limit_s: Number | None = Field(default=None, ge=0)
+    gap: Number | None = Field(default=None, ge=0)
+    set: dict[str, list[Any]] | None = None
+
+
+def sweep_of(paths: Sequence[Path], told: Sweep) -> Sweep:
+    """The sweep of these files, worlds or one ``sweep.yaml``; what is told beside them comes first."""
+    if len(paths) == 1 and paths[0].is_file() and (read := read_yaml(paths[0])).data is not None \
+            and isinstance(read.data, dict) and str(read.data.get("format", "")).startswith("sva-bench/sweep"):
+        held = _from_file(read)
+        asked = {key: value for key, value in vars(told).items() if value not in (None, (), frozenset())}
+        return replace(held, **asked, told=frozenset(asked))
+    return replace(told, worlds=tuple(path for given in paths for path in _matching(given)))
+
+
+def _from_file(document: Document) -> Sweep:
+    file = validate(document, _SweepFile, KIND)
+    given = file.seeds if isinstance(file.seeds, list) else [] if file.seeds is None else [file.seeds]
+    try:
+        seeds = seeds_of([str(seed) for seed in given], "") if given else None
+    except BadInput as error:
+        raise document.error(("seeds",), str(error)) from None
+    for key, values in (file.set or {}).items():
+        if not values:
+            raise document.error(("set", key), "give at least one value")
+    worlds: list[Path] = []
+    for number, word in enumerate(file.worlds):
+        try:
+            worlds += _matching(document.path.parent / word)
+        except BadInput as error:
+            raise document.error(("worlds", number), str(error)) from None
+    return Sweep(
+        worlds=tuple(worlds), seeds=seeds, trials=file.trials, rollouts=file.rollouts, fidelity=file.fidelity,
+        unit_trials=file.unit_trials, planners=tuple(file.planners) if file.planners else None,
+        scenarios=tuple(file.scenarios) if file.scenarios else None, margin=file.margin,
+        plan_failure=file.plan_failure, execute_failure=file.execute_failure, evpi=file.evpi,
+        time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set, file=document)
+
+
+def _matching(given: Path) -> list[Path]:
+    """The files that a pattern matches; the path itself where it is none.
+
+    Raises:
+        BadInput: If none match, or too many, or too many places would have to be looked at.
+    """
+    if given.exists() or not has_pattern(given):
+        return [given]
+    found = matching(given, MOST_POINTS)
+    if not found:
+        raise BadInput(f"{given}: no file matches")
+    return found
+
+
+def seeds_of(words: Sequence[str], what: str = "--seed ") -> tuple[int, ...]:
+    """Seeds as told: ``3``, ``0-9``, ``1,5,7-9``."""
+    seeds: list[int] = []
+    for part in ",".join(words).split(","):
+        ends = part.strip().split("-")
+        if len(ends) > 2 or not all(end.strip().isdecimal() and len(end) < 19 for end in ends):
+            raise BadInput(f"{what}{part.strip()!r}: expected a whole number, or a range like 0-9")
+        first, last = int(ends[0]), int(ends[-1])
+        if last < first or last - first >= MOST_SEEDS:
+            raise BadInput(f"{what}{part.strip()!r}: a range goes from the smaller to the greater, over "
+                           f"{MOST_SEEDS} seeds at most")
+        seeds += range(first, last + 1)
+        if len(seeds) > MOST_SEEDS:
+            raise BadInput(f"{what}{part.strip()!r}: more than {MOST_SEEDS} seeds in all")
+    return tuple(dict.fromkeys(seeds))
+
+
+def planners_of(words: Sequence[str]) -> tuple[Planner, ...]:
+    """Planners as told, each once."""
+    known = get_args(Planner)
+    for word in words:
+        if word not in known:
+            raise BadInput(f"--planner {word}: there is no such planner; {nearest(word, list(known))}")
+    return tuple(planner for planner in known if planner in words)
+
+
+def varied(words: Sequence[str]) -> dict[str, list[Any]]:
+    """Values by key as told: ``robots.uv2.fuel_capacity_s=200,250,300``, in the syntax of a world file."""
+    vary: dict[str, list[Any]] = {}
+    for word in words:
+        key, equals, values = word.partition("=")
+        if not (key and equals and values.strip()):
+            raise BadInput(f"--set {word}: expected KEY=VALUE,VALUE,...")
+        if key in vary:
+            raise BadInput(f"--set {key}: told twice; put all its values into one")
+        try:
+            vary[key] = parse_yaml(f"[{values}]", Path(f"--set {key}")).data
+        except BadFile as error:
+            raise BadInput(f"--set {word}: {error.problem}") from None
+        if not isinstance(vary[key], list) or not vary[key]:
+            raise BadInput(f"--set {word}: expected KEY=VALUE,VALUE,...")
+    return vary
+
+
+def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
+    """The grid that a sweep comes to.
+
+    Args:
+        sweep: What is asked for.
+        progress: Told of the worlds that are read: with all their variants they may be thousands.
+
+    Raises:
+        BadFile: If a world is wrong, as it is or varied.
+        BadInput: If two worlds share a name, or values don't differ.
+    """
+    vary = sweep.vary or {}
+    planners = sweep.planners or ("prmstar",)
+    for key, values in vary.items():
+        if len({json.dumps(value) for value in values}) < len(values):
+            raise sweep.wrong("vary", ("set", key), f"--set {key}", "a value stands there twice")
+    options = _options_of(sweep)
+    unit_trials = sweep.unit_trials or (UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS)
+    seeds = sweep.seeds or (0,)
+    # Before anything is read or multiplied out: a few lines can ask for more than there are atoms.
+    count = len(sweep.worlds) * math.prod(map(len, vary.values()))
+    refuse_too_many(count * len(planners), len(seeds), options.trials, unit_trials)
+    points: list[Point] = []
+    alike: dict[tuple[int, str], str] = {}
+    told: set[str] = set()
+    for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
+        before = alike.setdefault(_effective(world), "; ".join(variant))
+        if before != "; ".join(variant) and world.name not in told:  # once: there may be thousands
+            told.add(world.name)
+            _log.warning("%s: %s changes nothing against %s: its scenarios, or other keys, say otherwise", world.name,
+                         "; ".join(variant), before)
+        if count >= _MANY:
+            progress("reading worlds", number, count)
+        for planner in planners:
+            parts = [*variant, *([f"planner={planner}"] if len(planners) > 1 else [])]
+            points.append(Point(world=world, planner=planner, variant="; ".join(parts)))
+    if options.fidelity == "kinematic" and any(key.split(".")[0] == "noise" for key in vary):
+        _log.warning("noise is varied to no effect: kinematic trials have none")
+    return checked(Grid(points=points, seeds=seeds, options=options, unit_trials=unit_trials))
+
+
+def _options_of(sweep: Sweep) -> Options:
+    return Options(
+        trials=sweep.trials or 1000, rollouts=sweep.rollouts or 8, fidelity=sweep.fidelity or "rollout",
+        limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap),
+        evpi=bool(sweep.evpi))
+
+
+def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tuple[World, list[str]]]:
+    """Each world of a sweep with each choice of values, and how that is told."""
+    files: dict[str, Path] = {}
+    held: dict[str, World] = {}
+    for path in sweep.worlds:
+        document = read_yaml(path)
+        for chosen in product(*vary.values()):
+            values = dict(zip(vary, chosen, strict=True))
+
+            def wrong(key: str, problem: str, values: Mapping[str, Any] = values) -> SvaBenchError:
+                return sweep.wrong("vary", ("set", key), option_of(key, values), problem)
+
+            world = world_with(document, values, wrong)
+            other = files.setdefault(world.name, path)
+            if other is not path:
+                raise BadInput(f"{path}: its world is named {world.name!r}, as that of {other}; names must differ "
+                               "within a batch: change one" if other != path else f"{path}: this world is given twice")
+            for number, name in enumerate(sweep.scenarios or ()):
+                known = [scenario.name for scenario in world.scenarios]
+                if name not in known:
+                    raise sweep.wrong("scenarios", ("scenarios", number), f"--scenario {name}",
+                                      f"{path} has no scenario {name!r}; {nearest(name, known)}")
+            yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure),
+                            held),
+                   [f"{key}={json.dumps(value)}" for key, value in values.items()])
+
+
+def _effective(world: World) -> tuple[int, str]:
+    """What of a world trials depend on; equal obstacles are one object (``_sharing``).
+
+    Availabilities under ``robots:`` are those of scenarios that don't say otherwise, and of nothing else.
+    """
+    robots = [replace(robot, availability=1.0) for robot in world.robots]
+    return id(world.obstacles), digest(world.name, world.sites, robots, world.scenarios, world.plan_failure,
+                                       world.execute_failure, world.margin, world.noise)
+
+
+def _sharing(world: World, held: dict[str, World]) -> World:
+    """The world; obstacles and map files are those of an earlier one where they are equal, so thousands fit."""
+    source = world.map_source
+    first = held.setdefault(digest(world.obstacles, None if source is None else source.digests()), world)
+    if source is not None and first.map_source is not None:
+        source = replace(source, files=first.map_source.files)
+    return replace(world, obstacles=first.obstacles, map_source=source)

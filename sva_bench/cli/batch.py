@@ -1,0 +1,252 @@
+"""Commands of batches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, get_args
+
+import typer
+from rich.markup import escape
+
+from sva_bench.cli.libraries import load_libraries
+from sva_bench.cli.options import (
+    AsJson,
+    ExecuteFailure,
+    Fidelity,
+    MarginOption,
+    PlanFailure,
+    Planner,
+    ScenarioNames,
+    TimeLimit,
+    Verbose,
+    WorkerCount,
+    finite,
+)
+from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.usage import PlainCommand, UnnamedCommand, WorldsFirst
+from sva_bench.errors import BadInput, ExitCode, Interrupted
+from sva_bench.files.outputs import check_folder
+from sva_bench.interrupts import holding_back_ctrl_c
+
+if TYPE_CHECKING:
+    from sva_bench.batch.grid import Grid
+    from sva_bench.workers.local import Engine
+
+
+batch_app = typer.Typer(cls=WorldsFirst, rich_markup_mode="rich",
+                        help="Monte Carlo over many worlds; 'batch status DIR', 'batch retry DIR'.")
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The batch folder.", show_default=False)]
+CacheOption = Annotated[Path | None, typer.Option("--cache", metavar="DIR", help="Folder of travel times, plans and "
+                                                  "drives that batches share.", show_default="the user's cache")]
+DaskOption = Annotated[str | None, typer.Option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this "
+                                                "scheduler, or of this scheduler file.", show_default="here")]
+UnitTimeLimit = Annotated[float, typer.Option("--unit-time-limit", metavar="S", min=0.1, callback=finite,
+                                              help="A unit that takes longer is tried again, twice, then given up.")]
+TablesAsCsv = Annotated[bool, typer.Option("--csv", help="Write the tables map by map and over maps as CSV too.")]
+MemoryMb = Annotated[int, typer.Option("--memory-mb", min=0, help="Memory that a unit may take; 0 = any.")]
+
+
+@batch_app.command(cls=UnnamedCommand, epilog="'sva-bench batch status DIR' says how far a batch is, 'sva-bench batch "
+                                             "retry DIR' takes up what failed.")
+def over(
+    worlds: Annotated[list[Path], typer.Argument(metavar="WORLD...", help="World files (YAML), patterns of them, or "
+                                                 "one sweep.yaml.", show_default=False)],
+    seed: Annotated[list[str] | None, typer.Option(metavar="N or N-M", help="Seeds of failures and noise, also as a "
+                                                   "range; may be repeated.", show_default="0")] = None,
+    trials: Annotated[int | None, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.",
+                                               show_default="1000")] = None,
+    rollouts: Annotated[int | None, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod "
+                                                 "ROLLOUTS.", show_default="8")] = None,
+    fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per route and "
+                                                      "noise draw; or every trial in physics.",
+                                                      show_default="rollout")] = None,
+    planner: Annotated[list[str] | None, typer.Option(metavar="|".join(get_args(Planner)), help="OMPL planner, as for "
+                                                      "run; may be repeated.", show_default="prmstar")] = None,
+    scenario: ScenarioNames = None,
+    vary: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=V1,V2,...", help="Vary a key of the world "
+                                                   "files, e.g. robots.uv2.fuel_capacity_s=200,250; may be repeated.",
+                                                   show_default=False)] = None,
+    margin: MarginOption = None,
+    plan_failure: PlanFailure = None,
+    execute_failure: ExecuteFailure = None,
+    evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
+                                                      "takes.")] = False,
+    time_limit: TimeLimit = None,
+    gap: Annotated[float | None, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as "
+                                              "optimal.", show_default="1e-06")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The batch folder.",
+                                             show_default="runs/batch-<hash>")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the grid, with an estimate of time and disk, and do "
+                                          "nothing.")] = False,
+    workers: WorkerCount = None,
+    dask: DaskOption = None,
+    unit_trials: Annotated[int | None, typer.Option("--unit-trials", min=1, help="Trials of one unit, which is what "
+                                                    "a crash can cost.", show_default="10000; 10 in physics")] = None,
+    unit_time_limit: UnitTimeLimit = 3600.0,
+    memory_mb: MemoryMb = 4096,
+    cache: CacheOption = None,
+    as_json: AsJson = False,
+    as_csv: TablesAsCsv = False,
+    verbose: Verbose = False,
+) -> None:
+    """Monte Carlo over many worlds, seeds and variants: shards of outcomes, and the VSS over maps.
+
+    Nothing that is done is lost, whatever happens: --resume goes on.
+    """
+    set_up_logging(verbose)
+    load_libraries()
+    with holding_back_ctrl_c():
+        from sva_bench.batch.cache import default_folder
+        from sva_bench.batch.grid import batch_name
+        from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
+
+    if not dry_run:  # before worlds are read: with their variants, that takes its time
+        check_folder(out or Path("runs"), "--out")
+        check_folder(cache or default_folder(), "--cache")
+    sweep = sweep_of(worlds, Sweep(
+        seeds=seeds_of(seed) if seed else None, trials=trials, rollouts=rollouts, fidelity=fidelity,
+        planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
+        margin=margin, plan_failure=plan_failure, execute_failure=execute_failure, evpi=evpi or None,
+        time_limit_s=time_limit, gap=gap,
+        vary=varied(vary) if vary else None, unit_trials=unit_trials))
+    with progress_bars() as progress:
+        grid = grid_of(sweep, progress)
+    folder = out or Path("runs") / batch_name(grid.settings())
+    if dry_run:
+        _list(grid, folder, cache, as_json)
+        return
+    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=resume)
+
+
+@batch_app.command(cls=PlainCommand)
+def retry(
+    folder: Folder,
+    workers: WorkerCount = None,
+    dask: DaskOption = None,
+    unit_time_limit: UnitTimeLimit = 3600.0,
+    memory_mb: MemoryMb = 4096,
+    cache: CacheOption = None,
+    as_json: AsJson = False,
+    as_csv: TablesAsCsv = False,
+    verbose: Verbose = False,
+) -> None:
+    """Take up again what failed or was not done; worlds and settings are those in the folder."""
+    set_up_logging(verbose)
+    load_libraries()
+    with holding_back_ctrl_c():
+        from sva_bench.batch.folder import settings_in
+        from sva_bench.batch.grid import grid_of
+
+    _existing(folder)
+    grid = grid_of(*settings_in(folder))
+    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True)
+
+
+@batch_app.command(cls=PlainCommand)
+def status(folder: Folder, as_json: AsJson = False) -> None:
+    """How far is a batch, and what does it come to so far? It may be at work."""
+    with holding_back_ctrl_c():
+        from sva_bench.batch.aggregates import summary_of
+        from sva_bench.batch.folder import at_work, failures_in, settings_in, units_in
+        from sva_bench.batch.grid import grid_of
+        from sva_bench.cli.watching import over_maps, print_failed
+
+    _existing(folder)
+    running = at_work(folder)
+    grid = grid_of(*settings_in(folder))
+    units = grid.units()
+    done = units_in(folder) & set(units)
+    failures = [failure for failure in failures_in(folder) if failure.unit not in done]
+    summary = summary_of(grid, folder, done, failures)
+    if as_json:
+        print_json({"format": "sva-bench/batch-status@1", "at_work": running, "units": len(units), "done": len(done),
+                    "aggregate": summary["aggregate"], "failed": summary["failed"]})
+        return
+    console = results()
+    state = "at work" if running else "complete" if len(done) == len(units) else "not at work; --resume goes on" \
+        if len(done) + len(failures) < len(units) else "over"
+    console.print(f"{len(done)} of {len(units)} units done, {len(failures)} failed: {state}", highlight=False)
+    if done:
+        console.print(over_maps(summary["aggregate"], "VSS over maps, so far"))
+    print_failed(summary["failed"], console)
+
+
+def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool) -> None:
+    with holding_back_ctrl_c():
+        from sva_bench.batch.cache import Cache, default_folder
+        from sva_bench.batch.estimates import estimates
+        from sva_bench.cli.watching import print_grid
+
+    with progress_bars() as progress:
+        listed = estimates(grid, Cache(folder=cache or default_folder()), folder, progress)
+    if as_json:
+        print_json({"format": "sva-bench/batch-grid@1", "strands": [
+            {"world": e.point.world.name, "variant": e.point.variant, "seed": e.seed, "units": e.units, "rows": e.rows,
+             "disk_mb": round(e.disk_bytes / 1e6, 3), "processor_s": round(e.processor_s, 1)} for e in listed]})
+    else:
+        print_grid(listed)
+
+
+def _existing(folder: Path) -> None:
+    if not folder.is_dir():
+        raise BadInput(f"{folder}: there is no such folder")
+
+
+def _run(
+    grid: Grid, folder: Path, workers: int | None, dask: str | None, unit_time_limit_s: float, memory_mb: int,
+    cache: Path | None, as_json: bool, as_csv: bool, *, resume: bool, again: bool = False,
+) -> None:
+    with holding_back_ctrl_c():
+        from sva_bench.batch.cache import Cache, default_folder
+        from sva_bench.batch.folder import units_in
+        from sva_bench.batch.run import run_batch
+        from sva_bench.batch.tables import write_tables
+        from sva_bench.cli.watching import print_batch, watching
+        from sva_bench.workers.answers import Caps
+        from sva_bench.workers.local import LocalProcesses
+        from sva_bench.workers.pool import count_of
+
+    if dask is not None and workers is not None:
+        raise BadInput("--dask and --workers don't go together: the cluster has its own workers")
+    caps = Caps(time_s=unit_time_limit_s, memory_mb=memory_mb)
+
+    @contextmanager
+    def engine() -> Iterator[Engine]:
+        running: Engine
+        if dask is None:
+            running = LocalProcesses(count_of(workers), caps)
+        else:
+            with holding_back_ctrl_c():
+                from sva_bench.workers.dask import DaskCluster
+
+            running = DaskCluster(dask, caps)
+        try:
+            yield running
+        finally:
+            running.close()
+
+    check_folder(folder, "--out")
+    check_folder(cache or default_folder(), "--cache")
+    try:
+        with watching() as report:
+            summary = run_batch(grid, folder, engine, Cache(folder=cache or default_folder()), report, resume=resume,
+                                retry=again)
+    except KeyboardInterrupt:
+        done = len(units_in(folder) & set(grid.units()))
+        raise Interrupted(f"interrupted: {done} of {len(grid.units())} units are done and kept in {folder}; the same "
+                          "command goes on with --resume") from None
+    if as_csv:
+        write_tables(folder, summary)
+    if as_json:
+        print_json(summary)
+    else:
+        print_batch(summary)
+        messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
+    if summary["failed"]:
+        if as_json:
+            messages.print(f"{len(summary['failed'])} units were given up", highlight=False)
+        raise typer.Exit(ExitCode.UNFINISHED_TRIALS)

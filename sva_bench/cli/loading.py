@@ -1,0 +1,124 @@
+"""Worlds and instances as the command line asks for them; what is wrong is said of the file and line."""
+
+from __future__ import annotations
+
+import os
+import unicodedata
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from sva_bench.cli.options import FailureProcess, Planner
+from sva_bench.cli.terminal import messages
+from sva_bench.errors import BadInput, nearest
+from sva_bench.files.documents import read_yaml
+from sva_bench.files.mistaken import what_it_is
+from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.mission.instance import Instance
+from sva_bench.world.load import load_world
+from sva_bench.world.model import World
+
+_LONGEST_NAME = 120
+"""Bytes of a plan's name: with a scenario's before it and an ending behind it, it is a file's name, of 255 at most."""
+
+
+def load(
+    path: Path, scenarios: Sequence[str] | None = None, margin: float | None = None,
+    plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
+) -> World:
+    """The world, as the command line changes it."""
+    return adapted(load_world(path), scenarios, margin, plan_failure, execute_failure)
+
+
+def adapted(
+    world: World, scenarios: Sequence[str] | None = None, margin: float | None = None,
+    plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
+) -> World:
+    """A world with some of its settings replaced."""
+    if scenarios:
+        world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
+            scenarios, [s.name for s in world.scenarios])))
+    return replace(
+        world, margin=world.margin if margin is None else margin,
+        plan_failure=world.plan_failure if plan_failure is None else plan_failure,
+        execute_failure=world.execute_failure if execute_failure is None else execute_failure)
+
+
+@contextmanager
+def about(path: Path) -> Iterator[None]:
+    """What travel says of sites and robots, said of the file and line where they stand."""
+    with holding_back_ctrl_c():
+        from sva_bench.travel.times import UnreachableSite
+
+    try:
+        yield
+    except UnreachableSite as error:
+        document = read_yaml(path)
+        # Where nothing at all is reached, it is the base that stands badly.
+        sites = load_world(path).sites
+        name = "base" if len(error.destinations) == len(sites) - 1 > 1 else error.destinations[0]
+        where = {"base": ("sites", "base"), "station": ("sites", "stations", name), "poi": ("sites", "pois", name)}
+        # Of a site that the file doesn't name but leaves to us, the line of its section is said.
+        kind = next(site.kind for site in sites if site.name == name)
+        raise document.error(where[kind], str(error)) from None
+
+
+def instance_of_world(
+    path: Path, scenario: str | None, planner: Planner, margin: float | None,
+    progress: Callable[[str, int, int], None],
+) -> Instance:
+    """The instance of a world's scenario; of the availabilities under ``robots:`` by default."""
+    world = load(path, [scenario] if scenario else None, margin)
+    with holding_back_ctrl_c():  # after the world: its errors are said at once
+        from sva_bench.study.planning import instance_of, nominal_scenario, plan_costs
+
+    with about(path):
+        costs = plan_costs(world, planner, progress)
+    for cost in costs.values():
+        messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
+                       f"to {cost.max_excess_pct:.1f} %", highlight=False)
+    return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))
+
+
+def refuse_no_map(path: Path) -> None:
+    """Refuse a file of ours where a map is asked for.
+
+    Raises:
+        BadFile: If it is one, and which command takes it.
+    """
+    document = read_yaml(path)
+    if isinstance(document.data, dict) and "format" in document.data and (known := what_it_is(document.data)):
+        raise document.error((), f"expected a map, and {known}")
+
+
+def by_name(paths: Sequence[Path]) -> dict[str, Path]:
+    """Plan files by the names that they go by, in tables and as names of files: their stems.
+
+    Raises:
+        BadInput: If one can't be shown, is too long to be part of a file's name, or is that of another, as file
+            systems that don't know capitals or ways of writing accents would say.
+    """
+    found: dict[str, Path] = {}
+    known: dict[str, Path] = {}
+    for path in paths:
+        name = path.stem
+        if not name.isprintable():
+            raise BadInput(f"{os.fsencode(path)!r}: a plan goes by the name of its file, and this one can't be shown; "
+                           "rename it")
+        if len(name.encode()) > _LONGEST_NAME:
+            raise BadInput(f"{path}: a plan goes by the name of its file, and this one is longer than {_LONGEST_NAME} "
+                           "bytes; rename it")
+        plain = unicodedata.normalize("NFKC", name).casefold()
+        if plain in known:
+            raise BadInput(f"{path}: there is another plan named {name!r}, {known[plain]}; the names of the files must "
+                           "differ, and in more than capitals")
+        found[name] = known[plain] = path
+    return found
+
+
+def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
+    for name in names:
+        if name not in known:
+            raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
+    return list(dict.fromkeys(names))

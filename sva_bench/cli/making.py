@@ -1,0 +1,208 @@
+"""Commands that check and make worlds and instances."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sva_bench.cli.options import Family, Force, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
+from sva_bench.cli.terminal import print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.usage import PlainCommand
+from sva_bench.errors import BadInput
+from sva_bench.files.outputs import check_output, write_beside, write_result
+from sva_bench.files.seal import refuse_edited, refuse_others, sealed
+from sva_bench.interrupts import holding_back_ctrl_c
+
+world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
+instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
+
+
+@world_app.command("check", cls=PlainCommand)
+def check_world(
+    world: WorldArgument,
+    planner: PlannerOption = "prmstar",
+    verbose: Verbose = False,
+) -> None:
+    """Check a world: is the file right, does every robot reach every site, and what can't be part of any plan?"""
+    with holding_back_ctrl_c():
+        from sva_bench.cli.loading import about, load
+
+    set_up_logging(verbose)
+    loaded = load(world)
+    with holding_back_ctrl_c():
+        from sva_bench.analysis.reach import NOTHING, beyond_reach
+        from sva_bench.study.planning import plan_costs, reach_of
+
+    with about(world), progress_bars() as progress:
+        costs = plan_costs(loaded, planner, progress)
+    console = results()
+    for cost in costs.values():
+        longest = int(cost.repaired_ms.max()) / 1000
+        console.print(f"{cost.times.model.name}: {cost.pairs} travel times of up to {longest:.1f} s, "
+                      f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
+                      highlight=False)
+    reach = reach_of(loaded, costs)
+    for said in beyond_reach({"reach": reach}):
+        console.print(said, highlight=False, markup=False)
+    verdict = f"can be read, but {NOTHING}" if reach["nothing"] else "is a good world"
+    counts = {"station": len(loaded.stations), "POI": len(loaded.pois), "robot": len(loaded.robots),
+              "scenario": len(loaded.scenarios)}
+    console.print(f"{loaded.name} {verdict}: "
+                  + ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items()), highlight=False)
+
+
+@world_app.command("random", cls=PlainCommand)
+def make_random_world(
+    family: Annotated[WorldFamily, typer.Option(help="What stands there: walls with doors and furniture, scattered "
+                                                     "obstacles, racks, or a maze.")] = "rooms",
+    size: Annotated[float, typer.Option(metavar="METRES", min=10, max=100, callback=finite, help="Side of the "
+                                        "square.")] = 18,
+    density: Annotated[float | None, typer.Option(
+        min=0, max=1, callback=finite, help="Share of the area that furniture, obstacles or racks cover; of a maze, "
+        "share of its walls that stand: 1 leaves no loops.", show_default="rooms 0.06, field 0.1, aisles 0.2, "
+        "maze 0.8")] = None,
+    pois: Annotated[int, typer.Option(min=4, max=100, help="Points of interest, at least two for each robot.")] = 10,
+    stations: Annotated[int, typer.Option(min=0, max=30, help="Refuelling stations.")] = 5,
+    robots: Annotated[int, typer.Option(min=2, max=10, help="Robots; half of them, rounded down, are uncertain.")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of terrain, sites and incentives.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="World file to write; default: standard "
+                                                "output.", show_default=False)] = None,
+    force: Force = False,
+    verbose: Verbose = False,
+) -> None:
+    """Make a random world, with a mission that is neither trivial nor hopeless and the paper's scenarios S1 to S4."""
+    with holding_back_ctrl_c():
+        from sva_bench.generate.worlds import random_world
+
+    set_up_logging(verbose)
+    check_output(output)
+    if output is not None:
+        refuse_edited(output, force=force)
+    with progress_bars() as progress:
+        text = random_world(family, size_m=size, density=density, pois=pois, stations=stations, robots=robots,
+                            seed=seed, progress=progress)
+    write_result(output, sealed(text))
+
+
+@world_app.command("from-map", cls=PlainCommand)
+def make_world_from_map(
+    source: Annotated[Path, typer.Argument(metavar="MAP.yaml|MAP.map", help="YAML file of a ROS map, or a MovingAI "
+                                           "map.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="WORLD.yaml", help="World file to write; the map's "
+                                         "files are copied beside it, to WORLD-map/.", show_default=False)],
+    pois: Annotated[int, typer.Option(min=4, max=100, help="Points of interest, at least two for each robot.")] = 20,
+    stations: Annotated[int, typer.Option(min=0, max=30, help="Refuelling stations.")] = 5,
+    robots: Annotated[int, typer.Option(min=2, max=10, help="Robots; half of them, rounded down, are uncertain.")] = 2,
+    base: Annotated[tuple[float, float] | None, typer.Option(
+        metavar="X Y", help="Where the base is, in metres of the map; what it can't reach gets no sites.",
+        show_default="the middle of the largest region that walls enclose")] = None,
+    min_spacing: Annotated[float | None, typer.Option(
+        metavar="METRES", min=0.05, max=1000, callback=finite, help="From one point of interest to the next and to all "
+        "other sites, at least.", show_default="as wide as it easily goes")] = None,
+    cell_m: Annotated[float | None, typer.Option(
+        metavar="METRES", min=1e-3, max=100, callback=finite, help="Side of a cell of a MovingAI map.",
+        show_default="1.0")] = None,
+    unknown: Annotated[Unknown | None, typer.Option(help="What unknown cells of a ROS map count as.",
+                                                    show_default="occupied")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of points of interest and incentives.")] = 0,
+    force: Force = False,
+    verbose: Verbose = False,
+) -> None:
+    """Make a world of a map, with sites on free ground, a mission that suits it and the paper's scenarios S1 to S4."""
+    with holding_back_ctrl_c():
+        from sva_bench.cli.loading import refuse_no_map
+        from sva_bench.generate.worlds import world_from_map
+
+    set_up_logging(verbose)
+    octile = source.suffix.lower() == ".map"
+    if octile and unknown is not None:
+        raise BadInput("--unknown belongs to ROS maps; a MovingAI map has no unknown cells")
+    if not octile and cell_m is not None:
+        raise BadInput("--cell-m belongs to MovingAI maps; a ROS map says its resolution")
+    if base is not None and not all(map(math.isfinite, base)):
+        raise BadInput("--base: expected two finite numbers")
+    check_output(output, source)
+    refuse_edited(output, force=force)
+    if source.suffix.lower() in (".yaml", ".yml"):
+        refuse_no_map(source)
+    with progress_bars() as progress:
+        text, files = world_from_map(
+            source, output, base=base, pois=pois, stations=stations, robots=robots, seed=seed, spacing_m=min_spacing,
+            cell_m=1.0 if cell_m is None else cell_m, unknown=unknown or "occupied", progress=progress)
+    if not force:
+        refuse_others(output, {file.name: file.content for file in files})
+    with holding_back_ctrl_c():  # a map and the world on it belong together
+        for file in files:  # before the world that names them
+            write_beside(output, file.name, file.content)
+        write_result(output, sealed(text))
+
+
+@world_app.command("draw", cls=PlainCommand)
+def draw(
+    world: WorldArgument,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="PICTURE.png|svg", help="Picture to write.",
+                                         show_default=False)],
+    roadmap: Annotated[bool, typer.Option("--roadmap", help="Show the roadmap that paths are planned on.")] = False,
+    paths: Annotated[bool, typer.Option("--paths", help="Show the paths between all sites.")] = False,
+    plan: Annotated[Path | None, typer.Option(metavar="PLAN.json", help="Show the routes of a plan.",
+                                              show_default="none")] = None,
+    verbose: Verbose = False,
+) -> None:
+    """Draw a world to scale: map, sites, incentives; on request roadmap, paths and a plan's routes."""
+    kind = output.suffix.lower()[1:]
+    if kind not in ("png", "svg"):
+        raise BadInput(f"{output}: pictures are written as PNG or SVG; let the name end in .png or .svg")
+    with holding_back_ctrl_c():
+        from sva_bench.cli.loading import about, load
+
+    set_up_logging(verbose)
+    check_output(output, world)
+    loaded = load(world)
+    if loaded.map_source is not None:  # a map may be a picture of that name
+        check_output(output, *(world.parent / file.name for file in loaded.map_source.files))
+    with holding_back_ctrl_c():
+        from sva_bench.study.pictures import picture_of
+
+    with about(world), progress_bars() as progress:
+        content = picture_of(loaded, "svg" if kind == "svg" else "png", roadmap=roadmap, paths=paths, plan=plan,
+                             progress=progress)
+    write_result(output, content)
+
+
+@world_app.command("schema", cls=PlainCommand)
+def world_schema() -> None:
+    """Print the JSON schema of world files, for editors."""
+    with holding_back_ctrl_c():
+        from sva_bench.world.schema import WorldFile
+
+    print_json(WorldFile.model_json_schema())
+
+
+@instance_app.command("random", cls=PlainCommand)
+def random_instances(
+    family: Annotated[Family, typer.Option(help="A: one filling lasts for the mission; B: two to five refuels; C: "
+                                                "short routes.")] = "A",
+    pois: Annotated[int, typer.Option(min=0, max=1000, help="Points of interest.")] = 20,
+    vehicles: Annotated[int, typer.Option(min=0, max=100, help="Vehicles; every second one is uncertain.")] = 2,
+    availability: Annotated[float, typer.Option(min=0, max=1, callback=finite, help="Availability of the uncertain "
+                                                "ones.")] = 0.75,
+    fuel: Annotated[float | None, typer.Option(min=0.01, max=1000, callback=finite, help="Fuel capacity in largest "
+                                               "distances.", show_default="the family's")] = None,
+    tau: Annotated[float | None, typer.Option(min=0.01, max=1000, callback=finite, help="Mission limit in fuel "
+                                              "capacities.", show_default="the family's")] = None,
+    directed: Annotated[bool, typer.Option("--directed", help="Legs cost up to a tenth more, each way.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of places and incentives.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Instance file to write; default: standard "
+                                                "output.", show_default=False)] = None,
+) -> None:
+    """Make a random instance of the paper's kind."""
+    with holding_back_ctrl_c():
+        from sva_bench.generate.instances import random_instance
+        from sva_bench.mission.instance import instance_text
+
+    write_result(output, instance_text(random_instance(
+        family, pois=pois, vehicles=vehicles, availability=availability, fuel_multiple=fuel, tau=tau,
+        directed=directed, seed=seed)))

@@ -1,0 +1,70 @@
+"""Arguments and options that commands share."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from sva_bench.workers.pool import count_of
+
+# Spelt out, not imported: the modules that own them take a second to load, and --help should not.
+Fidelity = Literal["kinematic", "rollout", "physics"]
+Planner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
+Method = Literal["auto", "expected", "dep", "relaxed", "lshaped"]
+Cuts = Literal["single", "multi", "pareto"]
+RiskKind = Literal["cvar", "excess"]
+FailureProcess = Literal["mission", "per_leg"]
+Family = Literal["A", "B", "C"]
+WorldFamily = Literal["rooms", "field", "aisles", "maze"]
+Part = Literal["rewards", "simulation", "runtimes"]
+Objective = Literal["stochastic", "deterministic"]
+Unknown = Literal["occupied", "free"]
+
+
+
+def finite(value: float | None) -> float | None:
+    """Refuse inf and nan, which pass bounds."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"expected a finite number, found {value}")
+    return value
+
+
+WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
+PlannerOption = Annotated[Planner, typer.Option(help="OMPL planner: one PRM* roadmap, or pair by pair RRTConnect "
+                                                     "(noisy), FMT*, BFMT* or Informed RRT* (slow).")]
+MarginOption = Annotated[float | None, typer.Option(
+    min=0, max=1, callback=finite, help="Planning costs are twin times x (1 + margin); default: the world's.",
+    show_default=False)]
+TimeLimit = Annotated[float | None, typer.Option(
+    metavar="S", min=0, callback=finite, help="Stop each solve after so many seconds and take its best plan.",
+    show_default="none")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")]
+Trials = Annotated[int, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.")]
+Rollouts = Annotated[int, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod ROLLOUTS.")]
+FidelityOption = Annotated[Fidelity, typer.Option(
+    help="The kinematic twin alone; physics once per route and noise draw; or every trial in physics.")]
+ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",
+                                                         show_default="all")]
+PlanFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that plans are made for.",
+                                                           show_default="the world's")]
+ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that is executed.",
+                                                              show_default="the world's")]
+Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
+AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
+
+
+def few_enough(count: int | None) -> int | None:
+    """Refuse more worker processes than this machine can have any use for, before any work."""
+    count_of(count)
+    return count
+
+
+WorkerCount = Annotated[int | None, typer.Option(min=1, callback=few_enough, help="Processes that drive.",
+                                                 show_default="all cores")]
+Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]
+Force = Annotated[bool, typer.Option("--force", help="Write over a world that was edited by hand, too.")]

@@ -1,0 +1,167 @@
+"""Commands for what solvers take and give: instances, plans, certificates."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sva_bench.cli.options import (
+    AsJson,
+    Cuts,
+    Gap,
+    MarginOption,
+    Method,
+    Objective,
+    PlannerOption,
+    RiskKind,
+    TimeLimit,
+    Verbose,
+    WorldArgument,
+    finite,
+)
+from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.errors import BadInput, ExitCode, Interrupted
+from sva_bench.files.outputs import check_output, write_result
+from sva_bench.interrupts import deferring_ctrl_c, holding_back_ctrl_c
+
+log = logging.getLogger(__name__)
+
+
+def times(
+    world: WorldArgument,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Instance file to write; default: standard "
+                                                "output.", show_default=False)] = None,
+    scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario; default: those under "
+                                                      "robots.", show_default=False)] = None,
+    planner: PlannerOption = "prmstar",
+    margin: MarginOption = None,
+    verbose: Verbose = False,
+) -> None:
+    """Plan travel times and repair them into fuel costs: an instance for any solver."""
+    with holding_back_ctrl_c():
+        from sva_bench.cli.loading import instance_of_world
+        from sva_bench.mission.instance import instance_text
+
+    set_up_logging(verbose)
+    check_output(output, world)
+    with progress_bars() as progress:
+        instance = instance_of_world(world, scenario, planner, margin, progress)
+    write_result(output, instance_text(instance))
+
+
+def plan(
+    source: Annotated[Path, typer.Argument(metavar="WORLD-or-INSTANCE", help="World (YAML) or instance (JSON).",
+                                           show_default=False)],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Plan file to write; default: standard output.",
+                                                show_default=False)] = None,
+    objective: Annotated[Objective, typer.Option(help="Plan for failures, or take every robot as "
+                                                            "available.")] = "stochastic",
+    method: Annotated[Method, typer.Option(help="Solution method: auto chooses; expected is the collapsed model; dep, "
+                                                "relaxed and lshaped are the paper's.")] = "auto",
+    cuts: Annotated[Cuts | None, typer.Option(help="Optimality cuts of lshaped.", show_default="single")] = None,
+    risk: Annotated[RiskKind | None, typer.Option(help="Plan for the worst outcomes: their mean, or the shortfall "
+                                                  "below a target.", show_default="none")] = None,
+    beta: Annotated[float | None, typer.Option(min=0, max=0.999999, callback=finite, help="cvar: the mean of the worst "
+                                               "1 - BETA share of outcomes.", show_default="0.9")] = None,
+    weight: Annotated[float | None, typer.Option(min=0, max=1, callback=finite, help="Share of the risk measure in the "
+                                                 "objective; the rest is the expected incentive.",
+                                                 show_default="1")] = None,
+    target: Annotated[float | None, typer.Option(min=0, callback=finite, help="excess: the incentive below which the "
+                                                 "shortfall counts.", show_default=False)] = None,
+    scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
+                                                      "under robots.", show_default=False)] = None,
+    time_limit: TimeLimit = None,
+    gap: Gap = 1e-6,
+    verbose: Verbose = False,
+) -> None:
+    """Make one plan, proved optimal unless a limit stops it."""
+    with holding_back_ctrl_c():
+        from sva_bench.cli.loading import instance_of_world
+        from sva_bench.files.documents import pretty_json
+        from sva_bench.mission.instance import read_instance
+        from sva_bench.mission.plan import plan_as_dict
+
+    set_up_logging(verbose)
+    check_output(output, source)
+    if risk is not None and (objective != "stochastic" or method != "auto"):
+        raise BadInput("--risk goes with the stochastic objective and the method auto alone")
+    if (risk == "excess") != (target is not None):
+        raise BadInput("--risk excess and --target go together")
+    if beta is not None and risk != "cvar":
+        raise BadInput("--beta belongs to --risk cvar")
+    if weight is not None and risk is None:
+        raise BadInput("--weight is the share of a measure of risk: choose one with --risk cvar or --risk excess")
+    if cuts is not None and method != "lshaped":
+        raise BadInput("--cuts are those of --method lshaped")
+    with progress_bars() as progress:
+        if source.suffix.lower() in (".yaml", ".yml"):
+            instance = instance_of_world(source, scenario, "prmstar", None, progress)
+        elif scenario is not None:
+            raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
+        else:
+            instance = read_instance(source)
+        with holding_back_ctrl_c():  # after reading: what is wrong is said at once
+            from sva_bench.solver.risk import RiskMeasure
+            from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
+
+        progress("solving", 0, 1)
+        limits, cuts_used = SolveLimits(time_limit_s=time_limit, gap=gap), cuts or "single"
+        with deferring_ctrl_c():  # the solver hears it; from there on the plan is written
+            if risk is not None:
+                told = {"weight": weight, "beta": beta, "target": target}
+                made = plan_averse(instance, RiskMeasure(
+                    kind=risk, **{name: value for name, value in told.items() if value is not None}), limits)
+            elif objective == "stochastic":
+                made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
+            else:
+                stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
+                                             cuts=cuts_used)
+                made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
+            write_result(output, pretty_json(plan_as_dict(made)))
+        progress("solving", 1, 1)
+    assert made.value is not None
+    assert made.bound is not None
+    gap_left = made.bound - made.value
+    if gap_left > 0:
+        gap_left = gap_left / abs(made.value) if made.value else math.inf  # as --gap counts it
+    outcome = (f"{made.status}: value {made.value:.6g}, bound {made.bound:.6g}, relative gap {gap_left:.2g}, "
+               f"{made.runtime_s:.2f} s")
+    if made.status == "interrupted":
+        raise Interrupted(outcome)
+    messages.print(outcome, highlight=False)
+
+
+def certify(
+    instance: Annotated[Path, typer.Argument(metavar="INSTANCE", help="Instance file (JSON).", show_default=False)],
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="Plan file (JSON).", show_default=False)],
+    as_json: AsJson = False,
+) -> None:
+    """Check a plan independently: is it feasible, and what is it worth?
+
+    Exits with 3 if it is infeasible.
+    """
+    with holding_back_ctrl_c():
+        from sva_bench.mission.certify import certify as check
+        from sva_bench.mission.instance import read_instance
+        from sva_bench.mission.plan import read_plan
+
+    problem = read_instance(instance)
+    candidate = read_plan(plan, problem)
+    if candidate.instance not in (None, problem.name):
+        log.warning("%s was made for %s, not for %s", plan, candidate.instance, problem.name)
+    certificate = check(problem, candidate)
+    if as_json:
+        print_json(certificate.as_dict())
+    else:
+        console = results()
+        verdict = f"feasible, expected incentive {certificate.expected:.6g}" if certificate.feasible else "infeasible"
+        console.print(verdict, highlight=False)
+        for reason in certificate.reasons:
+            console.print(f"  {reason}", highlight=False, markup=False)
+    if not certificate.feasible:
+        raise typer.Exit(ExitCode.INFEASIBLE_PLAN)

@@ -1,0 +1,159 @@
+"""What commands print: results on standard output, progress and messages on standard error."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.logging import RichHandler
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.segment import Segment
+from rich.table import Table
+
+from sva_bench.files.printable import printable
+from sva_bench.interrupts import holding_back_ctrl_c
+
+
+class SafeConsole(Console):
+    """Prints nothing that a terminal would obey, wherever a text came from: the one door for all that is shown."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """What is to be printed, piece by piece."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(printable(segment.text), segment.style)
+
+
+class _SafeFormatter(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
+
+
+messages = SafeConsole(stderr=True)
+
+
+def results() -> Console:
+    """Standard output; tables keep their shape in a pipe."""
+    return SafeConsole(width=None if sys.stdout.isatty() else 140, markup=False)  # names may hold brackets
+
+
+def print_json(data: Any) -> None:
+    """Print a result as JSON on standard output."""
+    sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
+
+
+def set_up_logging(verbose: bool) -> None:
+    """Send warnings to standard error, and everything of ours where the user wants to know more."""
+    if messages.is_terminal:
+        logging.basicConfig(level=logging.WARNING, format="%(message)s", force=True,
+                            handlers=[RichHandler(console=messages, show_time=False, show_path=False)])
+    else:  # a line each, whatever reads them
+        handler = logging.StreamHandler()
+        handler.setFormatter(_SafeFormatter("%(levelname)s %(message)s"))
+        logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
+    logging.getLogger("sva_bench").setLevel(logging.DEBUG if verbose else logging.WARNING)
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
+    """Progress bars on standard error; plain lines where that is no terminal."""
+    if not messages.is_terminal:
+        said: set[str] = set()
+
+        def say(what: str, done: int, of: int) -> None:
+            if what not in said and done < of:
+                said.add(what)
+                messages.print(f"{what} ...", highlight=False)
+
+        yield say
+        return
+    tasks: dict[str, Any] = {}
+
+    def show(what: str, done: int, of: int) -> None:
+        if what not in tasks:
+            tasks[what] = bars.add_task(what, total=of)
+        bars.update(tasks[what], completed=done, total=of)
+
+    bars = Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                    console=messages, transient=True)
+    try:
+        with holding_back_ctrl_c():  # the thread that draws them inherits it: Ctrl-C is this one's to hear
+            bars.start()
+        yield show
+    finally:
+        bars.stop()
+
+
+def print_summary(summary: Any) -> None:
+    """Print a summary as a table, and what it comes to."""
+    from sva_bench.analysis.reach import infeasible, lost_robots
+    from sva_bench.report.wording import (
+        ASSUMPTION_HEAD,
+        answer,
+        assumption_rows,
+        ranked,
+        remarks,
+        vss_verdict,
+        with_interval,
+    )
+
+    console = results()
+    scenarios, travel = summary["scenarios"], summary["travel"]
+    table = Table(title=f"{summary['world']}, seed {summary['seed']}: {summary['trials']} trials, "
+                        f"{summary['rollouts']} rollouts, {summary['fidelity']}", title_justify="left")
+    compared = "vss" in scenarios[0]
+    judged = any("lost" in plan for plan in scenarios[0]["plans"].values())  # plans from anywhere may lose robots
+    for heading in ("scenario", "plan", *(("robots lost",) if judged else ()), "promised", "expected",
+                    "executed [95 %]", *scenarios[0]["availability"],
+                    *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
+        table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
+    for scenario in scenarios:
+        last = list(scenario["plans"])[-1]
+        for number, (name, plan) in enumerate(scenario["plans"].items()):
+            proof = "" if plan["status"] in ("optimal", None) else f" ({plan['status']})"
+            proof = " (infeasible)" if infeasible(plan) else proof
+            worth = ["", "", ""] if compared else []
+            if compared and number == 0:
+                vss, evpi = scenario["vss"], scenario["evpi"]
+                worth = [vss_verdict(scenario), f"{vss['modelled']:.1f}", "" if evpi is None else f"{evpi:.1f}"]
+            table.add_row(
+                "" if number else scenario["name"], name + proof, *((lost_robots(plan),) if judged else ()),
+                f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
+                with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()), *worth,
+                end_section=name == last)
+    console.print(table)
+    missions, unhappy = 0, []
+    for name in scenarios[0]["plans"]:
+        ends: dict[str, int] = {}
+        for scenario in scenarios:
+            for end, count in scenario["plans"][name]["ends"].items():
+                ends[end] = ends.get(end, 0) + count
+        missions += sum(ends.values())
+        bad = [f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if end in ends]
+        if bad:
+            unhappy.append(f"{', '.join(bad)} ({name})")
+    console.print(f"{travel['pairs']} travel times, {travel['triangle_violations_pct']:.1f} % repaired, by up to "
+                  f"{travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed under "
+                  f"{summary['failure']['execute']} failures.", highlight=False)
+    if unhappy:
+        console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
+                      highlight=False)
+    for scenario in scenarios:
+        if scenario.get("comparisons"):
+            console.print(f"{scenario['name']}: {ranked(scenario)}", highlight=False, markup=False)
+    console.print(answer(summary), highlight=False)
+    for said in remarks(summary):
+        console.print(said, highlight=False)
+    if rows := assumption_rows(scenarios):
+        crossed = Table(title="Plans under the failures they were made for and under the others", title_justify="left")
+        for number, heading in enumerate(ASSUMPTION_HEAD):
+            crossed.add_column(heading, justify="left" if number < 4 else "right")
+        for row in rows:
+            crossed.add_row(*row)
+        console.print(crossed)
+    if not summary["reproducible"]:
+        console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

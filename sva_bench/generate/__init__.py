@@ -1,0 +1,1 @@
+"""Inputs made: terrain, missions, worlds, instances."""

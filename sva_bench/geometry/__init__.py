@@ -1,0 +1,1 @@
+"""Solids, grids and distances in the plane: arrays only."""

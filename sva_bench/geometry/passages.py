@@ -1,0 +1,65 @@
+"""How wide a robot may be and still get from place to place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.ndimage import label
+
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.geometry.buckets import clearances
+from sva_bench.geometry.cells import distance_field
+from sva_bench.world.model import Obstacles
+
+_FINEST_M, _PLACES = 0.02, 1_000_000  # finest lattice among shapes, and most places of it
+_STEPS = 16  # halvings of the range of radii
+
+
+def widest_passage(obstacles: Obstacles, points: FloatArray) -> float:
+    """A clearance at which all points are connected [m]: the greatest, but for half a lattice step; 0 if there is none.
+
+    Args:
+        obstacles: What stands in the way.
+        points: The places, shape (n, 2).
+    """
+    distance, at = _lattice(obstacles, points)
+    # The nearest lattice places are beside the points, not at them.
+    low, high = 0.0, float(min(clearances(obstacles, points).min(), distance[at[..., 0], at[..., 1]].max(axis=1).min()))
+    if high > 0 and _connects(distance, at, high):
+        return high
+    for _ in range(_STEPS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if middle > 0 and _connects(distance, at, middle) else (low, middle)
+    return max(low, 0.0)
+
+
+def _lattice(obstacles: Obstacles, points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Distances on a lattice, between whose neighbours nothing is nearer; and the four places about each point.
+
+    Returns:
+        Shapes (rows, columns) and (n, 4, 2).
+    """
+    if obstacles.cells is not None:
+        field = distance_field(obstacles.cells)
+        distance = field.distance_m.astype(np.float64)
+        steps = field.cells.from_world(points)[:, ::-1] / (field.cells.cell_m / 2)
+    else:
+        low, size = obstacles.bounds_m[:2], obstacles.bounds_m[2:] - obstacles.bounds_m[:2]
+        step = max(_FINEST_M, math.sqrt(float(np.prod(size)) / _PLACES))
+        x, y = (low[axis] + np.arange(math.floor(size[axis] / step) + 1) * step for axis in (0, 1))
+        places = np.stack(np.meshgrid(x, y), axis=-1)
+        # Half way to a neighbour it may be nearer by half a step.
+        distance = clearances(obstacles, places.reshape(-1, 2)).reshape(places.shape[:2]) - step / 2
+        steps = (points - low)[:, ::-1] / step
+    corner = np.floor(steps).astype(np.int64)
+    around = corner[:, None] + np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
+    return distance, np.clip(around, 0, np.array(distance.shape) - 1)
+
+
+def _connects(distance: FloatArray, at: IntArray, clearance_m: float) -> bool:
+    """Whether one part of what is so roomy comes near every point."""
+    parts, count = label(distance >= clearance_m)
+    near = np.zeros((len(at), count + 1), dtype=np.bool_)
+    near[np.arange(len(at))[:, None], parts[at[..., 0], at[..., 1]]] = True
+    return bool(near[:, 1:].all(axis=0).any())

@@ -1,0 +1,198 @@
+"""Charts of a summary: colours told apart by all eyes, and by hatching or shape beside."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.report.drawing import Axes, chart
+
+_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#999999")
+_HATCHES = ("", "///", "...", "xxx", "\\\\\\", "ooo", "+++", "---")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+Scenario = Mapping[str, Any]
+
+
+def incentive_by_robot(scenarios: Sequence[Scenario], plan: str, beside: Sequence[str] = ()) -> str:
+    """Bars: what each robot collected, scenario by scenario (Figures 4 and 7 of the paper).
+
+    Args:
+        scenarios: Of a summary.
+        plan: Whose bars they are.
+        beside: Plans whose charts stand beside this one: all have the axis of the greatest.
+    """
+    robots = list(scenarios[0]["availability"])
+    heights = {robot: [s["plans"][plan]["by_robot"][robot] for s in scenarios] for robot in robots}
+    most = max(s["plans"][name]["by_robot"][robot] for s in scenarios for name in {plan, *beside} for robot in robots)
+
+    def draw(axes: Axes) -> None:
+        _bars(axes, [s["name"] for s in scenarios], heights, {})
+        axes.set_ylabel("mean incentive [world file's units]")
+        axes.set_title(f"Incentive by robot, {plan} plan")
+        if most > 0:
+            axes.set_ylim(0, 1.05 * most)
+
+    return chart(_name("robots", plan), f"Mean incentive that each robot collects in each scenario, {plan} plan",
+                 (_width(len(scenarios), len(robots)), 3.6), draw)
+
+
+def plans_compared(scenarios: Sequence[Scenario]) -> str:
+    """Bars with intervals: what each plan collected, scenario by scenario (Figure 8)."""
+    plans = list(scenarios[0]["plans"])
+    heights = {name: [s["plans"][name]["executed"]["mean"] for s in scenarios] for name in plans}
+    ends = {name: [s["plans"][name]["executed"]["ci95"] for s in scenarios] for name in plans}
+
+    def draw(axes: Axes) -> None:
+        _bars(axes, [s["name"] for s in scenarios], heights, ends)
+        axes.set_ylabel("mean incentive [world file's units]")
+        axes.set_title("Executed incentive, 95 % intervals")
+
+    return chart("plans", "Mean executed incentive of each plan in each scenario with 95 % intervals",
+                 (_width(len(scenarios), len(plans)), 3.6), draw)
+
+
+def differences(rows: Sequence[tuple[str, Mapping[str, Any]]], title: str, unit: str) -> str:
+    """Points with intervals on a line of zero: one row each."""
+    def draw(axes: Axes) -> None:
+        axes.axvline(0, color="#444", linewidth=1)
+        for row, (_, found) in enumerate(rows):
+            if found["ci95"] is not None:
+                axes.plot(found["ci95"], [row, row], color=_COLOURS[0], linewidth=3, solid_capstyle="butt")
+            axes.plot(found["mean"], row, marker="o", color="black", markersize=6, linestyle="none")
+        axes.set_yticks(range(len(rows)), [label for label, _ in rows])
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.set_xlabel(unit)
+        axes.set_title(title)
+        axes.grid(axis="x", color="#ddd")
+
+    return chart(_name("differences", title), f"{title}: means and 95 % intervals", (6.0, 1.3 + 0.34 * len(rows)), draw)
+
+
+def distributions(scenarios: Sequence[Scenario]) -> str:
+    """Boxes: how a plan's incentive varies over trials."""
+    plans = list(scenarios[0]["plans"])
+
+    def draw(axes: Axes) -> None:
+        for number, name in enumerate(plans):
+            found = [s["plans"][name]["distribution"] for s in scenarios]
+            boxes = [{"med": d["q50"], "q1": d["q25"], "q3": d["q75"], "whislo": d["q05"], "whishi": d["q95"]}
+                     for d in found]
+            at = [k + _offset(number, len(plans)) for k in range(len(scenarios))]
+            drawn = axes.bxp(boxes, positions=at, widths=0.8 / len(plans) * 0.85, showfliers=False, patch_artist=True,
+                             medianprops={"color": "black", "linewidth": 1.6}, manage_ticks=False)
+            for box in drawn["boxes"]:
+                box.set(facecolor=_colour(number), hatch=_hatch(number))
+            axes.plot(at, [d["cvar10"] for d in found], linestyle="none", marker="v", color="black", markersize=5,
+                      label="mean of the worst tenth" if number == 0 else None)
+            axes.bar(0, 0, facecolor=_colour(number), hatch=_hatch(number), edgecolor="black", label=name)
+        _names(axes, [s["name"] for s in scenarios])
+        axes.set_ylabel("incentive of a trial [world file's units]")
+        axes.set_title("Over trials: 5, 25, 50, 75, 95 %")
+        _legend(axes)
+
+    return chart("distributions", "Box plots of the incentive of single trials, by scenario and plan",
+                 (max(6.0, _width(len(scenarios), len(plans))), 3.8), draw)
+
+
+def boxes_of(groups: Mapping[str, Sequence[float]], title: str, unit: str) -> str:
+    """A box and its points for each group, one below the other: their names may be long."""
+    labels = [textwrap.fill(name, _LABEL) for name in groups]
+    lines = sum(label.count("\n") + 1 for label in labels)
+
+    def draw(axes: Axes) -> None:
+        figures = [np.asarray(group, dtype=np.float64) for group in groups.values()]
+        axes.axvline(0, color="#444", linewidth=1)
+        drawn = axes.boxplot(figures, positions=range(len(groups)), widths=0.5, patch_artist=True, manage_ticks=False,
+                             showfliers=False, orientation="horizontal",
+                             medianprops={"color": "black", "linewidth": 1.6})
+        for box in drawn["boxes"]:
+            box.set(facecolor="#cfe3f1")
+        for k, group in enumerate(figures):
+            spread = np.linspace(-0.12, 0.12, len(group)) if len(group) > 1 else np.zeros(1)
+            axes.plot(group, k + spread, linestyle="none", marker="o", color=_COLOURS[0], markersize=4,
+                      markeredgecolor="black", markeredgewidth=0.4)
+        axes.set_yticks(range(len(groups)), labels)
+        axes.set_ylim(len(groups) - 0.5, -0.5)
+        axes.set_xlabel(unit)
+        axes.set_title(title)
+        axes.grid(axis="x", color="#ddd")
+
+    return chart(_name("boxes", title), title, (7.0, 1.3 + max(0.4 * len(groups), 0.22 * lines)), draw)
+
+
+_LABEL = 32  # letters of a label from which on it goes on in the next line
+
+
+def legs_driven(planned_s: FloatArray, driven_s: FloatArray, robots: Sequence[str]) -> str:
+    """Points: how far each leg's driven time is off the planned one."""
+    def draw(axes: Axes) -> None:
+        names = np.asarray(robots)
+        kept = planned_s > 0
+        for number, robot in enumerate(dict.fromkeys(robots)):
+            mine = kept & (names == robot)
+            axes.plot(planned_s[mine], 100 * (driven_s[mine] / planned_s[mine] - 1), linestyle="none",
+                      marker=_MARKERS[number % len(_MARKERS)], color=_colour(number), markersize=4,
+                      markeredgecolor="black", markeredgewidth=0.3, alpha=0.75, label=robot,
+                      rasterized=int(kept.sum()) > _MANY)
+        axes.axhline(0, color="#444", linewidth=1)
+        axes.set_xlabel("planned time of the leg = fuel [s]")
+        axes.set_ylabel("driven against planned [%]")
+        axes.set_title("Legs as driven")
+        axes.grid(color="#ddd")
+        _legend(axes)
+
+    return chart("legs", "Driven against planned time of each leg in per cent, by planned time", (6.0, 3.6), draw)
+
+
+_MANY = 2000  # points from which on an SVG holds them as an image
+
+
+def _bars(axes: Axes, groups: Sequence[str], heights: Mapping[str, Sequence[float]],
+          ends: Mapping[str, Sequence[Sequence[float] | None]]) -> None:
+    for number, (name, tall) in enumerate(heights.items()):
+        at = [k + _offset(number, len(heights)) for k in range(len(groups))]
+        axes.bar(at, tall, width=0.8 / len(heights), facecolor=_colour(number), hatch=_hatch(number),
+                 edgecolor="black", linewidth=0.6, label=name)
+        for x, interval in zip(at, ends.get(name, ()), strict=False):
+            if interval is not None:
+                axes.plot([x, x], interval, color="black", linewidth=1.6, marker="_", markersize=7)
+    _names(axes, groups)
+    _legend(axes)
+
+
+def _names(axes: Axes, groups: Sequence[str]) -> None:
+    crowded = sum(map(len, groups)) > 40
+    axes.set_xticks(range(len(groups)), groups, rotation=30 if crowded else 0, ha="right" if crowded else "center")
+    axes.set_xlim(-0.6, len(groups) - 0.4)
+    axes.grid(axis="y", color="#ddd")
+
+
+def _legend(axes: Axes) -> None:
+    axes.legend(loc="upper left", bbox_to_anchor=(0, -0.16), ncols=3, frameon=False, handlelength=1.8, fontsize=9)
+
+
+def _offset(number: int, of: int) -> float:
+    return 0.8 * ((number + 0.5) / of - 0.5)
+
+
+def _colour(number: int) -> str:
+    return _COLOURS[number % len(_COLOURS)]
+
+
+def _hatch(number: int) -> str:
+    return _HATCHES[number % len(_HATCHES)]
+
+
+def _width(groups: int, series: int) -> float:
+    return min(max(4.8, 1.2 + 0.34 * groups * max(series, 2)), 12.0)
+
+
+def _name(kind: str, of: str) -> str:
+    return kind + "-" + "".join(c if c.isascii() and c.isalnum() else f"_{ord(c):x}_" for c in of)
+
+

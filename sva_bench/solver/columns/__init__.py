@@ -1,0 +1,1 @@
+"""Routes as columns: branch and price."""

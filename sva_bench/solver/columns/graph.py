@@ -1,0 +1,94 @@
+"""What a vehicle may drive, as pricing reads it, and which POIs each site remembers (ng-sets)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.mission.instance import Instance
+from sva_bench.solver.preprocess import Scope, is_metric
+from sva_bench.solver.program import SLACK_S
+
+NG_START, NG_MOST = 7, 14  # POIs that a site remembers at first, and at most
+_WITHIN = 0.9  # of the tolerance: sums in another order must not make a route infeasible
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Graph:
+    """What a vehicle may drive, as pricing reads it.
+
+    Attributes:
+        base: The base.
+        bit: Number of each POI, -1 for base and stations, shape (n,).
+        legs: Whether a leg is of use, shape (n, n).
+        time_s: Time of a leg with half the stops at its ends [s], shape (n, n).
+        fuel_s: Fuel of a leg [s], shape (n, n).
+        capacity_s: Fuel capacity, tolerance included [s].
+        limit_s: Mission limit, tolerance included [s]; finite.
+        survival: Chance to get to the next POI.
+        symmetric: Whether every leg costs the same both ways and the order of visits is indifferent.
+        metric: Whether no detour is quicker, or burns less, than a direct leg.
+    """
+
+    base: int
+    bit: IntArray
+    legs: BoolArray
+    time_s: FloatArray
+    fuel_s: FloatArray
+    capacity_s: float
+    limit_s: float
+    survival: float
+    symmetric: bool
+    metric: bool
+
+
+def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
+    """What a vehicle may drive, for pricing."""
+    n = len(instance.sites)
+    bit = np.full(n, -1, dtype=np.int64)
+    bit[list(instance.pois)] = np.arange(len(instance.pois))
+    binding = math.isfinite(scope.capacity_s)
+    fuel = scope.fuel_s if binding else np.zeros((n, n))
+    drive = scope.time_s - instance.stop_s[None, :]
+    time = drive + (instance.stop_s[:, None] + instance.stop_s[None, :]) / 2
+    legs = scope.legs
+    # Without a limit no route worth driving takes longer: from a POI to the next by all stations at most.
+    limit = scope.limit_s if math.isfinite(scope.limit_s) else \
+        float(time[legs].max(initial=0.0)) * (len(instance.pois) + 1) * (len(instance.stations) + 1)
+    symmetric = survival == 1.0 and np.array_equal(legs, legs.T) and np.array_equal(time[legs], time.T[legs]) \
+        and np.array_equal(fuel[legs], fuel.T[legs])
+    return Graph(base=instance.base, bit=bit, legs=legs, time_s=np.where(legs, time, 0.0),
+                 fuel_s=np.where(legs, fuel, 0.0), capacity_s=scope.capacity_s + _WITHIN * SLACK_S,
+                 limit_s=limit + _WITHIN * SLACK_S, survival=survival, symmetric=bool(symmetric),
+                 metric=is_metric(scope.fuel_s, instance.base, tolerance_s=0.0))
+
+
+def neighbours(graph: Graph, pois: Sequence[int]) -> NDArray[np.uint64]:
+    """First ng-sets: the nearest POIs of each site, shape (n, words), uint64."""
+    n, words = len(graph.bit), max(1, -(-len(pois) // 64))
+    memory = np.zeros((n, words), dtype=np.uint64)
+    far = np.where(graph.legs, graph.time_s, np.inf)
+    far = np.minimum(far, far.T)
+    np.fill_diagonal(far, 0.0)
+    for i in range(n):
+        for j in sorted(pois, key=lambda j: (far[i, j], j))[:NG_START if graph.bit[i] >= 0 else 2 * NG_START]:
+            memory[i, graph.bit[j] >> 6] |= np.uint64(1) << np.uint64(graph.bit[j] & 63)
+    return memory
+
+
+def allowed(route: tuple[int, ...], graph: Graph, memory: NDArray[np.uint64]) -> bool:
+    """Whether the ng-sets allow a route."""
+    mask = 0
+    for j in route[1:-1]:
+        b = int(graph.bit[j])
+        if b >= 0 and mask >> b & 1:
+            return False
+        mask &= sum(int(word) << 64 * k for k, word in enumerate(memory[j]))
+        if b >= 0:
+            mask |= 1 << b
+    return True

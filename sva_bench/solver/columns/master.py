@@ -1,0 +1,230 @@
+"""The master program of branch-and-price: routes as columns, visits and vehicles as rows.
+
+A *unit* is a vehicle, or several that are alike in everything, on one side of the decisions made so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.solver.highs import Outcome, Relaxation, Relaxed
+from sva_bench.solver.program import LinearModel, RowBuilder
+from sva_bench.solver.risk import Risk
+
+Stops = tuple[int, ...]
+"""Sites of a route, from base to base."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Class:
+    """Vehicles that are alike in everything.
+
+    Attributes:
+        vehicles: Their numbers.
+        weights: Reward of a visit, shape (n,).
+        floors: Weight of a visit in each floor, shape (floors, n).
+    """
+
+    vehicles: tuple[int, ...]
+    weights: FloatArray
+    floors: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """So many vehicles of a class, and the POIs that they may not visit."""
+
+    kind: int
+    count: int
+    forbidden: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """What has been decided on the way to a node of the search tree.
+
+    Attributes:
+        units: The vehicles.
+        required: POIs that are visited.
+    """
+
+    units: tuple[Unit, ...]
+    required: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Column:
+    """A route of a class.
+
+    Attributes:
+        kind: The class.
+        route: Sites from base to base.
+        visits: Visits of each site, shape (n,).
+        value: Its rewards less its cost.
+        floors: What it adds to each floor, shape (floors,).
+    """
+
+    kind: int
+    route: Stops
+    visits: FloatArray
+    value: float
+    floors: FloatArray
+
+    def fits(self, unit: Unit) -> bool:
+        """Whether a unit may drive it."""
+        return unit.kind == self.kind and not any(self.visits[j] for j in unit.forbidden)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Prices:
+    """Duals of the master program.
+
+    Attributes:
+        visit: Of each site's visit, shape (n,).
+        unit: Of each unit's vehicles.
+        floor: Of each floor, not positive, shape (floors,).
+        cut: Of each cut, not negative, shape (cuts,).
+    """
+
+    visit: FloatArray
+    unit: FloatArray
+    floor: FloatArray
+    cut: FloatArray
+
+    def between(self, other: Prices, share: float) -> Prices:
+        """So much of the other, and the rest of this."""
+        return Prices(visit=(1 - share) * self.visit + share * other.visit,
+                      unit=(1 - share) * self.unit + share * other.unit,
+                      floor=(1 - share) * self.floor + share * other.floor,
+                      cut=(1 - share) * self.cut + share * other.cut)
+
+
+@dataclass(eq=False, kw_only=True)
+class Master:
+    """The master program at a node, open for more columns.
+
+    Attributes:
+        side: The decisions.
+        pois: POIs with a row.
+        floors: Least sum of each floor.
+        sizes: Size of each floor's row, shape (floors,); all the same under a measure of risk.
+        cuts: How many cuts there are; of the routes a cut counts, one is in use at most.
+        counted: How often each cut counts a route, shape (cuts,).
+        penalty: What a unit of a required visit, or of a floor in units of its size, costs if it is missed.
+        risk: The measure of risk whose outcomes the floors are.
+        entries: Unit and column of each program column after the penalties and the measure's own.
+    """
+
+    side: Side
+    pois: tuple[int, ...]
+    n: int
+    floors: FloatArray
+    sizes: FloatArray
+    cuts: int
+    counted: Callable[[Column], FloatArray]
+    penalty: float
+    risk: Risk | None = None
+    entries: list[tuple[int, Column]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._row = {j: k for k, j in enumerate(self.pois)}
+        first = len(self.pois) + len(self.side.units)
+        rows = first + len(self.floors)
+        # What is required may be missed, at a price; under a risk measure the floors have columns of their own instead.
+        missed = [self._row[j] for j in sorted(self.side.required)]
+        missed += [] if self.risk else list(range(first, rows))
+        costs, entries = self.risk.costs() if self.risk else (np.zeros(0), np.zeros((len(self.floors), 0)))
+        costs = costs * self.sizes.max(initial=0.0)  # in units of the rows, so that tolerances are relative
+        self.penalties, self.others = len(missed), len(missed) + len(costs)
+        own = {row: k for k, row in enumerate(missed)}
+        build = RowBuilder()
+        for row in range(len(self.pois)):
+            build.add([own[row]] if row in own else [], [1.0] * (row in own), 1.0 if row in own else -np.inf, 1.0)
+        for unit in self.side.units:
+            build.add([], [], -np.inf, float(unit.count))
+        for k, floor in enumerate(self.floors):
+            used = np.flatnonzero(entries[k])
+            columns, values = self.penalties + used, entries[k][used]
+            if not self.risk:
+                columns, values = np.array([own[first + k]]), np.ones(1)
+            build.add(columns, values, float(floor / self.sizes[k]), np.inf)
+        for _ in range(self.cuts):
+            build.add([], [], -np.inf, 1.0)
+        self._program = Relaxation(LinearModel(
+            objective=np.concatenate([np.full(self.penalties, -self.penalty), costs]),
+            upper=np.full(self.others, np.inf), integer=np.zeros(self.others, dtype=np.bool_), rows=build.rows()))
+        self._present: set[tuple[int, Stops]] = set()
+        self._blocks: list[tuple[IntArray, FloatArray, FloatArray]] = []
+
+    def add(self, unit: int, columns: Sequence[Column]) -> int:
+        """Offer columns to a unit; how many are new."""
+        new = [c for c in columns if (unit, c.route) not in self._present]
+        if not new:
+            return 0
+        units, floors = len(self.side.units), len(self.floors)
+        visits = np.array([c.visits for c in new])
+        counted = np.array([self.counted(c) for c in new]).reshape(len(new), self.cuts)
+        levels = np.array([c.floors for c in new]).reshape(len(new), floors)
+        values = np.array([c.value for c in new])
+        matrix = np.hstack([visits[:, list(self.pois)], np.zeros((len(new), units)), levels / self.sizes, counted])
+        matrix[:, len(self.pois) + unit] = 1.0
+        column, row = np.nonzero(matrix)
+        self._program.add_columns(values, np.searchsorted(column, np.arange(len(new) + 1)), row, matrix[column, row])
+        self._present.update((unit, c.route) for c in new)
+        self.entries += [(unit, c) for c in new]
+        self._blocks.append((np.full(len(new), unit), values, np.hstack([visits, levels, counted])))
+        return len(new)
+
+    def most(self, prices: Prices) -> FloatArray:
+        """Greatest value of each unit's routes less the prices of what they take; 0 at least, shape (units,)."""
+        found = np.zeros(len(self.side.units))
+        if self._blocks:
+            self._blocks = [tuple(np.concatenate(part) for part in zip(*self._blocks, strict=True))]  # type: ignore[list-item]
+            unit, value, taken = self._blocks[0]
+            np.maximum.at(found, unit, value - taken @ np.concatenate([prices.visit, prices.floor, prices.cut]))
+        return found
+
+    def solve(self, time_limit_s: float) -> Relaxed:
+        """The relaxation over the columns so far."""
+        return self._program.solve(time_limit_s)
+
+    def prices(self, solved: Relaxed) -> Prices:
+        """Its duals."""
+        visit = np.zeros(self.n)
+        visit[list(self.pois)] = solved.duals[:len(self.pois)]
+        unit, floor, cut = np.split(solved.duals[len(self.pois):],
+                                    np.cumsum([len(self.side.units), len(self.floors)]))
+        return Prices(visit=visit, unit=unit, floor=floor / self.sizes, cut=np.maximum(cut, 0.0))
+
+    def bound(self, prices: Prices, best: FloatArray) -> float:
+        """Upper bound on the program over all columns, from any prices of the right signs.
+
+        Args:
+            prices: The prices.
+            best: Upper bound on a route's value less its visits' prices, of each unit, shape (units,).
+        """
+        counts = np.array([u.count for u in self.side.units], dtype=np.float64)
+        return float(prices.visit.sum() + prices.floor @ self.floors + prices.cut.sum()
+                     + counts @ np.maximum(best, 0.0))
+
+    def solve_whole(self, time_limit_s: float) -> Outcome:
+        """The best choice of whole columns; the program is then of no more use."""
+        return self._program.solve_whole(np.arange(self.others, self.others + len(self.entries)), time_limit_s)
+
+    def share(self, values: FloatArray) -> list[tuple[int, Column, float]]:
+        """The columns in use at a point: unit, column and share."""
+        used = values[self.others:]
+        return [(*self.entries[k], float(used[k])) for k in np.flatnonzero(used > 1e-7)]
+
+    def missed(self, values: FloatArray) -> float:
+        """How much is missed of what is required at a point."""
+        return float(values[:self.penalties].sum())
+
+
+def without(unit: Unit, poi: int) -> Unit:
+    """The unit, no longer allowed to visit a POI."""
+    return replace(unit, forbidden=unit.forbidden | {poi})

@@ -1,0 +1,1 @@
+"""The compact models over arcs, and branch and cut on them."""

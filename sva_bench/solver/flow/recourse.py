@@ -1,0 +1,121 @@
+"""The second stage as the paper has it: what is lost when vehicles fail, as columns of its own in every outcome.
+
+In an outcome, a POI's leg ``v[i,j]`` is lost as far as ``sum_j f_ij v_ij = (1 - alpha_m) sum_j f_ij y_ij`` says, with
+``0 <= v <= y``: constraints (14), (15a) and (11a) with the fuel flow put in. Costs must be positive, else a leg that
+costs nothing could be kept by a vehicle that failed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.errors import BadInput
+from sva_bench.mission.instance import Instance
+from sva_bench.solver.flow.expected import DirectedModel
+from sva_bench.solver.outcomes import Outcomes
+from sva_bench.solver.preprocess import Scope
+from sva_bench.solver.program import Goal, LinearModel, RowBuilder, Rows
+from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.refuelling import Road
+
+LEAST_AVAILABILITY = 1e-4
+"""Of the vehicle that is there most often: below it what is lost is as good as all that is earned."""
+
+
+def refuse_free_legs(instance: Instance) -> None:
+    """Refuse an instance in which a leg costs nothing.
+
+    Raises:
+        BadInput: If one does.
+    """
+    for vehicle in instance.vehicles:
+        free = np.argwhere((vehicle.fuel_s <= 0) & ~np.eye(len(instance.sites), dtype=np.bool_))
+        if len(free):
+            i, j = (instance.sites[k] for k in free[0])
+            raise BadInput(f"instance {instance.name}: {vehicle.name} drives {i} -> {j} for nothing, and the paper's "
+                           "second stage needs costs above 0; use the method auto or expected")
+
+
+def refuse_seldom_available(instance: Instance, availability: float) -> None:
+    """Refuse an instance whose vehicles are hardly ever there: nearly all that a plan earns is then lost again, and
+    the difference of the two, in which HiGHS rounds, is all that it is worth.
+
+    Args:
+        instance: The instance.
+        availability: The greatest one of its vehicles.
+
+    Raises:
+        BadInput: If it is above 0, but too small.
+    """
+    if 0 < availability < LEAST_AVAILABILITY:
+        raise BadInput(f"instance {instance.name}: no vehicle's availability is above {availability:g}, and the "
+                       f"paper's second stage is exact from {LEAST_AVAILABILITY:g}; use the method auto or expected")
+
+
+class EquivalentModel(DirectedModel):
+    """The deterministic equivalent: both stages in one program, the second one whole or relaxed."""
+
+    def __init__(
+        self, instance: Instance, scopes: Sequence[Scope], goal: Goal, roads: Sequence[Road], recourse: Outcomes, *,
+        relaxed: bool,
+    ) -> None:
+        super().__init__(instance, scopes, replace(goal, weights=recourse.incentives), roads)
+        legs, first = self.legs, self.model
+        self._lost = 1.0 - recourse.available[:, legs.vehicle]  # shape (outcomes, legs)
+        count, start = len(legs.vehicle), len(first.objective)
+        build = RowBuilder()
+        for outcome in range(len(recourse.probability)):
+            v = start + outcome * count
+            for k in range(count):
+                build.add([v + k, k], [1.0, -1.0], -np.inf, 0.0)
+            for lost, used in legs_out_of_pois(self, instance, scopes):
+                share = float(self._lost[outcome, used[0]])
+                build.add([*(v + used), *used], [*lost, *(-share * lost)], 0.0, 0.0)
+            for refuelled in np.flatnonzero(~self.out_of_poi(instance)):  # (11a)
+                share = float(self._lost[outcome, refuelled])
+                build.add([v + int(refuelled), int(refuelled)], [1.0, -share], 0.0, 0.0)
+        earned = recourse.incentives[legs.vehicle, legs.destination]
+        second = np.concatenate([-p * earned for p in recourse.probability]) if count else np.zeros(0)
+        outcomes = len(recourse.probability)
+        self.model = LinearModel(
+            objective=np.concatenate([first.objective, second]),
+            upper=np.concatenate([first.upper, np.tile(first.upper[:count], outcomes)]),
+            integer=np.concatenate([first.integer, np.full(outcomes * count, not relaxed)]),
+            rows=together(first.rows, build.rows()))
+
+    def out_of_poi(self, instance: Instance) -> BoolArray:
+        """Which legs leave a POI, shape (legs,)."""
+        out: BoolArray = np.isin(self.legs.origin, instance.pois)
+        return out
+
+    def point(self, orders: Orders) -> FloatArray | None:
+        """A plan as a point, with its only feasible recourse ``v = (1 - alpha) y``."""
+        first = super().point(orders)
+        if first is None:
+            return None
+        driven = first[:len(self.legs.vehicle)]
+        return np.concatenate([first, (self._lost * driven).ravel()])
+
+
+def legs_out_of_pois(
+    model: DirectedModel, instance: Instance, scopes: Sequence[Scope],
+) -> list[tuple[FloatArray, IntArray]]:
+    """Costs and numbers of the legs out of each POI, vehicle by vehicle."""
+    legs, found = model.legs, []
+    for m, scope in enumerate(scopes):
+        for i in instance.pois:
+            used = np.flatnonzero((legs.vehicle == m) & (legs.origin == i))
+            if len(used):
+                found.append((scope.fuel_s[i, legs.destination[used]], used))
+    return found
+
+
+def together(one: Rows, other: Rows) -> Rows:
+    return Rows(
+        lower=np.concatenate([one.lower, other.lower]), upper=np.concatenate([one.upper, other.upper]),
+        start=np.concatenate([one.start, one.start[-1] + other.start[1:]]),
+        column=np.concatenate([one.column, other.column]), value=np.concatenate([one.value, other.value]))

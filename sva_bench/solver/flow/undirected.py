@@ -1,0 +1,137 @@
+"""The collapsed model with a column for each edge: costs the same both ways, and one filling lasts for the mission.
+
+Columns per vehicle: ``u``, whether it leaves the base; ``s_j``, whether it visits POI j; ``x_e``, how often it drives
+edge e. Rows: ``x(edges at the base) = 2 u``, ``x(edges at j) = 2 s_j``, ``sum_e t_e x_e <= limit u``, and each POI once
+over all vehicles. Half as many columns as the directed model, and a much tighter one: nothing tells one sense of a
+route from the other. A cut ``x(edges out of S) >= 2 s_i`` is written over the edges within S, where those are fewer.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.mission.instance import Instance
+from sva_bench.solver.flow.cuts import Cut
+from sva_bench.solver.preprocess import Scope
+from sva_bench.solver.program import SLACK_S, Goal, LinearModel, RowBuilder, Rows, sizes_of
+from sva_bench.solver.routes.heuristic import Orders
+
+
+class UndirectedModel:
+    """The edge model of one goal, as ``branch_and_cut`` wants it."""
+
+    def __init__(self, instance: Instance, scopes: Sequence[Scope], goal: Goal) -> None:
+        self._instance, self._scopes = instance, scopes
+        n, base, pois = len(instance.sites), instance.base, instance.pois
+        half = instance.stop_s[:, None] / 2 + instance.stop_s[None, :] / 2
+        build = RowBuilder()
+        objective: list[float] = []
+        upper: list[float] = []
+        self._leaves: list[int] = []  # column u of each vehicle
+        self._visit = np.full((len(scopes), n), -1)  # column s
+        self._edge = np.full((len(scopes), n, n), -1)  # column x
+        for m, scope in enumerate(scopes):
+            time = scope.fuel_s + half
+            ends = np.argwhere(np.triu(scope.legs))
+            there = [j for j in pois if scope.legs[j].any()]
+            first = len(objective)
+            self._leaves.append(first)
+            self._visit[m, there] = first + 1 + np.arange(len(there))
+            edges = first + 1 + len(there) + np.arange(len(ends))
+            self._edge[m, ends[:, 0], ends[:, 1]] = self._edge[m, ends[:, 1], ends[:, 0]] = edges
+            costs = time[ends[:, 0], ends[:, 1]]
+            objective += [0.0, *goal.weights[m, there], *(-goal.driving * costs)]
+            upper += [1.0] * (1 + len(there)) + np.where((ends == base).any(axis=1), 2.0, 1.0).tolist()
+            for site in (base, *there):
+                of_site = self._edge[m, site][self._edge[m, site] >= 0]
+                total = first if site == base else int(self._visit[m, site])
+                build.add([*of_site, total], [1.0] * len(of_site) + [-2.0], 0.0, 0.0)
+            size = max(scope.limit_s, 1.0)
+            build.add([*edges, first], [*(costs / size), -(scope.limit_s + SLACK_S) / size], -np.inf, 0.0)
+            for j in there:
+                build.add([int(self._visit[m, j]), first], [1.0, -1.0], -np.inf, 0.0)
+        for j in pois:
+            of_poi = self._visit[:, j][self._visit[:, j] >= 0]
+            if len(of_poi) > 1:
+                build.add(of_poi, np.ones(len(of_poi)), -np.inf, 1.0)
+        for (weights, floor), size in zip(goal.floors, sizes_of(goal.floors), strict=True):
+            used = np.argwhere((self._visit >= 0) & (weights != 0))
+            build.add(self._visit[used[:, 0], used[:, 1]], weights[used[:, 0], used[:, 1]] / size, floor / size, np.inf)
+        self.model = LinearModel(objective=np.array(objective), upper=np.array(upper),
+                                 integer=np.ones(len(objective), dtype=np.bool_), rows=build.rows())
+
+    def rows(self, cuts: Sequence[Cut]) -> Rows:
+        """The cuts as rows."""
+        build = RowBuilder()
+        for cut in cuts:
+            inside = np.array([j for j in cut.inside if self._visit[cut.vehicle, j] >= 0], dtype=np.int64)
+            visit = int(self._visit[cut.vehicle, cut.poi])
+            if visit < 0:
+                build.add([], [], -np.inf, np.inf)
+                continue
+            edge = self._edge[cut.vehicle]
+            within = _positive(np.triu(edge[np.ix_(inside, inside)], 1))
+            outside = np.setdiff1d(np.arange(len(edge)), inside)
+            across = _positive(edge[np.ix_(inside, outside)])
+            others = self._visit[cut.vehicle, inside[inside != cut.poi]]
+            if len(within) + len(others) < len(across):
+                build.add([*within, *others], [1.0] * len(within) + [-1.0] * len(others), -np.inf, 0.0)
+            else:
+                build.add([*across, visit], [1.0] * len(across) + [-2.0], 0.0, np.inf)
+        return build.rows()
+
+    def visits(self, values: FloatArray, vehicle: int) -> FloatArray:
+        """Half of each edge in either sense, shape (n, n)."""
+        edge = self._edge[vehicle]
+        return np.where(edge >= 0, values[edge], 0.0) / 2
+
+    def order(self, values: FloatArray, vehicle: int) -> tuple[int, ...]:
+        """POIs of a vehicle's route, from the base on."""
+        left = np.rint(2 * self.visits(values, vehicle))
+        here = self._instance.base
+        order: list[int] = []
+        while True:
+            onward = np.flatnonzero(left[here] > 0.5)
+            if not len(onward):
+                return tuple(order)
+            there = int(onward[0])
+            left[here, there] -= 1
+            left[there, here] -= 1
+            if there == self._instance.base:
+                return tuple(order)
+            order.append(there)
+            here = there
+
+    def point(self, orders: Orders) -> FloatArray | None:
+        """A plan as a point."""
+        point = np.zeros(len(self.model.objective))
+        for m, order in enumerate(orders):
+            if not order:
+                continue
+            point[self._leaves[m]] = 1.0
+            stops = (self._instance.base, *order, self._instance.base)
+            for i, j in itertools.pairwise(stops):
+                if self._edge[m, i, j] < 0:
+                    return None
+                point[self._edge[m, i, j]] += 1.0
+            point[self._visit[m, list(order)]] = 1.0
+        return point
+
+
+def serves(instance: Instance, scopes: Sequence[Scope]) -> bool:
+    """Whether all vehicles drive legs that cost the same both ways, without ever refuelling."""
+    stations = list(instance.stations)
+    return all(
+        np.isfinite(scope.limit_s) and not np.isfinite(scope.capacity_s) and not scope.legs[stations].any()
+        and np.array_equal(scope.legs, scope.legs.T)
+        and np.array_equal(scope.fuel_s[scope.legs], scope.fuel_s.T[scope.legs]) for scope in scopes)
+
+
+def _positive(columns: IntArray) -> IntArray:
+    """The columns among entries of which -1, or the 0 of a triangle, stands for none."""
+    found: IntArray = columns[columns > 0]
+    return found

@@ -1,0 +1,1 @@
+"""Routes searched: construction, ruin and recreate, refuelling."""

@@ -1,0 +1,272 @@
+"""Routes in compiled code: the quickest refuelling of POIs in a given order, and where another POI fits best.
+
+A *front* at a stop holds the (time, fuel) pairs that no other pair beats: forwards the time since the start and the
+fuel burnt since the last refuel, backwards the time to the end and the fuel needed until the next refuel. The two are
+mirror images, so one step function serves both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.interrupts import deferring_ctrl_c
+from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.solver.looking import look, stop_mark
+from sva_bench.solver.preprocess import shortest_paths
+from sva_bench.solver.program import SLACK_S
+
+FRONT = 12
+"""Most pairs of a front. Real ones have two to four; a longer one loses its slowest pairs, and a search some routes."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tables:
+    """The legs of all kinds of vehicles, as compiled code reads them. Vehicles of one kind differ in rewards only.
+
+    Attributes:
+        kind: Kind of each vehicle, shape (M,).
+        base: The base.
+        fuel_s: Fuel of a leg [s], shape (kinds, n, n).
+        time_s: Driving time of a leg and the stop at its end [s], shape (kinds, n, n).
+        quickest_s: Least time from a site to another, directly or over stations [s], shape (kinds, n, n).
+        first: Where the ways over stations between two sites begin in ``hops``, shape (kinds, n, n).
+        last: Where they end, shape (kinds, n, n).
+        hops: Ways over stations: fuel to the first station, time in all, fuel from the last one [s], shape (hops, 3).
+        capacity_s: Fuel capacity [s], shape (kinds,).
+        limit_s: Mission limit [s], shape (kinds,).
+    """
+
+    kind: IntArray
+    base: int
+    fuel_s: FloatArray
+    time_s: FloatArray
+    quickest_s: FloatArray
+    first: IntArray
+    last: IntArray
+    hops: FloatArray
+    capacity_s: FloatArray
+    limit_s: FloatArray
+
+
+def tables_of(instance: Instance) -> Tables:
+    """The tables of an instance's vehicles."""
+    kinds: list[Vehicle] = []
+    kind = []
+    for vehicle in instance.vehicles:
+        same = [k for k, other in enumerate(kinds) if other.fuel_capacity_s == vehicle.fuel_capacity_s
+                and other.mission_limit_s == vehicle.mission_limit_s and np.array_equal(other.fuel_s, vehicle.fuel_s)]
+        kind.append(same[0] if same else len(kinds))
+        if not same:
+            kinds.append(vehicle)
+    n, stations = len(instance.sites), np.array(instance.stations, dtype=np.int64)
+    shape = (len(kinds), n, n)
+    first, last, hops, offset = np.zeros(shape, np.int64), np.zeros(shape, np.int64), [np.zeros((0, 3))], 0
+    fuel, time, quickest = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    capacity = np.array([v.fuel_capacity_s for v in kinds]) + SLACK_S
+    for k, vehicle in enumerate(kinds):
+        fuel[k] = vehicle.fuel_s
+        time[k] = fuel[k] + instance.stop_s[None, :]
+        quickest[k] = np.where(fuel[k] <= capacity[k], time[k], np.inf)
+        if len(stations) and vehicle.fuel_capacity_s < vehicle.mission_limit_s:
+            chain = shortest_paths(quickest[k][np.ix_(stations, stations)], -1)
+            with deferring_ctrl_c():
+                found, first[k], last[k] = _ways(fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k],
+                                                 stop_mark())
+            first[k] += offset
+            last[k] += offset
+            offset += len(found)
+            hops.append(found)
+    return Tables(
+        kind=np.array(kind, dtype=np.int64), base=instance.base, fuel_s=fuel, time_s=time, quickest_s=quickest,
+        first=first, last=last, hops=np.concatenate(hops), capacity_s=capacity,
+        limit_s=np.array([v.mission_limit_s for v in kinds]) + SLACK_S)
+
+
+@njit(cache=True)
+def _ways(fuel, time, chain, stations, capacity, quickest, stop):
+    """The ways over stations that no other beats in all three respects, by increasing time; lowers ``quickest``."""
+    n, count = len(fuel), len(stations)
+    first, last = np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
+    found = np.empty((1024, 3))
+    size = 0
+    some = np.empty((count * count, 3))
+    for a in range(n):
+        for b in range(n):
+            if look(stop):  # with a thousand stations each of so many pairs has a million ways
+                return found[:0].copy(), np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
+            first[a, b] = size
+            number = 0
+            for k in range(count):
+                for l in range(count):  # noqa: E741
+                    r, s = stations[k], stations[l]
+                    if r == a or s == b or fuel[a, r] > capacity or fuel[s, b] > capacity:
+                        continue
+                    if not np.isfinite(chain[k, l]):
+                        continue
+                    some[number, 0] = fuel[a, r]
+                    some[number, 1] = time[a, r] + chain[k, l] + time[s, b]
+                    some[number, 2] = fuel[s, b]
+                    number += 1
+            for x in np.argsort(some[:number, 1]):
+                beaten = False
+                for y in range(first[a, b], size):
+                    if found[y, 0] <= some[x, 0] and found[y, 2] <= some[x, 2]:
+                        beaten = True
+                        break
+                if beaten:
+                    continue
+                if size == len(found):
+                    larger = np.empty((2 * size, 3))
+                    larger[:size] = found
+                    found = larger
+                found[size] = some[x]
+                size += 1
+            last[a, b] = size
+            if last[a, b] > first[a, b]:
+                quickest[a, b] = min(quickest[a, b], found[first[a, b], 1])
+    return found[:size].copy(), first, last
+
+
+@njit(cache=True)
+def step(times, fuels, count, leg_time, leg_fuel, hops, begin, end, near, far, capacity, limit, to_times, to_fuels):
+    """The front after one more leg, driven directly or over stations; its length.
+
+    ``near`` and ``far`` say which columns of ``hops`` hold the fuel at this end and at the other one: 0 and 2
+    forwards, 2 and 0 backwards. Fronts are sorted by increasing time and decreasing fuel.
+    """
+    size = 0
+    direct = 0
+    hop = begin
+    while True:
+        # Next direct candidate, and next way over stations; the earlier one first.
+        while direct < count and fuels[direct] + leg_fuel > capacity:
+            direct += 1
+        time_direct = times[direct] + leg_time if direct < count else np.inf
+        time_hop, fuel_hop = np.inf, 0.0
+        if hop < end:
+            for k in range(count):
+                if fuels[k] + hops[hop, near] <= capacity:
+                    time_hop = times[k] + hops[hop, 1]
+                    break
+            fuel_hop = hops[hop, far]
+            if np.isinf(time_hop):
+                hop += 1
+                continue
+        if np.isinf(time_direct) and np.isinf(time_hop):
+            return size
+        if time_direct <= time_hop:
+            time, fuel = time_direct, fuels[direct] + leg_fuel
+            direct += 1
+        else:
+            time, fuel = time_hop, fuel_hop
+            hop += 1
+        if time > limit:
+            if direct >= count and hop >= end:
+                return size
+            continue
+        # Insert into the front; ways come by increasing time of their own, not of their sum.
+        place = size
+        while place > 0 and to_times[place - 1] > time:
+            place -= 1
+        if place > 0 and to_fuels[place - 1] <= fuel:
+            continue
+        stop = place
+        while stop < size and to_fuels[stop] >= fuel:
+            stop += 1
+        if stop == place:  # nothing beaten: make room
+            if size == FRONT:
+                if place == FRONT:
+                    continue
+                size -= 1
+            for k in range(size, place, -1):
+                to_times[k], to_fuels[k] = to_times[k - 1], to_fuels[k - 1]
+            size += 1
+        else:
+            for k in range(stop, size):
+                to_times[place + 1 + k - stop], to_fuels[place + 1 + k - stop] = to_times[k], to_fuels[k]
+            size -= stop - place - 1
+        to_times[place], to_fuels[place] = time, fuel
+
+
+@njit(cache=True)
+def route_time(order, length, base, fuel, time, first, last, hops, capacity, limit, scratch):
+    """Least time of a route that visits POIs in this order; ``inf`` = infeasible. ``scratch``: shape (4, FRONT)."""
+    if length == 0:
+        return 0.0
+    here, count, turn = base, 1, 0
+    scratch[0, 0] = scratch[1, 0] = 0.0
+    for k in range(length + 1):
+        there = base if k == length else order[k]
+        count = step(scratch[2 * turn], scratch[2 * turn + 1], count, time[here, there], fuel[here, there], hops,
+                     first[here, there], last[here, there], 0, 2, capacity, limit,
+                     scratch[2 - 2 * turn], scratch[3 - 2 * turn])
+        if count == 0:
+            return np.inf
+        turn = 1 - turn
+        here = there
+    return scratch[2 * turn, 0]
+
+
+@njit(cache=True)
+def fronts(order, length, base, fuel, time, first, last, hops, capacity, limit, ahead, ahead_size, behind, behind_size):
+    """Both fronts at every stop of a route, base first and base last; its least time, ``inf`` = infeasible.
+
+    ``ahead`` and ``behind``: shape (stops, 2, FRONT); their sizes: shape (stops,).
+    """
+    stops = length + 2
+    ahead[0, :, 0] = 0.0
+    ahead_size[0] = 1
+    for k in range(1, stops):
+        a = base if k == 1 else order[k - 2]
+        b = base if k == stops - 1 else order[k - 1]
+        if length == 0:
+            ahead[1, :, 0] = 0.0
+            ahead_size[1] = 1
+        else:
+            ahead_size[k] = step(ahead[k - 1, 0], ahead[k - 1, 1], ahead_size[k - 1], time[a, b], fuel[a, b], hops,
+                                 first[a, b], last[a, b], 0, 2, capacity, limit, ahead[k, 0], ahead[k, 1])
+        if ahead_size[k] == 0:
+            return np.inf
+    behind[stops - 1, :, 0] = 0.0
+    behind_size[stops - 1] = 1
+    for k in range(stops - 2, -1, -1):
+        a = base if k == 0 else order[k - 1]
+        b = base if k == stops - 2 else order[k]
+        if length == 0:
+            behind[0, :, 0] = 0.0
+            behind_size[0] = 1
+        else:
+            behind_size[k] = step(behind[k + 1, 0], behind[k + 1, 1], behind_size[k + 1], time[a, b], fuel[a, b], hops,
+                                  first[a, b], last[a, b], 2, 0, capacity, limit, behind[k, 0], behind[k, 1])
+        if behind_size[k] == 0:
+            return np.inf
+    return ahead[stops - 1, 0, 0]
+
+
+@njit(cache=True)
+def time_with(poi, a, b, fuel, time, first, last, hops, capacity, limit, ahead, ahead_size, behind, behind_size,
+              scratch):
+    """Least time of the route with one more POI between stops a and b; ``inf`` = infeasible.
+
+    ``ahead`` is the front at a, ``behind`` the one at b, both of shape (2, FRONT).
+    """
+    count = step(ahead[0], ahead[1], ahead_size, time[a, poi], fuel[a, poi], hops, first[a, poi], last[a, poi], 0, 2,
+                 capacity, limit, scratch[0], scratch[1])
+    best = np.inf
+    for x in range(count):
+        for y in range(behind_size):
+            if scratch[1, x] + fuel[poi, b] + behind[1, y] <= capacity:
+                best = min(best, scratch[0, x] + time[poi, b] + behind[0, y])
+                break
+        for h in range(first[poi, b], last[poi, b]):
+            if scratch[1, x] + hops[h, 0] > capacity:
+                continue
+            for y in range(behind_size):
+                if hops[h, 2] + behind[1, y] <= capacity:
+                    best = min(best, scratch[0, x] + hops[h, 1] + behind[0, y])
+                    break
+    return best if best <= limit else np.inf

@@ -1,0 +1,139 @@
+"""A good plan quickly: ruin and recreate from several starts, and the best of all routes met. Proves nothing.
+
+Deterministic: it counts rounds and reads no clock but to stop early.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.interrupts import deferring_ctrl_c
+from sva_bench.solver.looking import stop_mark
+from sva_bench.solver.routes.fronts import FRONT, Tables
+from sva_bench.solver.routes.packing import Route, best_packing
+from sva_bench.solver.routes.ruin_recreate import rounds as run_rounds
+from sva_bench.solver.routes.ruin_recreate import straighten
+
+Orders = tuple[tuple[int, ...], ...]
+"""POIs of each vehicle, in order of visit."""
+
+STARTS = 4
+ROUNDS = 1000  # after each start
+_LARGE = 120  # sites from which on rounds get fewer, for they get slower
+_POOL = 5000  # routes kept of one start
+_CYCLE = 50  # rounds between two returns to the best plan, or to nothing
+_HEAT = 0.03  # loss that is taken at the start of a cycle, relative to the best value
+_LOOKS = 4  # at the clock, in the rounds after a start
+_DETOUR = 0.01  # of the median leg; keeps a POI on the way from looking infinitely good
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found:
+    """What a search came to.
+
+    Attributes:
+        orders: The best plan.
+        routes: The routes met that count for the relaxation, each with its vehicle.
+    """
+
+    orders: Orders
+    routes: tuple[Route, ...]
+
+
+def search(
+    tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, seed: int = 0, starts: int = STARTS,
+    stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
+    offer: Callable[[Orders], None] = lambda orders: None,  # noqa: ARG005
+) -> Found:
+    """A plan worth at least as much as the one it starts from.
+
+    Args:
+        tables: The vehicles' legs.
+        weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
+        survival: Chance of a vehicle to get to its next POI, which multiplies its rewards, shape (M,); 1 = order is
+            indifferent.
+        start: A feasible plan.
+        seed: Seed of the random choices.
+        starts: How often to start, the first time from the given plan and then from nothing.
+        stop: Whether to stop, given the best value so far.
+        offer: Takes every better plan, for Ctrl-C ends the search.
+    """
+    vehicles, n = weights.shape
+    best = start
+    routes: dict[Route, None] = {}
+    if not vehicles or not (weights > 0).any():
+        return Found(orders=best, routes=())
+    both_ways = tables.time_s[0] + tables.time_s[0].T
+    near = np.argsort(both_ways, axis=1, kind="stable")
+    legs = both_ways[np.isfinite(both_ways) & (both_ways > 0)] / 2
+    detour = _DETOUR * float(np.median(legs)) if len(legs) else _DETOUR
+    ordered = bool((survival < 1).any())
+    rounds = int(ROUNDS * min(1.0, (_LARGE / n) ** 1.5)) + 1
+    for number in range(starts):
+        if number and stop(value_of(weights, survival, best)):
+            break
+        rng = np.random.default_rng((seed, number))
+        current, current_length = _as_arrays(start if number == 0 else tuple(() for _ in start), n)
+        incumbent, incumbent_length = current.copy(), current_length.copy()
+        pool, length, kind = np.zeros((_POOL, n), np.int16), np.zeros(_POOL, np.int64), np.zeros(_POOL, np.int64)
+        table, keys = np.full(2 * _POOL + 1, -1, np.int64), rng.integers(0, 2**63, n, dtype=np.uint64)
+        size = 0
+        looks = (0, *range(1, rounds, -(-rounds // _LOOKS)), rounds)  # a first plan at once
+        for done, until in itertools.pairwise(looks):
+            with deferring_ctrl_c():
+                size = run_rounds(
+                    rng, until - done, done, _CYCLE, _HEAT, tables.kind, tables.base, tables.fuel_s,
+                    tables.time_s, tables.quickest_s, tables.first, tables.last, tables.hops, tables.capacity_s,
+                    tables.limit_s, near, weights, survival, detour, current, current_length, incumbent,
+                    incumbent_length, pool, length, kind, size, table, keys, ordered, stop_mark())
+                found = _as_orders(incumbent, incumbent_length)
+                if value_of(weights, survival, found) > value_of(weights, survival, best):
+                    best = found
+                    offer(best)
+            if stop(value_of(weights, survival, best)):
+                break
+        routes.update(dict.fromkeys(
+            (int(kind[k]), tuple(pool[k, :length[k]].tolist())) for k in range(size)))
+    good: tuple[Route, ...] = ()
+    if not stop(value_of(weights, survival, best)):
+        packed, good = best_packing(tables, weights, survival, tuple(routes), best)
+        if value_of(weights, survival, packed) > value_of(weights, survival, best):
+            best = packed
+    return Found(orders=best, routes=good)
+
+
+def value_of(weights: FloatArray, survival: FloatArray, orders: Orders) -> float:
+    """Sum of the rewards, each times the chance to get that far."""
+    return math.fsum(weights[m, j] * survival[m]**k if survival[m] < 1 else weights[m, j]
+                     for m, order in enumerate(orders) for k, j in enumerate(order, start=1))
+
+
+def shorten(tables: Tables, orders: Orders) -> Orders:
+    """The same visits, each vehicle's in an order that no reversal and no move of up to three of them makes quicker."""
+    n = tables.fuel_s.shape[1]
+    array, length = _as_arrays(orders, n)
+    spare, sums = np.zeros(n, np.int64), np.zeros((2, n + 2))
+    with deferring_ctrl_c():
+        for m, k in enumerate(tables.kind):
+            if length[m]:
+                straighten(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
+                           tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
+                           np.zeros((4, FRONT)), spare, sums, stop_mark())
+    return _as_orders(array, length)
+
+
+def _as_arrays(orders: Orders, n: int) -> tuple[IntArray, IntArray]:
+    array, length = np.zeros((len(orders), n), np.int64), np.array([len(order) for order in orders], dtype=np.int64)
+    for m, order in enumerate(orders):
+        array[m, :len(order)] = order
+    return array, length
+
+
+def _as_orders(array: IntArray, length: IntArray) -> Orders:
+    return tuple(tuple(array[m, :length[m]].tolist()) for m in range(len(length)))

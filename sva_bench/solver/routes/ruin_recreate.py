@@ -1,0 +1,397 @@
+"""Ruin and recreate in compiled code: remove some POIs, insert others where they fit best, straighten the routes.
+
+Source:
+    Schrimpf et al. (2000), "Record breaking optimization results using the ruin and recreate principle".
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from sva_bench.solver.looking import look
+from sva_bench.solver.routes.fronts import FRONT, fronts, route_time, time_with
+
+_SHORT = 8  # POIs up to which a longer way may be tried, for it may save a refuel
+_RUIN = 0.6  # greatest share of the visits removed
+_BAN = 0.7  # share of the rounds in which POIs are barred from a random vehicle
+_SWAP = 0.1  # share of the rounds that begin by swapping the routes of two vehicles
+_NOISE = 0.3
+_EPSILON = 1e-9
+
+
+@njit(cache=True)
+def worth(order, length, weights, survival):
+    """Value of a route: each POI's weight, times the chance to get that far."""
+    total, chance = 0.0, 1.0
+    for k in range(length):
+        chance *= survival
+        total += chance * weights[order[k]] if survival < 1.0 else weights[order[k]]
+    return total
+
+
+@njit(cache=True)
+def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, first, last, hops, capacity, limit, near,
+           weights, survival, detour, current, current_length, best, best_length, pool, pool_length, pool_kind,
+           pool_size, pool_table, keys, ordered, stop):
+    """So many rounds; works on ``current``, ``best`` and ``pool`` in place; the size of the pool.
+
+    Args:
+        rng: Random numbers.
+        count: Rounds.
+        done: Rounds before these.
+        cycle: Rounds between two returns to the best plan; within a cycle worse plans are taken less and less.
+        heat: Loss that is taken at the start of a cycle, relative to the best value.
+        kind: Kind of each vehicle, shape (M,).
+        base: The base; it and the arrays up to ``limit`` are those of ``Tables``.
+        near: For each POI the others by their distance, shape (n, n).
+        weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
+        survival: Chance to get to the next POI, shape (M,); 1 where the order of visits is indifferent.
+        detour: Keeps a POI on the way from looking infinitely good [s].
+        current: POIs of each vehicle, in order, shape (M, n); ``current_length``: how many, shape (M,).
+        best: The best plan, alike.
+        pool: Routes met, shape (most, n), with length, kind and a hash table of twice their number or more.
+        keys: Random keys of the sites for hashing, shape (n,).
+        ordered: Whether routes with the same POIs in another order are different ones.
+        stop: Not 0 once it should end.
+    """
+    vehicles, n = weights.shape
+    orders, lengths = current.copy(), current_length.copy()
+    visited = np.zeros(n, np.bool_)
+    allowed = np.zeros((vehicles, n), np.bool_)
+    factor = np.ones((vehicles, n))
+    ahead, ahead_size = np.zeros((vehicles, n + 2, 2, FRONT)), np.zeros((vehicles, n + 2), np.int64)
+    behind, behind_size = np.zeros((vehicles, n + 2, 2, FRONT)), np.zeros((vehicles, n + 2), np.int64)
+    score, place = np.zeros((vehicles, n)), np.zeros((vehicles, n), np.int64)
+    least, reward, total = np.zeros((vehicles, n)), np.zeros((vehicles, n)), np.zeros(vehicles)
+    scratch, spare, removed = np.zeros((4, FRONT)), np.zeros(n, np.int64), np.zeros(n, np.bool_)
+    sums = np.zeros((2, n + 2))
+    current_value = best_value = 0.0
+    for m in range(vehicles):
+        current_value += worth(current[m], current_length[m], weights[m], survival[m])
+        best_value += worth(best[m], best_length[m], weights[m], survival[m])
+    for number in range(done, done + count):
+        if look(stop):
+            break
+        orders[:], lengths[:] = current, current_length
+        if vehicles > 1 and rng.random() < _SWAP:
+            _swap(rng, orders, lengths, weights, spare)
+        _ruin(rng, orders, lengths, near, removed)
+        for m in range(vehicles):
+            k = kind[m]
+            if np.isinf(route_time(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops,
+                                   capacity[k], limit[k], scratch)):
+                lengths[m] = 0  # without the triangle inequality a POI may have been a shortcut
+        power = 0.5 + 1.5 * rng.random()
+        ban = 0.5 * rng.random() if vehicles > 1 and rng.random() < _BAN else 0.0
+        for m in range(vehicles):
+            for j in range(n):
+                allowed[m, j] = weights[m, j] > 0
+                factor[m, j] = 1.0 + _NOISE * (2.0 * rng.random() - 1.0)
+        if ban > 0:
+            for j in range(n):
+                if rng.random() < ban:
+                    allowed[int(rng.random() * vehicles), j] = False
+        for again in range(2):
+            _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel, time, quickest, first, last,
+                      hops, capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score,
+                      place, least, reward, total, scratch)
+            if again == 0:
+                for m in range(vehicles):
+                    k = kind[m]
+                    straighten(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
+                               limit[k], weights[m], survival[m], scratch, spare, sums, stop)
+                    for j in range(n):
+                        allowed[m, j] = weights[m, j] > 0
+                factor[:] = 1.0
+                power = 1.0
+        value = 0.0
+        for m in range(vehicles):
+            value += worth(orders[m], lengths[m], weights[m], survival[m])
+            pool_size = _keep(orders[m], lengths[m], kind[m], pool, pool_length, pool_kind, pool_size, pool_table,
+                              keys, ordered)
+        if value > best_value + _EPSILON:
+            best[:], best_length[:] = orders, lengths
+            best_value = value
+        left = 1.0 - (number % cycle) / cycle
+        if value >= current_value - heat * left * best_value:
+            current[:], current_length[:] = orders, lengths
+            current_value = value
+        if number % cycle == cycle - 1:  # begin anew by turns from nothing and from the best
+            current[:], current_length[:] = best, best_length
+            current_value = best_value
+            if number // cycle % 2 == 0:
+                current_length[:] = 0
+                current_value = 0.0
+    return pool_size
+
+
+@njit(cache=True)
+def _swap(rng, orders, lengths, weights, spare):
+    """Let two vehicles drive each other's routes, as far as they earn there and can."""
+    a = int(rng.random() * len(lengths))
+    b = (a + 1 + int(rng.random() * (len(lengths) - 1))) % len(lengths)
+    length = lengths[a]
+    spare[:length] = orders[a, :length]
+    lengths[a] = 0
+    for k in range(lengths[b]):
+        if weights[a, orders[b, k]] > 0:
+            orders[a, lengths[a]] = orders[b, k]
+            lengths[a] += 1
+    lengths[b] = 0
+    for k in range(length):
+        if weights[b, spare[k]] > 0:
+            orders[b, lengths[b]] = spare[k]
+            lengths[b] += 1
+
+
+@njit(cache=True)
+def _ruin(rng, orders, lengths, near, removed):
+    """Remove a segment of the routes, the POIs around one, or any."""
+    visits = 0
+    for m in range(len(lengths)):
+        visits += lengths[m]
+    if visits == 0:
+        return
+    count = 1 + int(rng.random() * max(1, int(_RUIN * visits)))
+    way = int(rng.random() * 3)
+    removed[:] = False
+    if way == 0:  # any: each with the chance that leaves so many on average
+        for m in range(len(lengths)):
+            for k in range(lengths[m]):
+                removed[orders[m, k]] = rng.random() * visits < count
+    else:
+        start = int(rng.random() * visits)
+        seen = 0
+        centre = -1
+        for m in range(len(lengths)):
+            for k in range(lengths[m]):
+                if way == 1:
+                    removed[orders[m, k]] = start <= seen < start + count
+                elif seen == start:
+                    centre = orders[m, k]
+                seen += 1
+        if way == 2:
+            spread = int(count * len(near) / visits)
+            for k in range(min(spread, len(near))):
+                removed[near[centre, k]] = True
+    for m in range(len(lengths)):
+        left = 0
+        for k in range(lengths[m]):
+            if not removed[orders[m, k]]:
+                orders[m, left] = orders[m, k]
+                left += 1
+        lengths[m] = left
+
+
+@njit(cache=True)
+def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel, time, quickest, first, last, hops,
+              capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score, place, least,
+              reward, total, scratch):
+    """Insert POIs, those of most reward for the least detour first, until none fits."""
+    vehicles, n = weights.shape
+    visited[:] = False
+    score[:] = 0.0
+    inserted = -1
+    for m in range(vehicles):
+        for k in range(lengths[m]):
+            visited[orders[m, k]] = True
+        for j in range(n):
+            if allowed[m, j]:
+                reward[m, j] = weights[m, j]**power
+    stale = -1  # all
+    while True:
+        for m in range(vehicles):
+            if stale >= 0 and m != stale:
+                continue
+            k = kind[m]
+            free = capacity[k] >= limit[k]
+            if free:
+                total[m] = route_time(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops,
+                                      capacity[k], limit[k], scratch)
+            else:
+                total[m] = fronts(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
+                                  limit[k], ahead[m], ahead_size[m], behind[m], behind_size[m])
+            # Where fuel can't bind, a detour stays what it was wherever the route hasn't changed.
+            known = free and stale >= 0 and survival[m] == 1.0
+            for j in range(n):
+                if visited[j] or not allowed[m, j]:
+                    continue
+                begin, end, most = 0, lengths[m], 0.0
+                if known and least[m, j] < np.inf and place[m, j] != inserted:
+                    begin, end = inserted, inserted + 1
+                    if place[m, j] > inserted:
+                        place[m, j] += 1
+                else:
+                    least[m, j] = np.inf
+                suffix, chance = 0.0, 1.0
+                if survival[m] < 1.0:
+                    suffix = worth(orders[m], lengths[m], weights[m], survival[m])
+                for position in range(begin, end + 1):
+                    a = base if position == 0 else orders[m, position - 1]
+                    b = base if position == lengths[m] else orders[m, position]
+                    if free:
+                        later = total[m] + time[k, a, j] + time[k, j, b] - (time[k, a, b] if lengths[m] > 0 else 0.0)
+                    elif ahead[m, position, 0, 0] + quickest[k, a, j] + quickest[k, j, b] \
+                            + behind[m, position + 1, 0, 0] >= \
+                            (limit[k] if survival[m] < 1.0 else min(limit[k], total[m] + least[m, j])):
+                        later = np.inf  # seen without refuels: too late, or later than elsewhere
+                    else:
+                        later = time_with(j, a, b, fuel[k], time[k], first[k], last[k], hops, capacity[k],
+                                          limit[k], ahead[m, position], ahead_size[m, position],
+                                          behind[m, position + 1], behind_size[m, position + 1], scratch)
+                    if survival[m] < 1.0:
+                        chance *= survival[m]
+                        gain = chance * weights[m, j] - (1.0 - survival[m]) * suffix
+                        if position < lengths[m]:
+                            suffix -= chance * weights[m, orders[m, position]]
+                        if gain > _EPSILON and later <= limit[k]:
+                            merit = gain**power / (max(later - total[m], 0.0) + detour)
+                            if merit > most:
+                                least[m, j], place[m, j], most = later - total[m], position, merit
+                    elif later - total[m] < least[m, j]:
+                        least[m, j], place[m, j] = later - total[m], position
+                score[m, j] = 0.0
+                if total[m] + least[m, j] <= limit[k]:
+                    score[m, j] = factor[m, j] * (
+                        most if survival[m] < 1.0 else reward[m, j] / (max(least[m, j], 0.0) + detour))
+        chosen, poi, most = -1, -1, 0.0
+        for m in range(vehicles):
+            for j in range(n):
+                if not visited[j] and score[m, j] > most:
+                    chosen, poi, most = m, j, score[m, j]
+        if chosen < 0:
+            return
+        for k in range(lengths[chosen], place[chosen, poi], -1):
+            orders[chosen, k] = orders[chosen, k - 1]
+        orders[chosen, place[chosen, poi]] = poi
+        lengths[chosen] += 1
+        visited[poi] = True
+        stale, inserted = chosen, place[chosen, poi]
+
+
+@njit(cache=True)
+def straighten(order, length, base, fuel, time, first, last, hops, capacity, limit, weights, survival, scratch, spare,
+               sums, stop):
+    """Reverse parts of a route and move up to three POIs of it, in place, as long as that gains value or time.
+
+    On a long route only such changes are tried as are quicker without refuels. Ends early, with a route that is as
+    good as before or better, once ``stop`` is not 0.
+    """
+    now = route_time(order, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
+    earned = worth(order, length, weights, survival) if survival < 1.0 else 0.0
+    refuels = last[base, base] > first[base, base]
+    ahead, back = sums[0], sums[1]
+    _sums(order, length, base, time, ahead, back)
+    improved = True
+    while improved and not look(stop):
+        improved = False
+        for i in range(length):
+            for j in range(i + 1, length):
+                before = base if i == 0 else order[i - 1]
+                after = base if j == length - 1 else order[j + 1]
+                change = time[before, order[j]] + back[j + 1] - back[i + 1] + time[order[i], after] \
+                    - (ahead[j + 2] - ahead[i])
+                if change >= -_EPSILON and survival == 1.0 and (length > _SHORT or not refuels):
+                    continue
+                spare[:length] = order[:length]
+                for k in range(i, j + 1):
+                    spare[k] = order[i + j - k]
+                later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
+                gain = worth(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
+                if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
+                    order[:length] = spare[:length]
+                    _sums(order, length, base, time, ahead, back)
+                    now, earned, improved = later, earned + gain, True
+        for size in range(1, 4):
+            for i in range(length - size + 1):
+                for position in range(length + 1):
+                    if i <= position <= i + size:
+                        continue
+                    before = base if i == 0 else order[i - 1]
+                    after = base if i + size == length else order[i + size]
+                    without = ahead[i + size + 1] - ahead[i] - (time[before, after] if before != after else 0.0)
+                    a = base if position == 0 else order[position - 1]
+                    b = base if position == length else order[position]
+                    for way in range(2 if size > 1 else 1):
+                        if way == 0:
+                            change = time[a, order[i]] + ahead[i + size] - ahead[i + 1] + time[order[i + size - 1], b]
+                        else:
+                            change = time[a, order[i + size - 1]] + back[i + size] - back[i + 1] + time[order[i], b]
+                        change -= without + time[a, b]
+                        if change >= -_EPSILON and survival == 1.0 and (length > _SHORT or not refuels):
+                            continue
+                        _move(order, length, i, size, position, way, spare)
+                        later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit,
+                                           scratch)
+                        gain = worth(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
+                        if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
+                            order[:length] = spare[:length]
+                            _sums(order, length, base, time, ahead, back)
+                            now, earned, improved = later, earned + gain, True
+                            break
+
+
+@njit(cache=True)
+def _sums(order, length, base, time, ahead, back):
+    """Driving time up to each stop, and of the same stretch backwards."""
+    ahead[0] = back[0] = 0.0
+    for k in range(length + 1):
+        a = base if k == 0 else order[k - 1]
+        b = base if k == length else order[k]
+        ahead[k + 1] = ahead[k] + time[a, b]
+        back[k + 1] = back[k] + time[b, a]
+
+
+@njit(cache=True)
+def _move(order, length, start, size, position, way, to):
+    """The order with a block moved before another position, reversed if ``way`` is 1."""
+    filled = 0
+    for k in range(length + 1):
+        if k == position:
+            for b in range(size):
+                to[filled] = order[start + b] if way == 0 else order[start + size - 1 - b]
+                filled += 1
+        if k < length and not start <= k < start + size:
+            to[filled] = order[k]
+            filled += 1
+
+
+@njit(cache=True)
+def _keep(order, length, kind, pool, pool_length, pool_kind, size, table, keys, ordered):
+    """Put a route into the pool unless it is there or the pool is full; the size of the pool."""
+    if length == 0 or size == len(pool):
+        return size
+    code = np.uint64(kind + 1) * np.uint64(0x9E3779B97F4A7C15)
+    for k in range(length):
+        code += keys[order[k]] * np.uint64(k + 1) if ordered else keys[order[k]]
+    code ^= code >> np.uint64(29)
+    slot = np.int64(code % np.uint64(len(table)))
+    while table[slot] >= 0:
+        other = table[slot]
+        if pool_length[other] == length and pool_kind[other] == kind and \
+                _same(pool[other], order, length, ordered):
+            return size
+        slot = (slot + 1) % len(table)
+    table[slot] = size
+    pool[size, :length] = order[:length]
+    pool_length[size], pool_kind[size] = length, kind
+    return size + 1
+
+
+@njit(cache=True)
+def _same(one, other, length, ordered):
+    if ordered:
+        for k in range(length):  # noqa: SIM110 - all() takes seconds to compile
+            if one[k] != other[k]:
+                return False
+        return True
+    for k in range(length):
+        there = False
+        for i in range(length):
+            if one[k] == other[i]:
+                there = True
+                break
+        if not there:
+            return False
+    return True

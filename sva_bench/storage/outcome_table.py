@@ -1,0 +1,38 @@
+"""Outcomes as a table: the same rows and columns in the folder of a run and in the shards of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.outcome import ENDS
+from sva_bench.storage.tables import OUTCOMES
+
+
+def outcome_table(run: Executed, robots: Sequence[str], settings: Settings) -> pa.Table:
+    """One row per trial and robot, trial by trial."""
+    trials, count = run.incentive.shape
+    return pa.table({
+        "scenario": constant(run.case.scenario.name, trials * count),
+        "planner": constant(run.case.planner, trials * count),
+        "trial": np.repeat(settings.first + np.arange(trials), count), "rollout": np.repeat(run.rollout, count),
+        "robot": _words(np.tile(np.arange(count, dtype=np.int32), trials), robots),
+        "available": run.available.ravel(), "incentive": run.incentive.ravel(),
+        "pois_reached": run.pois_reached.ravel(), "stops_reached": run.stops_reached.ravel(),
+        "end": _words(run.end.ravel().astype(np.int8), ENDS), "end_time_s": run.end_time_s.ravel(),
+        "fuel_used_s": run.fuel_used_s.ravel(), "fidelity": constant(settings.fidelity, trials * count),
+    }).cast(OUTCOMES)
+
+
+def constant(word: str, rows: int) -> pa.Array:
+    """A column that holds one word."""
+    return _words(np.zeros(rows, dtype=np.int8), [word])
+
+
+def _words(codes: np.ndarray[Any, Any], words: Sequence[str]) -> pa.Array:
+    """Words by their numbers, spelt out by Arrow, which is quick at it."""
+    return pa.DictionaryArray.from_arrays(pa.array(codes), pa.array(list(words))).cast(pa.string())

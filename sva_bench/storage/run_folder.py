@@ -1,0 +1,147 @@
+"""Run folders: manifest, tables, plans, summary. Written under a temporary name and renamed when complete."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import platform
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from sva_bench import __version__
+from sva_bench.execution.execute import Executed, Settings
+from sva_bench.files.atomic import draft_folder, remove_left_behind
+from sva_bench.files.documents import pretty_json
+from sva_bench.storage.outcome_table import outcome_table
+from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import MapSource
+
+PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
+
+
+_RUN_NAME = re.compile(r".+-seed\d+-[0-9a-f]{8}")
+
+
+def run_name(world: str, seed: int, identity: Mapping[str, Any]) -> str:
+    """Name of a run folder: equal runs get equal names.
+
+    Args:
+        world: The world's name.
+        seed: The seed.
+        identity: Everything that the results depend on: the resolved world, and the options that change results.
+    """
+    text = json.dumps({"version": __version__, "seed": seed, **identity}, sort_keys=True)
+    return f"{world}-seed{seed}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+
+@contextlib.contextmanager
+def run_folder(out: Path, name: str) -> Iterator[Path]:
+    """A folder that appears as ``out / name`` only when it is complete; it replaces an older one in one step.
+
+    Raises:
+        BadInput: If ``out`` cannot be written to.
+    """
+    tidy(out)
+    with draft_folder(out / name, "choose another with --out") as draft:
+        yield draft
+
+
+def tidy(out: Path) -> None:
+    """Remove what killed runs left unfinished, and put back an older run that one had moved away."""
+    remove_left_behind(out, lambda left: _RUN_NAME.fullmatch(left) is not None)
+
+
+def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
+    """Name of a plan's files under a scenario, which no other plan of the run has.
+
+    Names of ours have no ``+`` in them, and no planner's is the end of another's; plans from elsewhere may be called
+    anything.
+
+    Args:
+        scenario: The scenario's name.
+        planner: The planner's, or that of a plan from elsewhere.
+        foreign: Whether the plan is from elsewhere.
+    """
+    return f"{scenario}{'+' if foreign else '-'}{planner}"
+
+
+def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
+             seconds: Mapping[str, float]) -> dict[str, Any]:
+    """What was run, with what, where and how long: the only place for wall-clock times."""
+    return {
+        "format": "sva-bench/manifest@1", "version": __version__, "seed": seed, "options": dict(options),
+        "command": ["sva-bench", *sys.argv[1:]], "started": started,
+        "seconds": {phase: round(taken, 3) for phase, taken in seconds.items()},
+        "machine": {"platform": platform.platform(), "python": platform.python_version(),
+                    "cpus": len(os.sched_getaffinity(0))},
+        "packages": {name: version(name) for name in PACKAGES}, "world": dict(world),
+    }
+
+
+def write_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a JSON file that a person can read."""
+    # A name that is no UTF-8 becomes an escape as JSON has it.
+    path.write_bytes(pretty_json(dict(data)).encode("utf-8", "backslashreplace"))
+
+
+def write_map(folder: Path, source: MapSource) -> None:
+    """Write the files that the world's map was read from, as ``map/`` and the names that the world has for them."""
+    for file in source.files:
+        path = folder / MAP / file.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(file.content)
+
+
+def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
+    """Write ``travel_times.parquet``: a row per robot model and directed pair."""
+    rows: dict[str, list[Any]] = {key: [] for key in ("origin", "destination", "model", "raw_s", "repaired_s", "via")}
+    for cost in costs:
+        sites = cost.times.sites
+        for i, origin in enumerate(sites):
+            for j, destination in enumerate(sites):
+                if i == j:
+                    continue
+                rows["origin"].append(origin)
+                rows["destination"].append(destination)
+                rows["model"].append(cost.times.model.name)
+                rows["raw_s"].append(int(cost.times.time_ms[i, j]) / 1000)
+                rows["repaired_s"].append(int(cost.repaired_ms[i, j]) / 1000)
+                rows["via"].append(sites[int(cost.via[i, j])])
+    write_table(path, TRAVEL_TIMES, [pa.table(rows, schema=TRAVEL_TIMES)])
+
+
+MAP = "map"
+"""Folder in a run folder that holds the files that the world's map was read from, under their names there."""
+
+LEG_COLUMNS = tuple(LEGS.names)
+
+
+def leg_columns(executed: Sequence[Executed]) -> dict[str, list[Any]]:
+    """A row per leg that was driven."""
+    rows: dict[str, list[Any]] = {key: [] for key in LEG_COLUMNS}
+    for run in executed:
+        for leg in run.legs:
+            rows["scenario"].append(run.case.scenario.name)
+            rows["planner"].append(run.case.planner)
+            for key in LEG_COLUMNS[2:]:
+                rows[key].append(getattr(leg, key))
+    return rows
+
+
+def write_legs(path: Path, rows: Mapping[str, Sequence[Any]]) -> None:
+    """Write ``legs.parquet``."""
+    write_table(path, LEGS, [pa.table(dict(rows), schema=LEGS)])
+
+
+def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[str], settings: Settings) -> None:
+    """Write ``outcomes.parquet``: a row per scenario, plan, trial and robot."""
+    write_table(path, OUTCOMES, (outcome_table(run, robots, settings) for run in executed))

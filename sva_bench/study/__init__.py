@@ -1,0 +1,1 @@
+"""Stages put together: from a world to its summary."""

@@ -1,0 +1,60 @@
+"""Pictures of worlds: what is to be seen is planned here, and drawn by ``analysis.drawing``."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from sva_bench.mission.plan import Plan
+from sva_bench.report.drawing import Kind, Leg, Overlays, draw_world
+from sva_bench.study.planning import Progress, plan_costs, read_plans
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.travel.roadmap import roadmap_edges
+from sva_bench.world.model import World
+
+
+def picture_of(
+    world: World, kind: Kind, *, roadmap: bool, paths: bool, plan: Path | None, progress: Progress,
+) -> bytes:
+    """A picture of a world, with what is planned in it on request.
+
+    Args:
+        world: The world.
+        kind: ``png`` or ``svg``.
+        roadmap, paths: Whether to show them; those of the widest robot where there are several models.
+        plan: A plan file whose routes to show; one that breaks fuel or limit is shown too, with a warning.
+        progress: Told how far it is.
+
+    Raises:
+        BadFile, InfeasiblePlan: If the plan can't be read, or not be driven whatever the fuel.
+        UnreachableSite: If something planned is asked for, and a site can't be reached.
+    """
+    if not (roadmap or paths or plan):
+        return draw_world(world, kind, Overlays())
+    costs = plan_costs(world, "prmstar", progress)
+    widest = max((cost.times for cost in costs.values()), key=lambda times: times.model.radius_m)
+    edges = None
+    if roadmap:
+        points = np.array([(site.x_m, site.y_m) for site in world.sites])
+        edges = roadmap_edges(world.obstacles, points, widest.clearance_m)
+    ways = [path for i, row in enumerate(widest.paths) for path in row[i + 1:] if path is not None] if paths else []
+    routes: dict[str, list[Leg]] = {}
+    if plan is not None:
+        (read,) = read_plans(world, costs, {plan.stem: plan}, allow_infeasible=True).values()
+        routes = routes_of(world, costs, read)
+    return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(ways), routes=routes))
+
+
+def routes_of(world: World, costs: Mapping[str, FuelCosts], plan: Plan) -> dict[str, list[Leg]]:
+    """The legs of each robot's route, along the chains of paths that they stand for."""
+    routes = {}
+    for robot in world.robots:
+        cost = costs[robot.model.name]
+        routes[robot.name] = [
+            Leg(destination=end, path=np.concatenate([
+                cost.times.path(a, b) for a, b in itertools.pairwise(cost.chain(start, end))]))
+            for start, end in itertools.pairwise(plan.route(robot.name))]
+    return routes

@@ -1,0 +1,108 @@
+"""A worker process whose crash, hang or death is an answer like any other."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import time
+from multiprocessing.connection import Connection
+
+from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.safe_path import environment_of_children
+from sva_bench.workers.answers import Answer, Caps, Failed
+
+_START_S = 300.0
+"""A worker that takes longer to load its libraries is taken for hung; a busy machine needs half a minute."""
+
+_HINTS = {"SIGKILL": ", sent by somebody, or for want of memory", "SIGABRT": ", raised by a library, perhaps for want "
+          "of memory"}
+
+
+class GuardedWorker:
+    """One process, one job at a time.
+
+    Not of ``multiprocessing``: a worker of Dask may have no children of that kind.
+    """
+
+    def __init__(self, caps: Caps) -> None:
+        self.caps = caps
+        ours, theirs = socket.socketpair()
+        environment = environment_of_children() | dict.fromkeys(
+            ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+        with theirs, holding_back_ctrl_c():  # it inherits the mask for good: Ctrl-C is the parent's to handle
+            # Libraries print to standard output, which is ours.
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "sva_bench.workers.far_end", str(theirs.fileno()), str(os.getpid()),
+                 str(caps.memory_mb)],
+                pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL, env=environment)
+        self.connection = Connection(ours.detach())
+        self.ready = False
+        self._due = time.monotonic() + _START_S
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._process.pid
+
+    def ask(self, content: bytes) -> Answer:
+        """Give it a job, pickled, and wait for the answer."""
+        if self.ready:
+            self.give(content)
+        while True:
+            if not self.connection.poll(max(self.left_s(), 0.0)):
+                return self.overdue()
+            answer = self.take()
+            if answer is not None:
+                return answer
+            self.give(content)
+
+    def give(self, content: bytes) -> None:
+        """Give it a job, pickled; it must be ready and idle. If it died meanwhile, ``take`` says so."""
+        self._due = time.monotonic() + self.caps.time_s
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            self.connection.send_bytes(content)
+
+    def left_s(self) -> float:
+        """Time until its job or its start is overdue."""
+        return self._due - time.monotonic()
+
+    def take(self) -> Answer | None:
+        """What it has to say; ``None`` if that is only that it is ready. To be called when there is something."""
+        try:
+            content = self.connection.recv_bytes()
+        except (EOFError, OSError):
+            return Failed(reason=self._death())
+        if not self.ready:
+            self.ready = True
+            return None
+        answer: Answer = pickle.loads(content)  # from our own child, by a pipe that nobody else holds
+        return answer
+
+    def overdue(self) -> Failed:
+        """End it, since its time is over."""
+        self.close()
+        if not self.ready:
+            return Failed(reason=f"the worker process didn't start within {_START_S:g} s")
+        return Failed(reason=f"it took longer than {self.caps.time_s:g} s; give it more with --unit-time-limit")
+
+    def close(self) -> None:
+        """End it."""
+        self._process.kill()
+        self._process.wait()
+        self.connection.close()
+
+    def _death(self) -> str:
+        try:
+            status = self._process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            return "the worker process closed its line"
+        if status < 0:
+            name = signal.Signals(-status).name if -status in set(signal.Signals) else str(-status)
+            return f"the worker process crashed: {name}{_HINTS.get(name, '')}"
+        return f"the worker process ended with status {status}"

@@ -1,0 +1,97 @@
+"""Where jobs run: processes of this machine."""
+
+from __future__ import annotations
+
+import pickle
+from collections import deque
+from collections.abc import Sequence
+from multiprocessing.connection import wait
+from typing import Protocol
+
+from sva_bench.batch.jobs import Job
+from sva_bench.workers.answers import Answer, Caps, Failed
+from sva_bench.workers.guarded import GuardedWorker
+
+
+class Engine(Protocol):
+    """Takes jobs and gives answers, in any order; every job is answered."""
+
+    @property
+    def slots(self) -> int:
+        """How many jobs it wants at a time."""
+
+    def submit(self, key: str, job: Job) -> None:
+        """Take a job."""
+
+    def answers(self, timeout_s: float) -> Sequence[tuple[str, Answer]]:
+        """Wait for answers; what there is after so long."""
+
+    def close(self) -> None:
+        """Drop what is in flight."""
+
+
+class LocalProcesses:
+    """Guarded workers of this machine."""
+
+    def __init__(self, count: int, caps: Caps) -> None:
+        self._caps = caps
+        self._workers = [GuardedWorker(caps) for _ in range(count)]
+        self._at: dict[GuardedWorker, str] = {}
+        self._waiting: deque[tuple[str, Job]] = deque()
+
+    @property
+    def slots(self) -> int:
+        """As many as there are workers."""
+        return len(self._workers)
+
+    @property
+    def pids(self) -> list[int]:
+        """Process ids of the workers."""
+        return [worker.pid for worker in self._workers]
+
+    def submit(self, key: str, job: Job) -> None:
+        """Give the job to an idle worker, or to the next that becomes idle."""
+        self._waiting.append((key, job))
+        self._hand_out()
+
+    def answers(self, timeout_s: float) -> list[tuple[str, Answer]]:
+        """Wait for workers to answer, die or be overdue."""
+        busy = [worker for worker in self._workers if worker in self._at or not worker.ready]
+        until = min([timeout_s, *(max(worker.left_s(), 0.0) for worker in busy)])
+        heard = set(wait([worker.connection for worker in self._workers], until))
+        found: list[tuple[str, Answer]] = []
+        for worker in list(self._workers):
+            if worker.connection in heard:
+                answer = worker.take()
+            elif worker in busy and worker.left_s() <= 0:
+                answer = worker.overdue()
+            else:
+                continue
+            if answer is None:
+                continue
+            job = self._at.pop(worker, None)
+            if isinstance(answer, Failed) and not answer.mendable:
+                self._replace(worker)
+                if not worker.ready and job is None and self._waiting:
+                    job = self._waiting.popleft()[0]  # else workers that can't start would be started for ever
+            if job is not None:
+                found.append((job, answer))
+        self._hand_out()
+        return found
+
+    def close(self) -> None:
+        """End all workers."""
+        for worker in self._workers:
+            worker.close()
+
+    def _replace(self, worker: GuardedWorker) -> None:
+        worker.close()
+        self._workers[self._workers.index(worker)] = GuardedWorker(self._caps)
+
+    def _hand_out(self) -> None:
+        idle = [worker for worker in self._workers if worker.ready and worker not in self._at]
+        for worker, _ in zip(idle, list(self._waiting), strict=False):
+            key, job = self._waiting.popleft()
+            self._at[worker] = key
+            # Pickled, both ways: a pipe between this process and its own child, which nobody else can write to.
+            worker.give(pickle.dumps(job, protocol=5))

@@ -1,0 +1,75 @@
+"""Worlds with other values at some of their keys, and what those values make wrong, said of whoever asked for them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from sva_bench.errors import BadFile, SvaBenchError
+from sva_bench.files.documents import Document, Loc
+from sva_bench.world.load import world_of
+from sva_bench.world.model import World
+
+Blame = Callable[[str, str], SvaBenchError]
+"""Makes an error of a key that was asked for and what is wrong with it."""
+
+_NAMED: dict[Loc, str] = {("robots",): "robot", ("sites", "stations"): "station", ("sites", "pois"): "POI",
+                          ("scenarios",): "scenario"}
+"""Sections whose keys are names that the file gives: to set something of one, it has to be there."""
+
+
+def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> World:
+    """The world of a file with other values at some dotted keys.
+
+    Args:
+        document: The world file.
+        values: The values by key.
+        blame: Makes the error where one of them is wrong.
+
+    Raises:
+        BadFile: If the file is wrong by itself.
+        SvaBenchError: As ``blame`` makes it.
+    """
+    changed = document
+    for key, value in values.items():
+        try:
+            changed = changed.changed(key, value, _NAMED)
+        except BadFile as error:
+            raise blame(key, f"{error.problem.removeprefix(f'{key}: ')} (in {document.path})") from None
+    try:
+        return world_of(changed)
+    except BadFile as error:
+        if not values:
+            raise
+        world_of(document)  # what is wrong without them is said of the file
+        key = _at_fault(document, values, error)
+        where = "" if error.key == _as_in_messages(key) else f"{error.key}: "
+        raise blame(key, f"{where}{error.problem} (in {document.path})") from None
+
+
+def _at_fault(document: Document, values: Mapping[str, Any], error: BadFile) -> str:
+    """Which of the values an error comes from: one that is about the same key, else one that is wrong alone."""
+    for key in values:
+        told = _as_in_messages(key)
+        if any(longer == shorter or longer.startswith((f"{shorter}.", f"{shorter}["))
+               for longer, shorter in ((error.key, told), (told, error.key))):
+            return key
+    for key, value in values.items():
+        try:
+            world_of(document.changed(key, value))
+        except BadFile:
+            return key
+    return list(values)[-1]
+
+
+def _as_in_messages(key: str) -> str:
+    """``obstacles.2.radius_m`` as ``obstacles[2].radius_m``."""
+    words = key.split(".")
+    return words[0] + "".join(f"[{word}]" if word.isdecimal() else f".{word}" for word in words[1:])
+
+
+def option_of(key: str, values: Mapping[str, Any]) -> str:
+    """A value as the command line asks for it."""
+    word = json.dumps(values[key])
+    return f"--set {key}={word if len(word) <= 60 else word[:57] + '...'}"
