@@ -19,6 +19,7 @@ import numpy as np
 from sva_bench.analysis.figures import difference_figure, end_figures, value_figure
 from sva_bench.analysis.statistics import Estimate, controlled, estimate
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import ENDS, End, FailureProcess
 from sva_bench.execution.execute import (
     Case,
     Drives,
@@ -27,11 +28,12 @@ from sva_bench.execution.execute import (
     drives_ahead,
     settle_trials,
 )
-from sva_bench.execution.outcome import ENDS, Assignment, End, settle
-from sva_bench.mission.failures import NEVER, FailureProcess
+from sva_bench.execution.outcome import Assignment, settle
+from sva_bench.mission.certify import expected_value
+from sva_bench.mission.failures import NEVER
 from sva_bench.mission.plan import Route
-from sva_bench.study.planning import Options, plan_costs, plan_scenarios
-from sva_bench.study.summing import expected_value
+from sva_bench.study.options import Options
+from sva_bench.study.planning import plan_costs, plan_scenarios
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World
 

@@ -19,11 +19,12 @@ from sva_bench.arrays import FloatArray
 from sva_bench.execution.execute import DriveTask, drive_route
 from sva_bench.geometry.buckets import open_heading
 from sva_bench.geometry.cells import Cells, bounds_of, boxes_of, connected_region, distance_field
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.travel.fuel import fuel_costs
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.maps.ros import read_ros_map
-from sva_bench.world.model import Noise, Obstacles, Site, World
+from sva_bench.world.model import Noise, Site, World
 
 CELL_M, ROOM, DOOR = 0.05, 100, 24  # cells: rooms of 5 m with doors of 1.2 m
 SITES, RUNS = 25, 3

@@ -11,14 +11,15 @@ from typing import get_args
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.travel.roadmap import PlannerName, plan_paths
+from sva_bench.choices import PathPlanner
+from sva_bench.travel.roadmap import plan_paths
 from tests.oracles.visibility import shortest_lengths
 from tests.oracles.worlds import free_places, random_obstacles
 
 WORLDS, SITES, CLEARANCE_M = (2, 3, 5, 7, 11, 13), 12, 0.297
 
 
-def measure(planner: PlannerName) -> tuple[float, FloatArray, int]:
+def measure(planner: PathPlanner) -> tuple[float, FloatArray, int]:
     """Processor time of a world [s], the ratios of all its paths to the optimum, and the pairs that it missed."""
     taken, missed, ratios = 0.0, 0, []
     for seed in WORLDS:
@@ -41,7 +42,7 @@ def main() -> None:
     """Print a row for each planner."""
     plan_paths(random_obstacles(0), free_places(random_obstacles(0), 0, 3, CLEARANCE_M), CLEARANCE_M)  # compiles
     print(f"{SITES} sites among 26 obstacles, {len(WORLDS)} worlds; ratio of a path's length to the optimum")
-    for planner in get_args(PlannerName):
+    for planner in get_args(PathPlanner):
         taken, ratios, missed = measure(planner)
         print(f"{planner:16} {taken:6.2f} s a world, mean {ratios.mean():.4f}, worst {ratios.max():.3f}, "
               f"{missed} pairs missed", flush=True)

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from sva_bench.execution.outcome import Assignment, Driven, Trace, settle, trace_of
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.recording.rerun import record
 from sva_bench.robot.model import BUILT_IN
-from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, Site, World
+from sva_bench.world.model import Noise, Robot, Scenario, Site, World
 
 ROBOTS, POIS, LEG_S, MISSION_S, POSES_HZ = 4, 40, 60.0, 600.0, 20
 SPEED_M_S, SIDE_M = 0.5, 40.0

@@ -12,10 +12,11 @@ import numpy as np
 
 from sva_bench.geometry.buckets import open_heading
 from sva_bench.geometry.distances import clearance
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.travel.fuel import fuel_costs
 from sva_bench.travel.times import plan_travel_times
-from sva_bench.world.model import Noise, Obstacles, Site, World
+from sva_bench.world.model import Noise, Site, World
 
 SITES, OBSTACLES, RUNS = 25, 30, 5
 

@@ -9,7 +9,7 @@ import pytest
 
 from sva_bench.analysis.precision import Precision
 from sva_bench.errors import BadInput
-from sva_bench.study.planning import Options
+from sva_bench.study.options import Options
 from sva_bench.study.run import measure
 from sva_bench.world.model import World
 from tests.worlds_for_tests import SMALL, world_of

@@ -17,8 +17,8 @@ from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.documents import read_json
 from sva_bench.files.patterns import MOST_LOOKED_AT, matching
 from sva_bench.files.read_back import MOST_BYTES
-from sva_bench.mission.instance import MOST_SITES, MOST_VEHICLES, read_instance
-from sva_bench.mission.plan import MOST_STOPS, read_plan
+from sva_bench.mission.instance_file import MOST_SITES, MOST_VEHICLES, read_instance
+from sva_bench.mission.plan_file import MOST_STOPS, read_plan
 from sva_bench.storage.tables import LEGS, OUTCOMES, pieces_of, write_table
 from tests.worlds_for_tests import SMALL
 

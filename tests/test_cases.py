@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from sva_bench.mission.certify import certify
-from sva_bench.mission.instance import read_instance
-from sva_bench.mission.plan import read_plan
+from sva_bench.mission.instance_file import read_instance
+from sva_bench.mission.plan_file import read_plan
 from sva_bench.solver.risk import RiskMeasure
 from tests.solver.oracle import risk_optimum
 from tests.test_cli import sva_bench

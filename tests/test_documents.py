@@ -12,20 +12,11 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 from sva_bench.errors import BadFile, ExitCode, nearest
-from sva_bench.files.documents import (
-    MAX_YAML_BYTES,
-    Bounded,
-    Loc,
-    Name,
-    Section,
-    dotted,
-    parse_yaml,
-    pretty_json,
-    pretty_yaml,
-    read_json,
-    read_yaml,
-    validate,
-)
+from sva_bench.files.complaints import dotted
+from sva_bench.files.documents import MAX_YAML_BYTES, Loc, parse_yaml, read_json, read_yaml, validate
+from sva_bench.files.fields import Bounded, Name, Section
+from sva_bench.files.pretty import pretty_json
+from sva_bench.files.yaml_text import pretty_yaml
 from tests.worlds_for_tests import SMALL, world_of
 
 

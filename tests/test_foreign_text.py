@@ -19,8 +19,8 @@ from sva_bench.__main__ import run_command_line
 from sva_bench.cli.terminal import results, set_up_logging
 from sva_bench.errors import BadFile
 from sva_bench.files.printable import is_text, printable
-from sva_bench.mission.instance import read_instance
-from sva_bench.mission.plan import read_plan
+from sva_bench.mission.instance_file import read_instance
+from sva_bench.mission.plan_file import read_plan
 from sva_bench.report.charts import boxes_of
 from sva_bench.report.page import text as text_of_a_page
 from tests.test_bounds import TINY

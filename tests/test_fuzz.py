@@ -27,8 +27,9 @@ from ruamel.yaml import YAML
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import SvaBenchError
 from sva_bench.mission.certify import certify
-from sva_bench.mission.instance import Instance, instance_as_dict, instance_text, read_instance
-from sva_bench.mission.plan import plan_as_dict, read_plan
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.instance_file import instance_as_dict, instance_text, read_instance
+from sva_bench.mission.plan_file import plan_as_dict, read_plan
 from sva_bench.solver.two_stage import SolveLimits, plan_stochastic
 from sva_bench.world.load import load_world, world_as_dict
 from tests.worlds_for_tests import SMALL

@@ -13,7 +13,7 @@ from sva_bench.batch.estimates import estimates
 from sva_bench.batch.folder import begin, settings_in
 from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
-from sva_bench.cli.options import Planner
+from sva_bench.choices import PathPlanner
 from sva_bench.errors import BadFile, BadInput
 from tests.test_cli import sva_bench
 from tests.worlds_for_tests import SMALL
@@ -172,9 +172,9 @@ def test_what_is_no_seed_is_said_of_the_line(written: str, tmp_path: Path) -> No
 
 
 def test_batches_offer_the_planners_and_failures_of_runs(tmp_path: Path) -> None:
-    grid = grid_of(Sweep(worlds=(world(tmp_path),), planners=planners_of(get_args(Planner)), plan_failure="per_leg",
+    grid = grid_of(Sweep(worlds=(world(tmp_path),), planners=planners_of(get_args(PathPlanner)), plan_failure="per_leg",
                          execute_failure="mission", evpi=True))
-    assert {point.planner for point in grid.points} == set(get_args(Planner))
+    assert {point.planner for point in grid.points} == set(get_args(PathPlanner))
     assert {(point.world.plan_failure, point.world.execute_failure) for point in grid.points} == {
         ("per_leg", "mission")}
     assert grid.options.evpi

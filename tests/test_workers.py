@@ -29,7 +29,7 @@ def interrupted(*arguments):
 if __name__ == "__main__":
     ProcessPoolExecutor.submit = interrupted
     try:
-        with local_workers(2):
+        with local_workers(2, "sva_bench.execution.execute"):
             print("lost")
     except KeyboardInterrupt:
         print("caught", len(multiprocessing.active_children()))
@@ -42,7 +42,7 @@ def test_ctrl_c_while_workers_start_is_not_lost_and_ends_them() -> None:
 
 
 def asked_of_a_worker(function: Callable[..., Any], argument: Any) -> None:
-    with local_workers(2) as executor:
+    with local_workers(2, "sva_bench.execution.execute") as executor:
         assert executor is not None
         executor.submit(function, argument).result()
 
@@ -61,7 +61,7 @@ def test_a_worker_without_memory_is_told_of_with_what_to_change() -> None:
 HELPED = """
 from sva_bench.workers.pool import local_workers
 if __name__ == "__main__":
-    with local_workers(2) as executor:
+    with local_workers(2, "sva_bench.execution.execute") as executor:
         print(executor.submit(abs, -1).result())
 """
 

@@ -11,24 +11,27 @@ import numpy as np
 import pytest
 
 from sva_bench.__main__ import run_command_line
+from sva_bench.choices import WorldFamily
 from sva_bench.errors import BadInput
 from sva_bench.files.documents import parse_yaml
 from sva_bench.generate.mission import SCENARIOS, propose_mission
-from sva_bench.generate.terrain import Family, random_places
+from sva_bench.generate.terrain import random_places
 from sva_bench.generate.worlds import random_world
+from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.mission.certify import expected_value
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.two_stage import knowledge_of, plan_nominal
-from sva_bench.study.planning import Options, instance_of, plan_costs, plan_scenarios
-from sva_bench.study.summing import expected_value
+from sva_bench.study.options import Options
+from sva_bench.study.planning import instance_of, plan_costs, plan_scenarios
 from sva_bench.world.load import world_of
-from sva_bench.world.model import Obstacles, Site, World
+from sva_bench.world.model import Site, World
 from tests.test_cli import sva_bench
 
-FAMILIES: tuple[Family, ...] = get_args(Family)
+FAMILIES: tuple[WorldFamily, ...] = get_args(WorldFamily)
 
 
-def text_of(family: Family, seed: int, *, size_m: float = 12, pois: int = 6, stations: int = 2, robots: int = 2,
+def text_of(family: WorldFamily, seed: int, *, size_m: float = 12, pois: int = 6, stations: int = 2, robots: int = 2,
             density: float | None = None) -> str:
     return random_world(family, size_m=size_m, density=density, pois=pois, stations=stations, robots=robots, seed=seed,
                         progress=lambda *_: None)
@@ -156,7 +159,7 @@ def test_what_does_not_fit_gives_one_clear_message_and_no_file(
 @pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("seed", range(8))
-def test_random_worlds_of_all_families_are_good_missions(family: Family, seed: int) -> None:
+def test_random_worlds_of_all_families_are_good_missions(family: WorldFamily, seed: int) -> None:
     size, pois, stations, robots = [(10, 6, 2, 2), (18, 10, 5, 2), (14, 8, 0, 3), (30, 12, 5, 3)][seed % 4]
     world = resolved(text_of(family, seed, size_m=size, pois=pois, stations=stations, robots=robots))
     check_that_it_is_a_good_mission(world)
@@ -164,7 +167,7 @@ def test_random_worlds_of_all_families_are_good_missions(family: Family, seed: i
 
 @pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
-def test_random_worlds_run(family: Family, tmp_path: Path) -> None:
+def test_random_worlds_run(family: WorldFamily, tmp_path: Path) -> None:
     (tmp_path / "w.yaml").write_text(text_of(family, 5))
     done = sva_bench("run", "w.yaml", "--fidelity", "kinematic", "--trials", 100, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -12,7 +12,8 @@ from statistics import median
 
 import numpy as np
 
-from sva_bench.generate.instances import Family, random_instance
+from sva_bench.choices import InstanceFamily
+from sva_bench.generate.instances import random_instance
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.routes.fronts import tables_of
 from sva_bench.solver.routes.heuristic import search
@@ -24,7 +25,7 @@ class Case:
     """One class: what is to be reached, by when."""
 
     name: str
-    family: Family
+    family: InstanceFamily
     pois: int
     vehicles: int
     limit_s: float

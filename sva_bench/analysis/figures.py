@@ -9,9 +9,9 @@ import numpy as np
 from sva_bench.analysis.moments import Bounds, Figure, figure_of
 from sva_bench.analysis.unseen import UNHAPPY, exposure_of
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Executed
 from sva_bench.execution.margins import Margins
-from sva_bench.execution.outcome import ENDS, End
 
 
 def value_figure(run: Executed, *, noisy: bool) -> Figure:

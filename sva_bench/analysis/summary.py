@@ -14,8 +14,8 @@ from sva_bench.analysis.moments import Figure
 from sva_bench.analysis.statistics import Estimate, controlled, distribution, estimate
 from sva_bench.analysis.unseen import UNHAPPY
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed
-from sva_bench.execution.outcome import ENDS
 from sva_bench.mission.plan import Plan
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.choices import End
 from sva_bench.execution.margins import Margins
-from sva_bench.execution.outcome import End
 from sva_bench.mission.instance import TOLERANCE_S
 
 UNHAPPY: tuple[End, ...] = ("out_of_fuel", "late", "stuck")

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sva_bench.batch.jobs import Job
 from sva_bench.errors import BadInput
 from sva_bench.files.codec import NotOfType, decoded, encoded
 from sva_bench.files.digest import code_digest
+from sva_bench.workers.engine import Job
 
 _HASH_BYTES = 32
 _MAX_BYTES = 1 << 30  # paths between 400 sites stay below

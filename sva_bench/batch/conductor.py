@@ -10,11 +10,11 @@ from typing import Any
 
 from sva_bench.batch.cache import Cache
 from sva_bench.batch.grid import Point
-from sva_bench.batch.jobs import Job, TrialsJob
+from sva_bench.batch.jobs import TrialsJob
 from sva_bench.batch.shards import Shard
 from sva_bench.batch.strands import Strand
 from sva_bench.workers.answers import Answer, Done
-from sva_bench.workers.local import Engine
+from sva_bench.workers.engine import Engine, Job
 
 ATTEMPTS = 3
 _TICK_S = 0.5

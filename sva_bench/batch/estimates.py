@@ -10,9 +10,10 @@ from pathlib import Path
 from sva_bench.batch.cache import Cache
 from sva_bench.batch.folder import units_in
 from sva_bench.batch.grid import Grid, Point
-from sva_bench.batch.jobs import DriveJob, Job, PlansJob, TravelTimesJob
+from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob
 from sva_bench.batch.strands import strand
-from sva_bench.study.planning import Progress
+from sva_bench.study.options import Progress
+from sva_bench.workers.engine import Job
 
 # Measured on a core of a shared virtual machine.
 _PATHS_S, _PLANS_S, _ROW_S = 5.0, 5.0, 1.5e-6

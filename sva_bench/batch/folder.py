@@ -15,7 +15,8 @@ from typing import Any
 from sva_bench.batch.schema import FailuresFile, ManifestFile, SettingsEntry
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.atomic import by_way_of, why
-from sva_bench.files.documents import pretty_json, read_json, validate
+from sva_bench.files.documents import read_json, validate
+from sva_bench.files.pretty import pretty_json
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 
 MANIFEST = "sva-bench/batch-manifest@1"
@@ -94,15 +95,6 @@ def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
             raise BadInput(f"the worlds and variants of this batch take {len(content)} bytes; at most {MOST_BYTES} are "
                            "kept in one folder: cut it into several batches")
         write(manifest, content)
-
-
-def is_batch(folder: Path) -> bool:
-    """Whether a folder is that of a batch, whole or not."""
-    try:
-        data = read_json(folder / "manifest.json", MOST_BYTES).data
-    except BadFile:
-        return next(folder.glob("outcomes-*.parquet"), None) is not None
-    return isinstance(data, dict) and str(data.get("format", "")).startswith("sva-bench/batch-manifest@")
 
 
 def settings_in(folder: Path) -> tuple[Part, SettingsEntry]:

@@ -13,7 +13,7 @@ from sva_bench.errors import BadInput
 from sva_bench.files.digest import digest
 from sva_bench.files.read_back import Part
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.study.planning import Options
+from sva_bench.study.options import Options
 from sva_bench.world.load import world_as_dict, world_of
 from sva_bench.world.model import World
 

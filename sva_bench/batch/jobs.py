@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.batch.shards import Facts, Shard, shard_of
+from sva_bench.choices import PathPlanner
 from sva_bench.execution.execute import (
     Case,
     DriveTask,
@@ -25,39 +26,11 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.robot.model import RobotModel
-from sva_bench.study.planning import Options, Planned, instance_of, plan_scenarios
+from sva_bench.study.options import Options
+from sva_bench.study.planning import Planned, instance_of, plan_scenarios
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.travel.roadmap import PlannerName
 from sva_bench.travel.times import TravelTimes, plan_travel_times
 from sva_bench.world.model import World
-
-
-class Job(Protocol):
-    """One piece of work.
-
-    Attributes:
-        kind: What sort of result it has.
-        kept: Whether its result goes into the cache.
-        result: Type of its result.
-    """
-
-    kind: ClassVar[str]
-    kept: ClassVar[bool]
-    result: ClassVar[Any]
-
-    @property
-    def key(self) -> str:
-        """Hash of all that the result depends on; equal jobs run once."""
-
-    @property
-    def what(self) -> str:
-        """For a person: what is being done."""
-
-    def run(self) -> Any:
-        """Do it."""
-
-    def fits(self, result: Any) -> bool:
-        """Whether a result of the right type can be this job's, and nothing that follows would trip over it."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,7 +42,7 @@ class TravelTimesJob:
     result: ClassVar[Any] = TravelTimes
     world: World
     model: RobotModel
-    planner: PlannerName
+    planner: PathPlanner
 
     @property
     def key(self) -> str:

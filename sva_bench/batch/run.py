@@ -27,9 +27,9 @@ from sva_bench.batch.folder import (
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.shards import Note, Shard, read_note, unit_of
 from sva_bench.batch.strands import Strand, strand
-from sva_bench.files.documents import pretty_json
-from sva_bench.report.run_page import write_batch_report
-from sva_bench.workers.local import Engine
+from sva_bench.files.pretty import pretty_json
+from sva_bench.report.batch_page import write_batch_report
+from sva_bench.workers.engine import Engine
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -7,11 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from sva_bench.analysis.unseen import UNHAPPY
-from sva_bench.execution.execute import Fidelity
-from sva_bench.execution.outcome import ENDS
-from sva_bench.files.documents import Name, Number, Section, WholeNumber
+from sva_bench.choices import ENDS, Fidelity, PathPlanner
+from sva_bench.files.fields import Name, Number, Section, WholeNumber
 from sva_bench.storage.results_schema import MOST_ROLLOUTS, MOST_TRIALS, Facts, Words
-from sva_bench.travel.roadmap import PlannerName
 
 MOST_SEED = 10**18 - 1
 """Seeds have a column of 64 bits in every table."""
@@ -35,7 +33,7 @@ class OptionsEntry(Section):
 
 class PointEntry(Section):
     variant: Words
-    planner: PlannerName
+    planner: PathPlanner
     world: dict[str, Any]
     files: dict[Words, Words] | None = None
 

@@ -17,8 +17,7 @@ from sva_bench.batch.schema import NoteFile
 from sva_bench.batch.tallies import Tally, tally_as_dict, tally_from, tally_of
 from sva_bench.errors import BadFile
 from sva_bench.execution.execute import Executed, Settings
-from sva_bench.files.complaints import first_complaint
-from sva_bench.files.documents import dotted
+from sva_bench.files.complaints import dotted, first_complaint
 from sva_bench.storage.outcome_table import constant, outcome_table
 from sva_bench.storage.tables import SHARDS, read_note_of, write_table
 from sva_bench.world.model import World

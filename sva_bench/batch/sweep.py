@@ -15,16 +15,16 @@ from pydantic import Field
 
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
 from sva_bench.batch.schema import Seed
-from sva_bench.cli.loading import adapted
-from sva_bench.cli.options import FailureProcess, Fidelity, Planner
+from sva_bench.choices import FailureProcess, Fidelity, PathPlanner
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.digest import digest
-from sva_bench.files.documents import Document, Loc, Name, Number, Section, parse_yaml, read_yaml, validate
+from sva_bench.files.documents import Document, Loc, parse_yaml, read_yaml, validate
+from sva_bench.files.fields import Name, Number, Section
 from sva_bench.files.patterns import has_pattern, matching
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.study.planning import Options, Progress
+from sva_bench.study.options import Options, Progress
 from sva_bench.world.model import World
-from sva_bench.world.variants import option_of, world_with
+from sva_bench.world.variants import adapted, option_of, world_with
 
 _log = logging.getLogger(__name__)
 
@@ -61,7 +61,7 @@ class Sweep:
     rollouts: int | None = None
     fidelity: Fidelity | None = None
     unit_trials: int | None = None
-    planners: tuple[Planner, ...] | None = None
+    planners: tuple[PathPlanner, ...] | None = None
     scenarios: tuple[str, ...] | None = None
     margin: float | None = None
     plan_failure: FailureProcess | None = None
@@ -88,7 +88,7 @@ class _SweepFile(Section):
     rollouts: int | None = Field(default=None, ge=1, le=100_000)
     fidelity: Fidelity | None = None
     unit_trials: int | None = Field(default=None, ge=1)
-    planners: list[Planner] | None = Field(default=None, min_length=1)
+    planners: list[PathPlanner] | None = Field(default=None, min_length=1)
     scenarios: list[Name] | None = Field(default=None, min_length=1)
     margin: Number | None = Field(default=None, ge=0, le=1)
     plan_failure: FailureProcess | None = None
@@ -164,9 +164,9 @@ def seeds_of(words: Sequence[str], what: str = "--seed ") -> tuple[int, ...]:
     return tuple(dict.fromkeys(seeds))
 
 
-def planners_of(words: Sequence[str]) -> tuple[Planner, ...]:
+def planners_of(words: Sequence[str]) -> tuple[PathPlanner, ...]:
     """Planners as told, each once."""
-    known = get_args(Planner)
+    known = get_args(PathPlanner)
     for word in words:
         if word not in known:
             raise BadInput(f"--planner {word}: there is no such planner; {nearest(word, list(known))}")

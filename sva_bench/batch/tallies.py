@@ -14,8 +14,8 @@ from sva_bench.analysis.statistics import estimate
 from sva_bench.analysis.summary import charges, plan_entry, scenario_entry
 from sva_bench.analysis.unseen import UNHAPPY
 from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed
-from sva_bench.execution.outcome import ENDS
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -9,6 +9,7 @@ import typer
 from rich.markup import escape
 
 from sva_bench import __version__
+from sva_bench.choices import PaperPart
 from sva_bench.cli.batch import batch_app
 from sva_bench.cli.libraries import load_libraries
 from sva_bench.cli.making import instance_app, world_app
@@ -20,7 +21,6 @@ from sva_bench.cli.options import (
     Gap,
     MarginOption,
     Out,
-    Part,
     PlanFailure,
     PlannerOption,
     Rollouts,
@@ -39,6 +39,9 @@ from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder, check_output, write_result
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.workers.pool import local_workers
+
+_PRELOAD = "sva_bench.execution.execute"
+"""What worker processes load while this one plans."""
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
@@ -102,14 +105,14 @@ def run(
     with holding_back_ctrl_c():
         from sva_bench.solver.two_stage import SolveLimits
         from sva_bench.storage.run_folder import tidy
-        from sva_bench.study.planning import Options
+        from sva_bench.study.options import Options
         from sva_bench.study.run import run as run_bench
 
     tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
                       assumptions=assumptions, precision=asked)
-    with about(world), progress_bars() as progress, local_workers(workers) as executor:
+    with about(world), progress_bars() as progress, local_workers(workers, _PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
     _show(result.summary, result.folder, as_json, csv=csv)
 
@@ -156,7 +159,8 @@ def execute(
     load_libraries()
     with holding_back_ctrl_c():
         from sva_bench.storage.run_folder import tidy
-        from sva_bench.study.planning import Options, plan_costs, read_plans
+        from sva_bench.study.options import Options
+        from sva_bench.study.planning import plan_costs, read_plans
         from sva_bench.study.run import execute_plans
 
     tidy(out)
@@ -164,7 +168,7 @@ def execute(
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
         read = read_plans(loaded, costs, named, allow_infeasible=allow_infeasible)
-        with local_workers(workers) as executor:
+        with local_workers(workers, _PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
     _show(result.summary, result.folder, as_json, csv=csv)
 
@@ -192,8 +196,9 @@ def view(
 
 @app.command(cls=PlainCommand)
 def reproduce(
-    part: Annotated[Part, typer.Argument(metavar="PART", help="rewards (Figure 4), simulation (Figures 7 and 8) or "
-                                         "runtimes (the tables of section 5.1).", show_default=False)],
+    part: Annotated[PaperPart, typer.Argument(
+        metavar="PART", show_default=False, help="rewards (Figure 4), simulation (Figures 7 and 8) or runtimes (the "
+                                                 "tables of section 5.1).")],
     worlds: Annotated[list[Path] | None, typer.Argument(metavar="[WORLD...]", help="simulation: the maps.",
                                                         show_default="the four shipped ones, in worlds/")] = None,
     trials: Trials = 1000,
@@ -228,7 +233,7 @@ def reproduce(
                               ("four-rooms", "open-field", "warehouse", "maze")]
             loaded = [load(path) for path in maps]
             settings = Settings(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity)
-            with local_workers(workers) as executor:
+            with local_workers(workers, _PRELOAD) as executor:
                 page = paper.simulation_page(paper.simulation(loaded, settings, executor, progress), settings)
     write_result(output, page)
 
@@ -241,7 +246,8 @@ def report(
 ) -> None:
     """Write the report of a finished run again, from its tables."""
     with holding_back_ctrl_c():
-        from sva_bench.storage.stored_run import report_again, write_csv
+        from sva_bench.storage.stored_run import write_csv
+        from sva_bench.study.publish import report_again
 
     set_up_logging(verbose)
     if folder.is_dir():  # else it is said what is missing

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 from rich.markup import escape
 
+from sva_bench.choices import Fidelity, PathPlanner
 from sva_bench.cli.libraries import load_libraries
 from sva_bench.cli.options import (
     AsJson,
     ExecuteFailure,
-    Fidelity,
     MarginOption,
     PlanFailure,
-    Planner,
     ScenarioNames,
     TimeLimit,
     Verbose,
@@ -32,7 +31,7 @@ from sva_bench.interrupts import holding_back_ctrl_c
 
 if TYPE_CHECKING:
     from sva_bench.batch.grid import Grid
-    from sva_bench.workers.local import Engine
+    from sva_bench.workers.engine import Engine
 
 
 batch_app = typer.Typer(cls=WorldsFirst, rich_markup_mode="rich",
@@ -63,8 +62,9 @@ def over(
     fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per route and "
                                                       "noise draw; or every trial in physics.",
                                                       show_default="rollout")] = None,
-    planner: Annotated[list[str] | None, typer.Option(metavar="|".join(get_args(Planner)), help="OMPL planner, as for "
-                                                      "run; may be repeated.", show_default="prmstar")] = None,
+    planner: Annotated[list[str] | None, typer.Option(
+        metavar="|".join(get_args(PathPlanner)), help="OMPL planner, as for run; may be repeated.",
+        show_default="prmstar")] = None,
     scenario: ScenarioNames = None,
     vary: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=V1,V2,...", help="Vary a key of the world "
                                                    "files, e.g. robots.uv2.fuel_capacity_s=200,250; may be repeated.",
@@ -212,7 +212,7 @@ def _run(
 
     if dask is not None and workers is not None:
         raise BadInput("--dask and --workers don't go together: the cluster has its own workers")
-    caps = Caps(time_s=unit_time_limit_s, memory_mb=memory_mb)
+    caps = Caps(time_s=unit_time_limit_s, memory_mb=memory_mb, preload="sva_bench.batch.jobs")
 
     @contextmanager
     def engine() -> Iterator[Engine]:

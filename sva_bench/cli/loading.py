@@ -6,18 +6,18 @@ import os
 import unicodedata
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
-from sva_bench.cli.options import FailureProcess, Planner
+from sva_bench.choices import FailureProcess, PathPlanner
 from sva_bench.cli.terminal import messages
-from sva_bench.errors import BadInput, nearest
+from sva_bench.errors import BadInput
 from sva_bench.files.documents import read_yaml
 from sva_bench.files.mistaken import what_it_is
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World
+from sva_bench.world.variants import adapted
 
 _LONGEST_NAME = 120
 """Bytes of a plan's name: with a scenario's before it and an ending behind it, it is a file's name, of 255 at most."""
@@ -29,20 +29,6 @@ def load(
 ) -> World:
     """The world, as the command line changes it."""
     return adapted(load_world(path), scenarios, margin, plan_failure, execute_failure)
-
-
-def adapted(
-    world: World, scenarios: Sequence[str] | None = None, margin: float | None = None,
-    plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
-) -> World:
-    """A world with some of its settings replaced."""
-    if scenarios:
-        world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
-            scenarios, [s.name for s in world.scenarios])))
-    return replace(
-        world, margin=world.margin if margin is None else margin,
-        plan_failure=world.plan_failure if plan_failure is None else plan_failure,
-        execute_failure=world.execute_failure if execute_failure is None else execute_failure)
 
 
 @contextmanager
@@ -65,7 +51,7 @@ def about(path: Path) -> Iterator[None]:
 
 
 def instance_of_world(
-    path: Path, scenario: str | None, planner: Planner, margin: float | None,
+    path: Path, scenario: str | None, planner: PathPlanner, margin: float | None,
     progress: Callable[[str, int, int], None],
 ) -> Instance:
     """The instance of a world's scenario; of the availabilities under ``robots:`` by default."""
@@ -115,10 +101,3 @@ def by_name(paths: Sequence[Path]) -> dict[str, Path]:
                            "differ, and in more than capitals")
         found[name] = known[plain] = path
     return found
-
-
-def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
-    for name in names:
-        if name not in known:
-            raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
-    return list(dict.fromkeys(names))

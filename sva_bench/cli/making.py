@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from sva_bench.cli.options import Family, Force, PlannerOption, Unknown, Verbose, WorldArgument, WorldFamily, finite
+from sva_bench.choices import InstanceFamily, Unknown, WorldFamily
+from sva_bench.cli.options import Force, PlannerOption, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import print_json, progress_bars, results, set_up_logging
 from sva_bench.cli.usage import PlainCommand
 from sva_bench.errors import BadInput
@@ -183,8 +184,8 @@ def world_schema() -> None:
 
 @instance_app.command("random", cls=PlainCommand)
 def random_instances(
-    family: Annotated[Family, typer.Option(help="A: one filling lasts for the mission; B: two to five refuels; C: "
-                                                "short routes.")] = "A",
+    family: Annotated[InstanceFamily, typer.Option(help="A: one filling lasts for the mission; B: two to five refuels; "
+                                                        "C: short routes.")] = "A",
     pois: Annotated[int, typer.Option(min=0, max=1000, help="Points of interest.")] = 20,
     vehicles: Annotated[int, typer.Option(min=0, max=100, help="Vehicles; every second one is uncertain.")] = 2,
     availability: Annotated[float, typer.Option(min=0, max=1, callback=finite, help="Availability of the uncertain "
@@ -201,7 +202,7 @@ def random_instances(
     """Make a random instance of the paper's kind."""
     with holding_back_ctrl_c():
         from sva_bench.generate.instances import random_instance
-        from sva_bench.mission.instance import instance_text
+        from sva_bench.mission.instance_file import instance_text
 
     write_result(output, instance_text(random_instance(
         family, pois=pois, vehicles=vehicles, availability=availability, fuel_multiple=fuel, tau=tau,

@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
+from sva_bench.choices import (
+    FailureProcess,
+    Fidelity,
+    PathPlanner,
+)
 from sva_bench.workers.pool import count_of
 
 # Spelt out, not imported: the modules that own them take a second to load, and --help should not.
-Fidelity = Literal["kinematic", "rollout", "physics"]
-Planner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
-Method = Literal["auto", "expected", "dep", "relaxed", "lshaped"]
-Cuts = Literal["single", "multi", "pareto"]
-RiskKind = Literal["cvar", "excess"]
-FailureProcess = Literal["mission", "per_leg"]
-Family = Literal["A", "B", "C"]
-WorldFamily = Literal["rooms", "field", "aisles", "maze"]
-Part = Literal["rewards", "simulation", "runtimes"]
-Objective = Literal["stochastic", "deterministic"]
-Unknown = Literal["occupied", "free"]
 
 
 
@@ -35,7 +29,7 @@ def finite(value: float | None) -> float | None:
 WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-PlannerOption = Annotated[Planner, typer.Option(help="OMPL planner: one PRM* roadmap, or pair by pair RRTConnect "
+PlannerOption = Annotated[PathPlanner, typer.Option(help="OMPL planner: one PRM* roadmap, or pair by pair RRTConnect "
                                                      "(noisy), FMT*, BFMT* or Informed RRT* (slow).")]
 MarginOption = Annotated[float | None, typer.Option(
     min=0, max=1, callback=finite, help="Planning costs are twin times x (1 + margin); default: the world's.",

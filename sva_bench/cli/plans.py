@@ -10,20 +10,8 @@ from typing import Annotated
 
 import typer
 
-from sva_bench.cli.options import (
-    AsJson,
-    Cuts,
-    Gap,
-    MarginOption,
-    Method,
-    Objective,
-    PlannerOption,
-    RiskKind,
-    TimeLimit,
-    Verbose,
-    WorldArgument,
-    finite,
-)
+from sva_bench.choices import Cuts, Method, Objective, RiskKind
+from sva_bench.cli.options import AsJson, Gap, MarginOption, PlannerOption, TimeLimit, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.files.outputs import check_output, write_result
@@ -45,7 +33,7 @@ def times(
     """Plan travel times and repair them into fuel costs: an instance for any solver."""
     with holding_back_ctrl_c():
         from sva_bench.cli.loading import instance_of_world
-        from sva_bench.mission.instance import instance_text
+        from sva_bench.mission.instance_file import instance_text
 
     set_up_logging(verbose)
     check_output(output, world)
@@ -82,9 +70,9 @@ def plan(
     """Make one plan, proved optimal unless a limit stops it."""
     with holding_back_ctrl_c():
         from sva_bench.cli.loading import instance_of_world
-        from sva_bench.files.documents import pretty_json
-        from sva_bench.mission.instance import read_instance
-        from sva_bench.mission.plan import plan_as_dict
+        from sva_bench.files.pretty import pretty_json
+        from sva_bench.mission.instance_file import read_instance
+        from sva_bench.mission.plan_file import plan_as_dict
 
     set_up_logging(verbose)
     check_output(output, source)
@@ -147,8 +135,8 @@ def certify(
     """
     with holding_back_ctrl_c():
         from sva_bench.mission.certify import certify as check
-        from sva_bench.mission.instance import read_instance
-        from sva_bench.mission.plan import read_plan
+        from sva_bench.mission.instance_file import read_instance
+        from sva_bench.mission.plan_file import read_plan
 
     problem = read_instance(instance)
     candidate = read_plan(plan, problem)

@@ -6,14 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.choices import ENDS, Fidelity
 from sva_bench.execution.engines.bullet import Simulator, downsampled
 from sva_bench.execution.margins import Margins, margins_of_team
-from sva_bench.execution.outcome import ENDS, Assignment, Driven, Outcome, Trace, settle, trace_of
+from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, settle, trace_of
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import NEVER, draw_failures
 from sva_bench.mission.plan import Plan, Route
 from sva_bench.robot.follower import Stretch
@@ -21,9 +22,8 @@ from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import drive as drive_twin
 from sva_bench.seeds import Stream, rng_for
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, World
+from sva_bench.world.model import Noise, Robot, Scenario, World
 
-Fidelity = Literal["kinematic", "rollout", "physics"]
 TRACE_HZ = 20.0
 
 Hop = tuple[Stretch, ...]

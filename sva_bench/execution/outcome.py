@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, get_args
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray, frozen
+from sva_bench.choices import End, EventKind
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
-
-End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
-ENDS: tuple[End, ...] = get_args(End)
-EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -166,3 +166,13 @@ def _models_in(annotation: Any) -> set[type[BaseModel]]:
     for argument in getattr(annotation, "__args__", ()):
         models |= _models_in(argument)
     return models
+
+
+
+def dotted(loc: Loc) -> str:
+    """``("map", "obstacles", 2)`` as ``map.obstacles[2]``."""
+    text = ""
+    for part in loc:
+        word = part if isinstance(part, int) or (part.isprintable() and len(part) <= 64) else shown(part)
+        text += f"[{word}]" if isinstance(part, int) else f".{word}" if text else str(word)
+    return text

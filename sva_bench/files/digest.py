@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from sva_bench import __version__
-from sva_bench.storage.run_folder import PACKAGES
 
 
 def digest(*parts: Any) -> str:
@@ -62,3 +61,7 @@ def code_digest() -> str:
              for path in package.rglob("*.py")}
     libraries = {name: version(name) for name in PACKAGES}
     return hashlib.sha256(json.dumps([__version__, files, libraries], sort_keys=True).encode()).hexdigest()
+
+
+
+PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")

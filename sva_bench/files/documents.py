@@ -1,6 +1,6 @@
 """YAML and JSON files in, checked data out: every complaint names file, line and key.
 
-The only importer of ruamel.yaml. Aliases, duplicate keys and oversized files are refused at the door:
+Aliases, duplicate keys and oversized files are refused at the door:
 no document of ours needs them, and an alias bomb can fill any memory.
 """
 
@@ -11,48 +11,22 @@ import json
 import math
 import os
 import stat
-from collections.abc import Callable, Mapping
-from io import StringIO
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.composer import Composer
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from pydantic import ValidationError
 
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.complaints import Loc as Loc
-from sva_bench.files.complaints import first_complaint, shown
+from sva_bench.files.complaints import dotted, first_complaint, shown
+from sva_bench.files.fields import SectionT
 from sva_bench.files.json_lines import json_line
-from sva_bench.files.mistaken import what_it_is, what_the_text_is
+from sva_bench.files.mistaken import what_it_is
+from sva_bench.files.yaml_text import MAX_DEPTH, Node, compose, line_in, plain_data, written_in
 
 MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
 MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 100 MB
-MAX_DEPTH = 32
-MAX_YAML_VALUES = 200_000  # keys and values; a world of 10 000 obstacles has 120 000, which take 5 s to read
-
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
-"""Pattern of names of worlds, sites, robots and scenarios."""
-
-Name = Annotated[str, StringConstraints(pattern=NAME)]
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]
-"""Times [s] and incentives: sums of more than 1e9 would lose the feasibility tolerance to rounding."""
-Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
-WholeNumber = Annotated[int, Field(strict=True, ge=0)]
-
-
-class Section(BaseModel):
-    """A part of a document: frozen, and an unknown key is an error."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-SectionT = TypeVar("SectionT", bound=BaseModel)
 
 
 class Document:
@@ -70,32 +44,11 @@ class Document:
         """Line of the key at ``loc``, counted from 1; of the nearest parent where it is absent."""
         if self._root is None:
             return json_line(self.text, loc)
-        node: Node = self._root
-        line = node.start_mark.line
-        for part in loc:
-            if isinstance(node, MappingNode):
-                found = next(((k, v) for k, v in node.value if k.value == str(part)), None)
-                if found is None:
-                    break
-                line, node = found[0].start_mark.line, found[1]
-            elif isinstance(node, SequenceNode) and isinstance(part, int) and part < len(node.value):
-                node = node.value[part]
-                line = node.start_mark.line
-            else:
-                break
-        return int(line) + 1
+        return line_in(self._root, loc)
 
     def written(self, loc: Loc) -> str | None:
         """How a YAML file writes the scalar at ``loc``; ``None`` where none stands there."""
-        node = self._root
-        for part in loc:
-            if isinstance(node, MappingNode):
-                node = next((v for k, v in node.value if k.value == str(part)), None)
-            elif isinstance(node, SequenceNode) and isinstance(part, int) and part < len(node.value):
-                node = node.value[part]
-            else:
-                return None
-        return str(node.value)[:60] if isinstance(node, ScalarNode) and node.value else None
+        return None if self._root is None else written_in(self._root, loc)
 
     def changed(self, key: str, value: Any, named: Mapping[Loc, str] | None = None) -> Document:
         """The same with another value at a dotted key, e.g. ``robots.uv2.fuel_capacity_s``; lines stay those read.
@@ -137,15 +90,6 @@ def _next_name(at: Any, words: list[str]) -> tuple[Any, list[str]]:
     return words[0], words[1:]
 
 
-def dotted(loc: Loc) -> str:
-    """``("map", "obstacles", 2)`` as ``map.obstacles[2]``."""
-    text = ""
-    for part in loc:
-        word = part if isinstance(part, int) or (part.isprintable() and len(part) <= 64) else shown(part)
-        text += f"[{word}]" if isinstance(part, int) else f".{word}" if text else str(word)
-    return text
-
-
 def read_yaml(path: Path) -> Document:
     """Read a YAML 1.2 file without aliases, tags or duplicate keys.
 
@@ -161,22 +105,10 @@ def parse_yaml(text: str, path: Path) -> Document:
     Raises:
         BadFile: If it is not plain YAML.
     """
-    try:
-        root = _compose(text)
-    except YAMLError as error:
-        if (known := what_the_text_is(text)) is not None:
-            raise BadFile(path, None, "", known) from None
-        if not isinstance(error, MarkedYAMLError):
-            raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}") from None
-        mark = error.problem_mark or error.context_mark
-        raise BadFile(path, mark.line + 1 if mark else None, "", f"not valid YAML: {error.problem}") from None
-    except RecursionError:
-        raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
-    except (ValueError, OverflowError):
-        raise BadFile(path, None, "", "not valid YAML: an escape that is no character") from None
+    root = compose(text, path)
     if root is None:
         raise BadFile(path, 1, "", "the file is empty")
-    return Document(path, _plain(root, path, ()), text, root)
+    return Document(path, plain_data(root, path, ()), text, root)
 
 
 def read_json(path: Path, most: int = MAX_JSON_BYTES) -> Document:
@@ -304,141 +236,3 @@ def _last_line_of(text: str, piece: str) -> int | None:
     return None if at < 0 else text.count("\n", 0, at) + 1
 
 
-class _StrictComposer(Composer):
-    """Composes nodes, refusing aliases before they are followed."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        from ruamel.yaml.events import AliasEvent
-
-        self.values: int = getattr(self, "values", 0) + 1
-        if self.values > MAX_YAML_VALUES:
-            raise MarkedYAMLError(problem=f"more than {MAX_YAML_VALUES} keys and values; at most so many are read",
-                                  problem_mark=self.parser.peek_event().start_mark)
-        if self.parser.check_event(AliasEvent):
-            event = self.parser.peek_event()
-            raise MarkedYAMLError(problem="aliases are not allowed; write the value out", problem_mark=event.start_mark)
-        return super().compose_node(parent, index)
-
-
-def _compose(text: str) -> Node | None:
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Composer = _StrictComposer
-    node: Node | None = yaml.compose(text)
-    return node
-
-
-def _plain(node: Node, path: Path, loc: Loc) -> Any:
-    """Python data of a node tree: mappings, lists and plain scalars only."""
-    line = node.start_mark.line + 1
-    if len(loc) > MAX_DEPTH:
-        raise BadFile(path, line, dotted(loc[:3]), f"nested deeper than {MAX_DEPTH} levels")
-    if isinstance(node, MappingNode):
-        data: dict[str, Any] = {}
-        for key_node, value_node in node.value:
-            if not isinstance(key_node, ScalarNode):
-                raise BadFile(path, key_node.start_mark.line + 1, dotted(loc), "a key must be a plain word")
-            key = str(key_node.value)
-            if key in data:
-                raise BadFile(path, key_node.start_mark.line + 1, dotted((*loc, key)),
-                              "this key stands twice; remove one")
-            data[key] = _plain(value_node, path, (*loc, key))
-        return data
-    if isinstance(node, SequenceNode):
-        return [_plain(item, path, (*loc, number)) for number, item in enumerate(node.value)]
-    return _scalar(node, path, loc)
-
-
-def _scalar(node: Node, path: Path, loc: Loc) -> Any:
-    """The value of a plain YAML 1.2 scalar; what looks like a date stays text."""
-    text, kind = str(node.value), str(node.tag).rpartition(":")[2]
-    if not str(node.tag).startswith("tag:yaml.org,2002:") or kind not in _SCALARS:
-        raise BadFile(path, node.start_mark.line + 1, dotted(loc),
-                      f"the tag {shown(str(node.tag))} is not allowed; write a plain value")
-    try:
-        value = _SCALARS[kind](text)
-    except (ValueError, OverflowError):
-        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"{shown(text)} is no valid {kind}") from None
-    if isinstance(value, float) and not math.isfinite(value):
-        raise BadFile(path, node.start_mark.line + 1, dotted(loc), f"expected a finite number, found {shown(text)}")
-    return value
-
-
-def _whole(text: str) -> int:
-    if len(text) > 400:  # far beyond any float, and Python prints none of more than 4300 digits
-        raise ValueError(text)
-    return int(text, 0) if text[:2].lower() in ("0x", "0o") else int(text)
-
-
-def _number(text: str) -> float:
-    return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
-
-
-_SCALARS: dict[str, Callable[[str], Any]] = {
-    "str": str,
-    "timestamp": str,
-    "null": lambda _: None,
-    "bool": lambda text: text.lower() == "true",
-    "int": _whole,
-    "float": _number,
-}
-
-
-def pretty_json(data: Any, indent: int = 0, width: int = 116) -> str:
-    """JSON that a person can read: what fits on a line stays on it."""
-    flat = json.dumps(data, ensure_ascii=False, allow_nan=False)
-    if len(flat) + indent <= width or not isinstance(data, dict | list) or not data:
-        return flat + ("\n" if indent == 0 else "")
-    pad = " " * (indent + 1)
-    if isinstance(data, dict):
-        items = [f"{pad}{json.dumps(key)}: {pretty_json(value, indent + 1)}" for key, value in data.items()]
-        text = "{\n" + ",\n".join(items) + "\n" + " " * indent + "}"
-    else:
-        rows = [pad + (json.dumps(item) if not _deep(item) else pretty_json(item, indent + 1)) for item in data]
-        text = "[\n" + ",\n".join(rows) + "\n" + " " * indent + "]"
-    return text + ("\n" if indent == 0 else "")
-
-
-def pretty_yaml(data: Mapping[str, Any], remarks: Mapping[Loc, str], width: int = 116) -> str:
-    """YAML that a person can read: what holds no mapping inside stands on one line.
-
-    Args:
-        data: The content.
-        remarks: Comments by the key or list item that they stand above; ``()`` is the head of the file. One that
-            begins with a newline has an empty line above it.
-        width: Where long lines are broken.
-    """
-    yaml = YAML()
-    yaml.width = width
-    yaml.indent(mapping=2, sequence=4, offset=2)
-    root = _commented(data, (), remarks)
-    if () in remarks:
-        root.yaml_set_start_comment(remarks[()])
-    stream = StringIO()
-    yaml.dump(root, stream)
-    return "".join(line.rstrip() + "\n" for line in stream.getvalue().rstrip().splitlines())
-
-
-def _commented(item: Any, loc: Loc, remarks: Mapping[Loc, str]) -> Any:
-    if not isinstance(item, Mapping | list):
-        return item
-    named = isinstance(item, Mapping)
-    pairs = [(key, _commented(value, (*loc, key), remarks))
-             for key, value in (item.items() if isinstance(item, Mapping) else enumerate(item))]
-    node = CommentedMap(pairs) if named else CommentedSeq(value for _, value in pairs)
-    if not item or (loc and not any(_holds_mapping(value) for _, value in pairs)):
-        node.fa.set_flow_style()
-        return node
-    node.fa.set_block_style()
-    for key, _ in pairs:
-        if (*loc, key) in remarks:
-            node.yaml_set_comment_before_after_key(key, before=remarks[*loc, key], indent=2 * len(loc))
-    return node
-
-
-def _holds_mapping(item: Any) -> bool:
-    return isinstance(item, Mapping) or (isinstance(item, list) and any(_holds_mapping(x) for x in item))
-
-
-def _deep(item: Any) -> bool:
-    """Whether an item of a list holds more than numbers and words."""
-    return isinstance(item, dict) or (isinstance(item, list) and any(isinstance(x, dict | list) for x in item))

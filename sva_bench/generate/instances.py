@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
+from sva_bench.choices import InstanceFamily
 from sva_bench.mission.instance import Instance, Vehicle
-
-Family = Literal["A", "B", "C"]
 
 SIDE = 100.0
 STATIONS = ((25.0, 25.0), (25.0, 75.0), (75.0, 25.0), (75.0, 75.0))
@@ -16,7 +13,7 @@ DECIMALS = 9
 MOST_INCENTIVE = (150.0, 170.0)
 _STREAMS = {"places": 0, "incentives": 1, "winds": 2}
 
-FUEL_MULTIPLE: dict[Family, float] = {"A": 2.25, "B": 1.0, "C": 1.2}
+FUEL_MULTIPLE: dict[InstanceFamily, float] = {"A": 2.25, "B": 1.0, "C": 1.2}
 """Fuel capacity in largest distances; the paper's table has 2.25 to 3."""
 
 FUEL_TIGHT_LIMIT = 2.25
@@ -24,8 +21,8 @@ FUEL_TIGHT_LIMIT = 2.25
 
 
 def random_instance(
-    family: Family, *, pois: int, vehicles: int, availability: float, seed: int, fuel_multiple: float | None = None,
-    tau: float | None = None, directed: bool = False,
+    family: InstanceFamily, *, pois: int, vehicles: int, availability: float, seed: int,
+    fuel_multiple: float | None = None, tau: float | None = None, directed: bool = False,
 ) -> Instance:
     """A random instance: base in the middle of a square of side 100, four stations, POIs anywhere.
 

@@ -9,26 +9,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import WorldFamily
 from sva_bench.errors import BadInput
 from sva_bench.generate.mazes import maze_walls
 from sva_bench.generate.rooms import room_walls
 from sva_bench.geometry.distances import clearance, segment_distance
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.seeds import Stream, key_of, rng_for
 from sva_bench.world.load import obstacles_of
-from sva_bench.world.model import Obstacles
 from sva_bench.world.places import Places, Point
 from sva_bench.world.schema import Shapes
 
-Family = Literal["rooms", "field", "aisles", "maze"]
 Shape = Mapping[str, Any]
 """An obstacle as it stands in a world file."""
 
-DENSITY: dict[Family, float] = {"rooms": 0.06, "field": 0.1, "aisles": 0.2, "maze": 0.8}
+DENSITY: dict[WorldFamily, float] = {"rooms": 0.06, "field": 0.1, "aisles": 0.2, "maze": 0.8}
 """Density unless another is asked for. Of a maze, the share of the walls of one without loops; else of the area."""
 
 PASSAGE_M = 0.8
@@ -69,7 +69,7 @@ class Terrain:
         return _obstacles(self.bounds_m, self.shapes)
 
 
-def random_terrain(family: Family, *, size_m: float, density: float, seed: int) -> Terrain:
+def random_terrain(family: WorldFamily, *, size_m: float, density: float, seed: int) -> Terrain:
     """Terrain of a family.
 
     Args:

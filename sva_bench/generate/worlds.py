@@ -11,17 +11,23 @@ from typing import Any
 
 import numpy as np
 
+from sva_bench.choices import Unknown, WorldFamily
 from sva_bench.errors import BadInput
-from sva_bench.files.documents import NAME, Loc, parse_yaml, pretty_yaml
-from sva_bench.generate.terrain import DENSITY, Family, random_places, random_terrain
+from sva_bench.files.documents import Loc, parse_yaml
+from sva_bench.files.fields import NAME
+from sva_bench.files.yaml_text import pretty_yaml
+from sva_bench.generate.terrain import DENSITY, random_places, random_terrain
 from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.robot.model import BUILT_IN, USUAL_MODEL
 from sva_bench.seeds import key_of
 from sva_bench.world.load import world_of
-from sva_bench.world.maps.ros import MapFile, Unknown, read_movingai_map, read_ros_map
-from sva_bench.world.model import MapSource, Obstacles
+from sva_bench.world.maps.files import MapFile
+from sva_bench.world.maps.movingai import read_movingai_map
+from sva_bench.world.maps.ros import read_ros_map
+from sva_bench.world.model import MapSource
 from sva_bench.world.places import NoRoom, Point, enclosed_beside, field_of, find_places
 from sva_bench.world.schema import KIND
 
@@ -33,7 +39,7 @@ STATION_STOP_S = 10
 WHEEL_GAIN_SD = 0.01
 """Noise, as in the shipped worlds."""
 
-_FIRST_WORDS: dict[Family, str] = {
+_FIRST_WORDS: dict[WorldFamily, str] = {
     "rooms": "Rooms joined by doors", "field": "A field with scattered obstacles", "aisles": "Aisles between racks",
     "maze": "A maze"}
 
@@ -43,7 +49,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def random_world(
-    family: Family, *, size_m: float, density: float | None, pois: int, stations: int, robots: int, seed: int,
+    family: WorldFamily, *, size_m: float, density: float | None, pois: int, stations: int, robots: int, seed: int,
     progress: Progress,
 ) -> str:
     """The text of a random world's file: the same for the same arguments.

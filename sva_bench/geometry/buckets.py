@@ -13,7 +13,7 @@ from numba import njit
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.geometry.distances import point_box, point_segment, segment_box
-from sva_bench.world.model import Obstacles
+from sva_bench.geometry.obstacles import Obstacles
 
 _BUCKETS = 65_536  # at most about so many
 _HEAD = 14  # numbers before the arrays: bounds, clearance, slack, side, columns, rows, boxes, cylinders, 3 offsets

@@ -7,7 +7,7 @@ import math
 from numba import njit
 
 from sva_bench.arrays import FloatArray
-from sva_bench.world.model import Obstacles
+from sva_bench.geometry.obstacles import Obstacles
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

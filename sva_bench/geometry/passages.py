@@ -10,7 +10,7 @@ from scipy.ndimage import label
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import distance_field
-from sva_bench.world.model import Obstacles
+from sva_bench.geometry.obstacles import Obstacles
 
 _FINEST_M, _PLACES = 0.02, 1_000_000  # finest lattice among shapes, and most places of it
 _STEPS = 16  # halvings of the range of radii

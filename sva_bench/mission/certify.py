@@ -6,7 +6,7 @@ Shares no code with the solver, so a bug there cannot hide here.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sva_bench.mission.failures import route_value
@@ -120,3 +120,12 @@ def _wrong_claims(plan: Plan, expected: float, nominal: float, fuel: dict[str, f
     claims += [f"{name}: the plan claims {claimed:.3f} s of fuel; it burns {fuel[name]:.3f} s"
                for name, claimed in plan.fuel_s.items() if name in fuel and abs(claimed - fuel[name]) > TOLERANCE_S]
     return claims
+
+
+
+def expected_value(instance: Instance, plan: Plan) -> float:
+    """Closed-form value of a plan under the instance's failure process, by the independent check."""
+    certificate = certify(instance, replace(plan, value=None))
+    if certificate.expected is None:
+        raise RuntimeError(f"a plan for {instance.name} fails its check: {'; '.join(certificate.reasons)}")
+    return certificate.expected

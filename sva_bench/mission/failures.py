@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.choices import FailureProcess
 from sva_bench.seeds import Stream, uniforms
-
-FailureProcess = Literal["mission", "per_leg"]
 
 NEVER = np.iinfo(np.int64).max
 """Number of the POI before which a robot that doesn't fail would fail."""

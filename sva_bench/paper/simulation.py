@@ -16,17 +16,18 @@ import numpy as np
 from sva_bench.analysis.figures import difference_figure
 from sva_bench.analysis.statistics import estimate, sample_mean
 from sva_bench.analysis.summary import totals
+from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Drives, Settings, execute
 from sva_bench.generate.instances import random_instance
-from sva_bench.mission.failures import FailureProcess
+from sva_bench.mission.certify import expected_value
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import unless_interrupted
 from sva_bench.report.wording import per_cent, verdict, with_interval
 from sva_bench.safe_path import environment_of_children
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_deterministic, plan_nominal, plan_stochastic
-from sva_bench.study.planning import NOMINAL, Options, Progress, plan_costs, plan_scenarios
-from sva_bench.study.summing import expected_value
+from sva_bench.study.options import Options, Progress
+from sva_bench.study.planning import NOMINAL, plan_costs, plan_scenarios
 from sva_bench.world.model import World
 
 CASES = (1.0, 0.75, 0.25, 0.0)

@@ -19,8 +19,9 @@ from rerun.experimental import ViewerClient
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.outcome import Trace
 from sva_bench.files.atomic import by_way_of
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Story, story_of
-from sva_bench.world.model import Obstacles, World
+from sva_bench.world.model import World
 
 TIMELINE = "sim_time"
 

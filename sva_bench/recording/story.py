@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
+from sva_bench.choices import SiteKind
 from sva_bench.execution.outcome import Event, Trace
-from sva_bench.world.model import Obstacles, Site, SiteKind, World
+from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.world.model import Site, World
 
 Color = tuple[int, int, int]
 Level = Literal["DEBUG", "INFO", "WARN", "ERROR"]

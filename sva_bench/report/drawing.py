@@ -30,9 +30,10 @@ from matplotlib.text import Text
 from matplotlib.ticker import MultipleLocator
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import SiteKind
 from sva_bench.geometry.cells import TooRagged, bounds_of, boxes_of
 from sva_bench.report.labels import place_labels
-from sva_bench.world.model import SiteKind, World
+from sva_bench.world.model import World
 
 Kind = Literal["png", "svg"]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.choices import Status
 from sva_bench.interrupts import hear_ctrl_c
 from sva_bench.mission.instance import Instance
-from sva_bench.mission.plan import Status
 from sva_bench.solver.flow.cuts import Cut
 from sva_bench.solver.program import Goal
 from sva_bench.solver.routes.fronts import Tables, tables_of

@@ -15,14 +15,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import RiskKind
 from sva_bench.solver.outcomes import Outcomes
-
-RiskKind = Literal["cvar", "excess"]
 
 
 @dataclass(frozen=True, kw_only=True)

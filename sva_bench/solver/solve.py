@@ -10,13 +10,14 @@ from typing import Literal
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import Cuts
 from sva_bench.interrupts import deferring_ctrl_c, hearing_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.columns.branch_and_price import BranchAndPrice
 from sva_bench.solver.columns.column_generation import ColumnGeneration
 from sva_bench.solver.flow.branch_and_cut import FlowModel, prove_by_cuts
 from sva_bench.solver.flow.expected import DirectedModel
-from sva_bench.solver.flow.lshaped import Cuts, prove_by_duals
+from sva_bench.solver.flow.lshaped import prove_by_duals
 from sva_bench.solver.flow.recourse import EquivalentModel
 from sva_bench.solver.flow.undirected import UndirectedModel, serves
 from sva_bench.solver.knowledge import (

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import Cuts, PlanObjective, Status
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
-from sva_bench.mission.plan import Objective, Plan, Status
-from sva_bench.solver.flow.lshaped import Cuts
+from sva_bench.mission.plan import Plan
 from sva_bench.solver.flow.recourse import refuse_free_legs, refuse_seldom_available
 from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of, value_of
 from sva_bench.solver.outcomes import outcomes_of, possible
@@ -231,7 +231,7 @@ def wait_and_see(
 
 
 def _plan(
-    instance: Instance, objective: Objective, availability: FloatArray, limits: SolveLimits | None,
+    instance: Instance, objective: PlanObjective, availability: FloatArray, limits: SolveLimits | None,
     incumbent: Plan | None, known: Knowledge | None, method: Method, cuts: Cuts,
 ) -> Plan:
     limits = limits or SolveLimits()
@@ -331,7 +331,7 @@ class _Ties:
 
 
 def _finish(
-    instance: Instance, objective: Objective, orders: Orders, known: Knowledge, *, value: float, bound: float,
+    instance: Instance, objective: PlanObjective, orders: Orders, known: Knowledge, *, value: float, bound: float,
     status: Status, solutions: Sequence[Solution], runtime_s: float,
 ) -> Plan:
     routes, fuel = {}, {}

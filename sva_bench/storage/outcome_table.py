@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed, Settings
-from sva_bench.execution.outcome import ENDS
 from sva_bench.storage.tables import OUTCOMES
 
 

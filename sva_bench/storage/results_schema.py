@@ -6,12 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from sva_bench.execution.execute import Fidelity
-from sva_bench.execution.outcome import End
-from sva_bench.files.documents import Name, Probability, Section, WholeNumber
+from sva_bench.choices import End, FailureProcess, Fidelity, Status
+from sva_bench.files.fields import Name, Probability, Section, WholeNumber
 from sva_bench.files.printable import is_name
-from sva_bench.mission.failures import FailureProcess
-from sva_bench.mission.plan import Status
 
 MOST_TRIALS, MOST_ROLLOUTS = 10_000_000, 10_000_000
 

@@ -19,14 +19,12 @@ import pyarrow as pa
 from sva_bench import __version__
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.files.atomic import draft_folder, remove_left_behind
-from sva_bench.files.documents import pretty_json
+from sva_bench.files.digest import PACKAGES
+from sva_bench.files.pretty import pretty_json
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import MapSource
-
-PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
-
 
 _RUN_NAME = re.compile(r".+-seed\d+-[0-9a-f]{8}")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from sva_bench.batch.folder import is_batch
+from sva_bench.choices import ENDS
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.execution.outcome import ENDS
 from sva_bench.files.atomic import draft_file
-from sva_bench.files.read_back import Part, read_ours
-from sva_bench.mission.plan import Route, read_routes
-from sva_bench.report.run_page import Content, write_report
+from sva_bench.files.documents import read_json
+from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
+from sva_bench.mission.plan import Route
+from sva_bench.mission.plan_file import read_routes
 from sva_bench.storage.results_schema import ManifestFile, SummaryFile
 from sva_bench.storage.run_folder import LEG_COLUMNS, MAP, stem_of
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
@@ -27,6 +28,27 @@ from sva_bench.world.model import World
 _AGREE = 1e-6  # relative; a mean added up in another order
 MOST_LEGS = 5_000_000
 """Legs that a report is made of; they are held in memory."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Content:
+    """What a report is made of: all of it stands in the run folder.
+
+    Attributes:
+        summary: Content of ``summary.json``.
+        routes: Route of each robot, by scenario and planner.
+        stems: Names of a plan's files, by scenario and planner.
+        legs: Columns of ``legs.parquet``.
+        world: The world, for its picture.
+        manifest: Content of ``manifest.json``.
+    """
+
+    summary: Mapping[str, Any]
+    routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]
+    stems: Mapping[tuple[str, str], str]
+    legs: Mapping[str, Sequence[Any]]
+    world: World
+    manifest: Mapping[str, Any]
 
 
 def run_folder_at(path: Path) -> Path:
@@ -52,17 +74,13 @@ def run_folder_at(path: Path) -> Path:
     return path
 
 
-def report_again(folder: Path) -> Path:
-    """Write the report of a finished run again, from its tables.
-
-    Raises:
-        BadInput, BadFile: If this is no run folder, or something in it is cut off, foreign or not of the same run.
-    """
-    content = read_content(run_folder_at(folder))
-    path = folder / "report.html"
-    with draft_file(path) as draft:
-        write_report(draft, content)
-    return path
+def is_batch(folder: Path) -> bool:
+    """Whether a folder is that of a batch, whole or not."""
+    try:
+        data = read_json(folder / "manifest.json", MOST_BYTES).data
+    except BadFile:
+        return next(folder.glob("outcomes-*.parquet"), None) is not None
+    return isinstance(data, dict) and str(data.get("format", "")).startswith("sva-bench/batch-manifest@")
 
 
 def write_csv(folder: Path) -> list[Path]:

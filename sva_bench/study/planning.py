@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.precision import Precision
 from sva_bench.analysis.reach import reached
+from sva_bench.choices import PathPlanner
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError
-from sva_bench.execution.execute import Fidelity
-from sva_bench.mission.certify import certify
+from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.mission.plan import Plan, read_plan, unless_interrupted
+from sva_bench.mission.plan import Plan, unless_interrupted
+from sva_bench.mission.plan_file import read_plan
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.two_stage import (
     Knowledge,
-    SolveLimits,
     knowledge_of,
     plan_deterministic,
     plan_nominal,
@@ -29,9 +28,9 @@ from sva_bench.solver.two_stage import (
 )
 from sva_bench.study.assumptions import PlansByProcess
 from sva_bench.study.informed import InformedPlans, plan_informed
-from sva_bench.study.summing import expected_value, model_is_executed
+from sva_bench.study.options import Options, Progress
+from sva_bench.study.summing import model_is_executed
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
-from sva_bench.travel.roadmap import PlannerName
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.model import Scenario, World
 
@@ -39,46 +38,6 @@ _log = logging.getLogger(__name__)
 
 NOMINAL = "nominal"
 """The scenario of the availabilities under ``robots:``."""
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Options:
-    """What a run can be told.
-
-    Attributes:
-        seed: Root of failures and noise; plans don't depend on it.
-        trials: Trials of each plan in each scenario.
-        rollouts: Noise draws; 1 is enough without noise.
-        fidelity: How plans are executed.
-        planner: How paths are planned.
-        limits: When a solve may stop.
-        evpi: Work out the value of perfect information however many outcomes there are.
-        informed: Execute what somebody would plan who knew beforehand who is available, too.
-        assumptions: Execute plans for both failure processes under both.
-        precision: Go on with more trials and noise draws until the executed VSS is so sure.
-    """
-
-    seed: int = 0
-    trials: int = 1000
-    rollouts: int = 8
-    fidelity: Fidelity = "rollout"
-    planner: PlannerName = "prmstar"
-    limits: SolveLimits = field(default_factory=SolveLimits)
-    evpi: bool = False
-    informed: bool = False
-    assumptions: bool = False
-    precision: Precision | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything that changes results."""
-        asked = {} if self.precision is None else {"precision_pct": self.precision.pct,
-                                                   "max_trials": self.precision.max_trials}
-        return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
-                "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
-                "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -160,7 +119,7 @@ def plan_scenarios(
     return planned
 
 
-def plan_costs(world: World, planner: PlannerName, progress: Progress) -> dict[str, FuelCosts]:
+def plan_costs(world: World, planner: PathPlanner, progress: Progress) -> dict[str, FuelCosts]:
     """Fuel costs of each robot model in the world, by its name."""
     models = {robot.model.name: robot.model for robot in world.robots}
     costs = {}

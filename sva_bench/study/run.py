@@ -2,62 +2,28 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from sva_bench.analysis.summary import Judged, comparison_summary
 from sva_bench.errors import BadInput
-from sva_bench.execution.execute import Case, Drives, Executed, Settings, execute
-from sva_bench.mission.certify import certify
-from sva_bench.mission.instance import Instance, write_instance
-from sva_bench.mission.plan import Plan, write_plan
-from sva_bench.recording.rerun import record
-from sva_bench.report.run_page import Content, write_report
-from sva_bench.storage.run_folder import (
-    leg_columns,
-    manifest,
-    run_folder,
-    run_name,
-    stem_of,
-    write_json,
-    write_legs,
-    write_map,
-    write_outcomes,
-    write_travel_times,
-)
+from sva_bench.execution.execute import Case, Drives, Executed, execute
+from sva_bench.mission.certify import certify, expected_value
+from sva_bench.mission.plan import Plan
 from sva_bench.study.assumptions import cross_table
 from sva_bench.study.informed import cases_of, is_part, put_together
-from sva_bench.study.planning import (
-    Options,
-    Planned,
-    Progress,
-    instance_of,
-    plan_costs,
-    plan_scenarios,
-    reach_of,
-    unlimited,
-)
-from sva_bench.study.summing import WORST, by_case, expected_value, head, model_is_executed, summarise
+from sva_bench.study.options import Options, Progress, settings_of
+from sva_bench.study.planning import Planned, instance_of, plan_costs, plan_scenarios, reach_of, unlimited
+from sva_bench.study.publish import Run, Stopwatch, publish
+from sva_bench.study.summing import WORST, by_case, head, model_is_executed, summarise
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.load import world_as_dict
 from sva_bench.world.model import World
 
 MOST_ROWS = 50_000_000
 """Outcomes that a run holds in memory, at some 80 bytes each."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Run:
-    """A finished run: where it is, and its summary."""
-
-    folder: Path
-    summary: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -74,7 +40,7 @@ class Measured:
 def run(world: World, options: Options, out: Path, executor: Executor | None, progress: Progress) -> Run:
     """Plan, execute, measure and record a world's mission."""
     done = measure(world, options, executor, progress)
-    return _publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
+    return publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
                     done.summary, out, done.clock, progress)
 
 
@@ -163,7 +129,7 @@ def execute_plans(
         entries.append(comparison_summary(judged, robots, noisy=not world.noise.silent))
     summary = head(world, options, settings, costs) | {
         "reach": reach_of(world, costs), "reproducible": True, "scenarios": entries}
-    return _publish(world, options, costs, instances, executed, summary, out, clock, progress,
+    return publish(world, options, costs, instances, executed, summary, out, clock, progress,
                     identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
                                         for name, plan in plans.items()}})
 
@@ -175,69 +141,3 @@ def refuse_too_many_rows(world: World, trials: int, plans: int) -> None:
         raise BadInput(f"{rows} outcomes ({trials} trials x {len(world.scenarios)} scenarios x {plans} plans x "
                        f"{len(world.robots)} robots); a run keeps {MOST_ROWS} at most: take fewer trials, or a batch, "
                        "which measures them unit by unit")
-
-
-def settings_of(world: World, options: Options) -> Settings:
-    """How plans are executed in a world."""
-    return Settings(seed=options.seed, trials=options.trials, fidelity=options.fidelity,
-                    rollouts=1 if world.noise.silent else options.rollouts)
-
-
-def _publish(
-    world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
-    executed: list[Executed], summary: Mapping[str, Any], out: Path, clock: Stopwatch, progress: Progress,
-    identity: Mapping[str, Any] | None = None,
-) -> Run:
-    """Write the run folder; ``identity`` is what results of plans from elsewhere depend on beside the rest."""
-    resolved = world_as_dict(world)
-    name = run_name(world.name, options.seed,
-                    {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
-    stems = {key: stem_of(*key, foreign=identity is not None) for key in by_case(executed)}
-    with run_folder(out, name) as folder:
-        (folder / "plans").mkdir()
-        (folder / "recordings").mkdir()
-        if world.map_source is not None:
-            write_map(folder, world.map_source)
-        write_travel_times(folder / "travel_times.parquet", list(costs.values()))
-        for scenario, instance in instances.items():
-            write_instance(folder / f"instance-{scenario}.json", instance)
-        with clock.phase("recording"):
-            for number, done in enumerate(executed):
-                scenario, planner = done.case.scenario.name, done.case.planner
-                stem = stems[scenario, planner]
-                write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
-                record(folder / "recordings" / f"{stem}.rrd", world, done.traces,
-                       title=f"{world.name}, {scenario}, {planner}")
-                progress("recording", number + 1, len(executed))
-        legs = leg_columns(executed)
-        write_legs(folder / "legs.parquet", legs)
-        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
-                       settings_of(world, options))
-        write_json(folder / "summary.json", summary)
-        told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
-        write_json(folder / "manifest.json", told)
-        write_report(folder / "report.html", Content(
-            summary=summary, routes={k: v.case.plan.routes for k, v in by_case(executed).items()}, stems=stems,
-            legs=legs, world=world, manifest=told))
-    return Run(folder=out / name, summary=summary)
-
-
-def _digests(world: World) -> dict[str, Any]:
-    """Digests of the files that a world names, by name; nothing if it names none."""
-    return {} if world.map_source is None else {"files": world.map_source.digests()}
-
-
-class Stopwatch:
-    """Wall-clock time of each phase, for the manifest alone."""
-
-    def __init__(self) -> None:
-        self.started = datetime.now(UTC).isoformat(timespec="seconds")
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
-        begun = time.monotonic()
-        try:
-            yield
-        finally:
-            self.seconds[name] = time.monotonic() - begun

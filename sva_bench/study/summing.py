@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from sva_bench.analysis.summary import Judged, ScenarioResult, scenario_summary
 from sva_bench.execution.execute import Executed, Settings
-from sva_bench.mission.certify import certify
-from sva_bench.mission.instance import Instance
-from sva_bench.mission.plan import Plan
+from sva_bench.mission.certify import expected_value
 from sva_bench.study.informed import INFORMED
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
 if TYPE_CHECKING:
-    from sva_bench.study.planning import Options, Planned
+    from sva_bench.study.options import Options
+    from sva_bench.study.planning import Planned
 
 WORST = "deterministic, worst of its ties"
 
@@ -24,14 +23,6 @@ WORST = "deterministic, worst of its ties"
 def model_is_executed(world: World) -> bool:
     """Whether failures are planned for and executed as in the two-stage model."""
     return world.plan_failure == world.execute_failure == "mission"
-
-
-def expected_value(instance: Instance, plan: Plan) -> float:
-    """Closed-form value of a plan under the instance's failure process, by the independent check."""
-    certificate = certify(instance, replace(plan, value=None))
-    if certificate.expected is None:
-        raise RuntimeError(f"a plan for {instance.name} fails its check: {'; '.join(certificate.reasons)}")
-    return certificate.expected
 
 
 def summarise(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from ompl import base as ob
@@ -21,20 +21,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.choices import PathPlanner
 from sva_bench.geometry.buckets import clearance_checker, keeps_clear, keeps_clearance
 from sva_bench.geometry.cells import Cells, distance_field
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c, pressed
 from sva_bench.travel.lattice import lattice_ways, open_parts
 from sva_bench.travel.samples import arc_points, roadmap_samples
 from sva_bench.travel.tangents import nothing_known, tangents, tangents_of_own, taut
-from sva_bench.world.model import Obstacles
-
-PlannerName = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
-"""Planners that are sound and give the same paths in every process; ``benchmarks/planners.py`` compares them.
-
-Not among them: BIT* (misses pairs that others join), RRT* (so it does, and is slower than its informed kin), the KPIECE
-family (longest paths, misses pairs), AORRTC (a path of length zero where the straight line is free).
-"""
 
 _GROWTH = ((1000, 6), (3000, 12), (6000, 24))
 """Milestones, and points on a quarter circle: the roadmap grows until it connects all sites, or to the last of these.
@@ -55,7 +49,7 @@ ou.setLogLevel(ou.LogLevel.LOG_NONE)  # it warns that seeding is late; it is not
 
 
 def plan_paths(
-    obstacles: Obstacles, points: FloatArray, clearance_m: float, *, planner: PlannerName = "prmstar", seed: int = 0,
+    obstacles: Obstacles, points: FloatArray, clearance_m: float, *, planner: PathPlanner = "prmstar", seed: int = 0,
 ) -> list[list[FloatArray | None]]:
     """A path from every point to every other.
 
@@ -316,7 +310,7 @@ def _read_roadmap(si: Any, planner: Any) -> tuple[FloatArray, csr_array]:
 
 
 def _pair_by_pair(
-    obstacles: Obstacles, points: FloatArray, clearance_m: float, planner: PlannerName
+    obstacles: Obstacles, points: FloatArray, clearance_m: float, planner: PathPlanner
 ) -> list[list[FloatArray | None]]:
     si, _ = _space(obstacles, clearance_m)
     n = len(points)
@@ -339,7 +333,7 @@ def _pair_by_pair(
 
 
 def _query(
-    si: Any, simplifier: Any, planner: PlannerName, effort: int, start: FloatArray, goal: FloatArray
+    si: Any, simplifier: Any, planner: PathPlanner, effort: int, start: FloatArray, goal: FloatArray
 ) -> FloatArray | None:
     problem = ob.ProblemDefinition(si)
     problem.setStartAndGoalStates(_state(si, start), _state(si, goal))

@@ -11,8 +11,8 @@ from scipy.stats import qmc
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.geometry.buckets import keeps_clearance
 from sva_bench.geometry.cells import Cells, convex_corners, distance_field
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.travel.lattice import open_parts
-from sva_bench.world.model import Obstacles
 
 _GRAZE_M = 1e-4  # boundary samples keep this far outside, so that edges along the boundary are free
 _MOST_ARC_POINTS = 40_000  # of a map of 2000 x 2000 cells full of corners

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray, frozen_int
+from sva_bench.choices import PathPlanner
 from sva_bench.errors import SvaBenchError
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.passages import widest_passage
 from sva_bench.robot.follower import Stretch, stretches
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import drive
-from sva_bench.travel.roadmap import PlannerName, plan_paths
+from sva_bench.travel.roadmap import plan_paths
 from sva_bench.world.model import World
 from sva_bench.world.places import CLEARANCE_MARGINS_M as CLEARANCE_MARGINS_M
 
@@ -91,7 +92,7 @@ class TravelTimes:
         return stretches(self.path(origin, destination), heading)
 
 
-def plan_travel_times(world: World, model: RobotModel, planner: PlannerName = "prmstar") -> TravelTimes:
+def plan_travel_times(world: World, model: RobotModel, planner: PathPlanner = "prmstar") -> TravelTimes:
     """Plan a path between each pair of sites and time it.
 
     A robot starts in the origin's heading and stops in the destination's, so the time of a leg depends on its two

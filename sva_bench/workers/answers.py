@@ -37,7 +37,9 @@ class Caps:
     Attributes:
         time_s: Longest time [s].
         memory_mb: Most memory [MB]; 0 = any.
+        preload: Module that jobs are of; a worker loads it before time is counted.
     """
 
     time_s: float
     memory_mb: int
+    preload: str = "sva_bench"

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from sva_bench.batch.jobs import Job
 from sva_bench.errors import BadInput
 from sva_bench.files.digest import code_digest
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.workers.answers import Answer, Caps, Failed
+from sva_bench.workers.engine import Job
 from sva_bench.workers.guarded import GuardedWorker
 
 _CONNECT_S = 10.0

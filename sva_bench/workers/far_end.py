@@ -7,6 +7,7 @@ import os
 import pickle
 import resource
 import sys
+from importlib import import_module
 from multiprocessing.connection import Connection
 
 from sva_bench.workers.answers import Answer, Done, Failed
@@ -16,7 +17,7 @@ _FAILURES_TOLD = 300
 
 
 def main() -> None:
-    """Serve: ``python -m sva_bench.workers.far_end FD PARENT MEMORY_MB``."""
+    """Serve: ``python -m sva_bench.workers.far_end FD PARENT MEMORY_MB PRELOAD``."""
     line, parent, memory_mb = int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
     die_with(parent)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -25,8 +26,7 @@ def main() -> None:
     warned = _Warnings()
     logging.basicConfig(level=logging.WARNING, handlers=[warned], force=True)
     with Connection(line) as connection:
-        import sva_bench.batch.jobs  # noqa: F401  # before time is counted
-
+        import_module(sys.argv[4])  # before time is counted
         connection.send_bytes(b"ready")
         while True:
             try:

@@ -38,7 +38,7 @@ class GuardedWorker:
             # Libraries print to standard output, which is ours.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "sva_bench.workers.far_end", str(theirs.fileno()), str(os.getpid()),
-                 str(caps.memory_mb)],
+                 str(caps.memory_mb), caps.preload],
                 pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, env=environment)
         self.connection = Connection(ours.detach())

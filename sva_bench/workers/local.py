@@ -4,30 +4,11 @@ from __future__ import annotations
 
 import pickle
 from collections import deque
-from collections.abc import Sequence
 from multiprocessing.connection import wait
-from typing import Protocol
 
-from sva_bench.batch.jobs import Job
 from sva_bench.workers.answers import Answer, Caps, Failed
+from sva_bench.workers.engine import Job
 from sva_bench.workers.guarded import GuardedWorker
-
-
-class Engine(Protocol):
-    """Takes jobs and gives answers, in any order; every job is answered."""
-
-    @property
-    def slots(self) -> int:
-        """How many jobs it wants at a time."""
-
-    def submit(self, key: str, job: Job) -> None:
-        """Take a job."""
-
-    def answers(self, timeout_s: float) -> Sequence[tuple[str, Answer]]:
-        """Wait for answers; what there is after so long."""
-
-    def close(self) -> None:
-        """Drop what is in flight."""
 
 
 class LocalProcesses:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from importlib import import_module
 from multiprocessing import resource_tracker, util
 from multiprocessing.process import BaseProcess
 from types import ModuleType
@@ -51,8 +52,13 @@ def count_of(wanted: int | None) -> int:
 
 
 @contextmanager
-def local_workers(wanted: int | None) -> Iterator[Executor | None]:
-    """An executor of so many processes (default: one a core); ``None`` for one, since this process can do its work."""
+def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]:
+    """An executor of so many processes (default: one a core); ``None`` for one, since this process can do its work.
+
+    Args:
+        wanted: How many processes.
+        preload: Module that workers load while this process goes on.
+    """
     count = count_of(wanted)
     if count <= 1:
         yield None
@@ -67,7 +73,7 @@ def local_workers(wanted: int | None) -> Iterator[Executor | None]:
     try:
         with holding_back_ctrl_c(), _without_main_module():  # workers inherit the former for good
             for _ in range(count):  # they start, import and load compiled code while this process plans
-                executor.submit(_warm_up)
+                executor.submit(import_module, preload)
         started = set(multiprocessing.active_children()) - before
         yield executor
     except BaseException as error:
@@ -132,7 +138,3 @@ def die_with(parent: int) -> None:
 
 
 _PR_SET_PDEATHSIG = 1
-
-
-def _warm_up() -> None:
-    import sva_bench.execution.execute  # noqa: F401

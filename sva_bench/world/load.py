@@ -9,16 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from sva_bench.choices import SiteKind
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_yaml, validate
 from sva_bench.geometry.buckets import open_heading, view_checker
 from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.maps.ros import read_movingai_map, read_ros_map
-from sva_bench.world.model import MapSource, Noise, Obstacles, Robot, Scenario, Site, SiteKind, World
+from sva_bench.world.maps.movingai import read_movingai_map
+from sva_bench.world.maps.ros import read_ros_map
+from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World
 from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
 from sva_bench.world.schema import (
     KIND,

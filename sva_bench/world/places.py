@@ -20,8 +20,8 @@ from scipy.spatial.distance import cdist
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import Cells, DistanceField, connected_region, distance_field
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.model import Obstacles
 
 Point = tuple[float, float]
 

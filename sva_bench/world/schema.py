@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from sva_bench.files.documents import Bounded, Name, Number, Positive, Probability, Section, WholeNumber
-from sva_bench.mission.failures import FailureProcess
+from sva_bench.choices import FailureProcess
+from sva_bench.files.fields import Bounded, Name, Number, Positive, Probability, Section, WholeNumber
 from sva_bench.world.places import APART_M
 
 KIND = "sva-bench/world@1"

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from sva_bench.errors import BadFile, SvaBenchError
+from sva_bench.choices import FailureProcess
+from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.documents import Document, Loc
 from sva_bench.world.load import world_of
 from sva_bench.world.model import World
@@ -73,3 +75,25 @@ def option_of(key: str, values: Mapping[str, Any]) -> str:
     """A value as the command line asks for it."""
     word = json.dumps(values[key])
     return f"--set {key}={word if len(word) <= 60 else word[:57] + '...'}"
+
+
+
+def adapted(
+    world: World, scenarios: Sequence[str] | None = None, margin: float | None = None,
+    plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
+) -> World:
+    """A world with some of its settings replaced."""
+    if scenarios:
+        world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
+            scenarios, [s.name for s in world.scenarios])))
+    return replace(
+        world, margin=world.margin if margin is None else margin,
+        plan_failure=world.plan_failure if plan_failure is None else plan_failure,
+        execute_failure=world.execute_failure if execute_failure is None else execute_failure)
+
+
+def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
+    for name in names:
+        if name not in known:
+            raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
+    return list(dict.fromkeys(names))

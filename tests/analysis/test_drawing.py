@@ -16,14 +16,16 @@ from numpy.testing import assert_array_equal
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import WorldFamily
 from sva_bench.execution.engines.bullet import obstacles_urdf
-from sva_bench.generate.terrain import Family, random_places, random_terrain
+from sva_bench.generate.terrain import random_places, random_terrain
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world, frame_of
 from sva_bench.report.labels import place_labels
 from sva_bench.world.maps.ros import read_ros_map
-from sva_bench.world.model import Obstacles, World
+from sva_bench.world.model import World
 from tests.oracles.distances import points_clearance
 from tests.world.maps_for_tests import write_ros_map
 from tests.worlds_for_tests import SMALL, world_of
@@ -46,7 +48,7 @@ def pixels(world: World, overlays: Overlays) -> FloatArray:
 def test_what_is_drawn_as_an_obstacle_is_one_and_what_is_white_is_free(family: str, small: World) -> None:
     world = small
     if family in ("field", "aisles"):
-        kind: Family = "field" if family == "field" else "aisles"
+        kind: WorldFamily = "field" if family == "field" else "aisles"
         obstacles = random_terrain(kind, size_m=10, density=0.12, seed=2).obstacles
         x, y = random_places(obstacles, stations=0, pois=0, seed=2).base
         world = replace(small, obstacles=obstacles, sites=(replace(small.sites[0], x_m=x, y_m=y),))

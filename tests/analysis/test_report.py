@@ -20,12 +20,13 @@ from sva_bench.analysis.statistics import Estimate
 from sva_bench.batch.aggregates import aggregate, maps
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.report import charts
-from sva_bench.report.run_page import _over_maps as over_maps_said
-from sva_bench.report.run_page import write_batch_report
+from sva_bench.report.batch_page import _over_maps as over_maps_said
+from sva_bench.report.batch_page import write_batch_report
 from sva_bench.report.wording import answer, finding, over_few_maps, remarks, vss_verdict, with_interval
-from sva_bench.storage.stored_run import report_again, write_csv
-from sva_bench.study.planning import Options
-from sva_bench.study.run import Run, run
+from sva_bench.storage.stored_run import write_csv
+from sva_bench.study.options import Options
+from sva_bench.study.publish import Run, report_again
+from sva_bench.study.run import run
 from tests.worlds_for_tests import world_of
 
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),

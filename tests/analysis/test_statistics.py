@@ -23,7 +23,8 @@ from sva_bench.analysis.statistics import (
     tail_mean,
 )
 from sva_bench.arrays import FloatArray
-from sva_bench.mission.failures import NEVER, FailureProcess, draw_failures, route_value
+from sva_bench.choices import FailureProcess
+from sva_bench.mission.failures import NEVER, draw_failures, route_value
 
 
 def interval_of(found: Estimate) -> tuple[float, float]:

@@ -22,9 +22,9 @@ from sva_bench.analysis.summary import (
     ranking,
     scenario_summary,
 )
+from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.execution.margins import Margins
-from sva_bench.execution.outcome import ENDS, End
 from sva_bench.mission.plan import Plan
 from sva_bench.world.model import Scenario
 

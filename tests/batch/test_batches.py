@@ -19,7 +19,7 @@ import pytest
 from sva_bench.batch.folder import begin, settings_in, shard_path, write_maps
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.study.planning import Options
+from sva_bench.study.options import Options
 from tests.test_batch import rows_of
 from tests.test_cli import sva_bench
 from tests.world.test_map_worlds import two_rooms

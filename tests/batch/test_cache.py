@@ -22,7 +22,7 @@ from sva_bench.batch.jobs import PlansJob, TravelTimesJob
 from sva_bench.errors import BadInput
 from sva_bench.execution.outcome import Driven
 from sva_bench.files.codec import NotOfType, decoded, encoded
-from sva_bench.study.planning import Options
+from sva_bench.study.options import Options
 from sva_bench.travel.fuel import fuel_costs
 from tests.worlds_for_tests import world_of
 

@@ -97,7 +97,7 @@ if __name__ == "__main__":
     engine.submit("hang", Deed(deed="hang"))
     while not engine._at:
         engine.answers(0.5)
-    with local_workers(2) as executor:
+    with local_workers(2, "sva_bench.execution.execute") as executor:
         pids = {executor.submit(Deed(deed="work").run).result() for _ in range(8)}
         executor.submit(time.sleep, 600)
         print(*engine.pids, *pids, flush=True)

@@ -14,11 +14,11 @@ from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadFile
 from sva_bench.execution.execute import DriveTask, drive_route
 from sva_bench.files.documents import parse_yaml
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.follower import CONTROL_HZ, stretches
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.load import world_of
-from sva_bench.world.model import Obstacles
 from sva_bench.world.schema import Figures
 from tests.worlds_for_tests import SMALL
 

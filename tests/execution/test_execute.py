@@ -14,9 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.analysis.figures import value_figure
 from sva_bench.analysis.statistics import estimate
-from sva_bench.execution.execute import Case, Executed, Fidelity, Settings, execute, wheel_gains
-from sva_bench.execution.outcome import ENDS
-from sva_bench.mission.failures import FailureProcess, JointState, route_value
+from sva_bench.choices import ENDS, FailureProcess, Fidelity
+from sva_bench.execution.execute import Case, Executed, Settings, execute, wheel_gains
+from sva_bench.mission.failures import JointState, route_value
 from sva_bench.mission.plan import Plan
 from sva_bench.world.model import Noise, Scenario, World
 from tests.execution.conftest import Planned

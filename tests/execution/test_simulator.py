@@ -11,13 +11,14 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import Fidelity
 from sva_bench.execution.engines.bullet import downsampled
-from sva_bench.execution.execute import DriveTask, Fidelity, Leg, drive_route
+from sva_bench.execution.execute import DriveTask, Leg, drive_route
 from sva_bench.execution.outcome import Driven
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.follower import CONTROL_HZ, stretches
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.travel.roadmap import plan_paths
-from sva_bench.world.model import Obstacles
 from tests.oracles.distances import points_clearance
 from tests.oracles.worlds import free_places, random_obstacles
 

@@ -14,8 +14,10 @@ from numpy.testing import assert_array_equal
 
 from sva_bench.errors import BadFile
 from sva_bench.mission.failures import JointState
-from sva_bench.mission.instance import Instance, Vehicle, instance_as_dict, read_instance, write_instance
-from sva_bench.mission.plan import Plan, plan_as_dict, read_plan, write_plan
+from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.mission.instance_file import instance_as_dict, read_instance, write_instance
+from sva_bench.mission.plan import Plan
+from sva_bench.mission.plan_file import plan_as_dict, read_plan, write_plan
 
 TINY: dict[str, Any] = {
     "format": "sva-bench/instance@1", "name": "tiny", "sites": ["base", "r1", "p1", "p2"], "base": "base",

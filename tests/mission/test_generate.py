@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sva_bench.generate.instances import Family, random_instance
-from sva_bench.mission.instance import instance_as_dict
+from sva_bench.choices import InstanceFamily
+from sva_bench.generate.instances import random_instance
+from sva_bench.mission.instance_file import instance_as_dict
 from sva_bench.solver.preprocess import is_metric
 
 
 @pytest.mark.parametrize("family", ["A", "B", "C"])
 @pytest.mark.parametrize("directed", [False, True])
-def test_an_instance_is_the_same_each_time_and_metric(family: Family, directed: bool) -> None:
+def test_an_instance_is_the_same_each_time_and_metric(family: InstanceFamily, directed: bool) -> None:
     one, other = (random_instance(family, pois=12, vehicles=3, availability=0.5, seed=4, directed=directed)
                   for _ in range(2))
     assert instance_as_dict(one) == instance_as_dict(other)
@@ -29,7 +30,7 @@ def test_every_other_vehicle_is_certain_and_earns_nothing_at_half_of_the_pois() 
 
 
 def test_families_differ_in_what_their_fuel_allows() -> None:
-    def ratios(family: Family, fuel: float | None = None, tau: float | None = None) -> tuple[float, float]:
+    def ratios(family: InstanceFamily, fuel: float | None = None, tau: float | None = None) -> tuple[float, float]:
         instance = random_instance(family, pois=15, vehicles=2, availability=0.5, seed=2, fuel_multiple=fuel, tau=tau)
         vehicle = instance.vehicles[0]
         longest = float(vehicle.fuel_s.max())

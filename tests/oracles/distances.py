@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.world.model import Obstacles
+from sva_bench.geometry.obstacles import Obstacles
 
 
 def corners_of(box: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
-from sva_bench.world.model import Obstacles
+from sva_bench.geometry.obstacles import Obstacles
 from tests.oracles.distances import corners_of
 
 _QUADRANT = 12  # edges for each quarter of a circle

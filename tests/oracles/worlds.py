@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.world.model import Obstacles
+from sva_bench.geometry.obstacles import Obstacles
 from tests.oracles.distances import points_clearance
 
 

@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from sva_bench.execution.outcome import Assignment, Driven, Trace, settle, trace_of
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import NEVER
 from sva_bench.robot.model import BUILT_IN
-from sva_bench.world.model import Noise, Obstacles, Robot, Scenario, Site, World
+from sva_bench.world.model import Noise, Robot, Scenario, Site, World
 
 BASE = (1.0, 1.0, 0.0)
 WORLD = World(

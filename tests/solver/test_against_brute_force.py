@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sva_bench.generate.instances import Family
+from sva_bench.choices import Cuts, InstanceFamily
 from sva_bench.generate.instances import random_instance as paper_instance
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.solver import solve as solving
-from sva_bench.solver.flow.lshaped import Cuts
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.solve import Method
@@ -175,7 +174,7 @@ def test_plans_for_failures_along_the_way_are_those_that_enumeration_finds_on_ma
 
 
 @pytest.mark.parametrize(("family", "seed"), [("B", 1), ("B", 2), ("B", 3), ("C", 11), ("C", 15)])
-def test_a_plan_that_falls_a_little_short_of_a_floor_ends_no_search(family: Family, seed: int) -> None:
+def test_a_plan_that_falls_a_little_short_of_a_floor_ends_no_search(family: InstanceFamily, seed: int) -> None:
     # The tied plan of least expected value: a whole relaxation that misses the floor by 3 % cost less than the plan.
     instance = paper_instance(family, pois=6, vehicles=2, availability=0.75, seed=seed)
     want, known = truth(instance), knowledge_of(instance)

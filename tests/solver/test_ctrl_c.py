@@ -16,11 +16,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sva_bench.generate.instances import Family, random_instance
+from sva_bench.choices import InstanceFamily
+from sva_bench.generate.instances import random_instance
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.certify import certify
-from sva_bench.mission.instance import Instance, write_instance
-from sva_bench.mission.plan import Plan, read_plan
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.instance_file import write_instance
+from sva_bench.mission.plan import Plan
+from sva_bench.mission.plan_file import read_plan
 from sva_bench.solver.columns import column_generation
 from sva_bench.solver.columns.graph import graph_of, neighbours
 from sva_bench.solver.columns.listing import counts
@@ -37,7 +40,7 @@ from sva_bench.solver.two_stage import plan_averse, plan_deterministic, plan_sto
 SOON_S = 0.2  # from the outside: compiled code keeps this process from doing anything
 
 
-def hard(family: Family = "A", pois: int = 60, *, vehicles: int = 2, directed: bool = True) -> Instance:
+def hard(family: InstanceFamily = "A", pois: int = 60, *, vehicles: int = 2, directed: bool = True) -> Instance:
     """An instance that takes minutes."""
     return random_instance(family, pois=pois, vehicles=vehicles, availability=0.75, seed=1, directed=directed)
 

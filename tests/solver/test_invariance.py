@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sva_bench.choices import Cuts
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver import solve as solving
-from sva_bench.solver.flow.lshaped import Cuts
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.solve import TWO_STAGE, Method

@@ -22,7 +22,8 @@ from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState
-from sva_bench.mission.instance import Instance, Vehicle, read_instance
+from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.mission.instance_file import read_instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver import solve as solving
 from sva_bench.solver.columns import column_generation

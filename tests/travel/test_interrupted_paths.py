@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import PathPlanner
 from sva_bench.geometry.buckets import keeps_clear
 from sva_bench.interrupts import as_ctrl_c
 from sva_bench.travel import roadmap
@@ -25,9 +26,9 @@ def where(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, FloatArray]
     return world.obstacles, np.array([(site.x_m, site.y_m) for site in world.sites])
 
 
-@pytest.mark.parametrize("planner", get_args(roadmap.PlannerName))
+@pytest.mark.parametrize("planner", get_args(PathPlanner))
 def test_ctrl_c_in_a_callback_ends_the_search_and_is_raised_then(
-    planner: roadmap.PlannerName, where: tuple[object, FloatArray], monkeypatch: pytest.MonkeyPatch
+    planner: PathPlanner, where: tuple[object, FloatArray], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls, raised = 0, 0
 

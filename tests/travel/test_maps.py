@@ -15,7 +15,8 @@ from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.geometry.cells import Cells, distance_field
 from sva_bench.geometry.passages import widest_passage
 from sva_bench.travel.roadmap import plan_paths
-from sva_bench.world.maps.ros import read_movingai_map, read_ros_map
+from sva_bench.world.maps.movingai import read_movingai_map
+from sva_bench.world.maps.ros import read_ros_map
 from tests.oracles.grids import shortest_lengths
 from tests.oracles.octile import octile_length, read_scen
 from tests.travel.test_roadmap import MEAN_RATIO, WORST_RATIO, length_of

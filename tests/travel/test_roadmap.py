@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +14,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from sva_bench.arrays import FloatArray
-from sva_bench.cli import options
-from sva_bench.travel.roadmap import PlannerName, plan_paths, roadmap_edges
-from sva_bench.world.model import Obstacles
+from sva_bench.choices import PathPlanner
+from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.travel.roadmap import plan_paths, roadmap_edges
 from tests.oracles.distances import path_clearance
 from tests.oracles.visibility import shortest_lengths
 from tests.oracles.worlds import free_places, random_obstacles
@@ -120,7 +120,7 @@ def test_the_two_bounds_of_the_oracle_enclose_the_optimum_to_a_thousandth(seed: 
     assert np.all(upper[both] <= lower[both] * 1.001)
 
 
-def digest(planner: PlannerName) -> str:
+def digest(planner: PathPlanner) -> str:
     """Every bit of all paths of a random world."""
     obstacles = random_obstacles(3)
     paths = plan_paths(obstacles, free_places(obstacles, 3, 6, CLEARANCE_M), CLEARANCE_M, planner=planner)
@@ -129,7 +129,7 @@ def digest(planner: PlannerName) -> str:
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_planning_twice_gives_the_same_paths_bit_for_bit(planner: PlannerName) -> None:
+def test_planning_twice_gives_the_same_paths_bit_for_bit(planner: PathPlanner) -> None:
     first = digest(planner)
     assert digest(planner) == first
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as fresh:
@@ -137,7 +137,7 @@ def test_planning_twice_gives_the_same_paths_bit_for_bit(planner: PlannerName) -
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_paths_of_every_planner_are_free_and_end_at_their_sites(planner: PlannerName) -> None:
+def test_paths_of_every_planner_are_free_and_end_at_their_sites(planner: PathPlanner) -> None:
     obstacles = random_obstacles(5)
     points = free_places(obstacles, 5, 6, CLEARANCE_M)
     optimum = shortest_lengths(obstacles, points, CLEARANCE_M)
@@ -156,10 +156,6 @@ def test_paths_of_every_planner_are_free_and_end_at_their_sites(planner: Planner
             assert length_of(path) >= optimum[i, j] * (1 - 1e-9)
 
 
-def test_the_command_line_offers_exactly_the_planners_that_there_are() -> None:
-    assert get_args(options.Planner) == get_args(PlannerName)
-
-
 def test_in_an_empty_world_paths_are_straight() -> None:
     nothing = Obstacles(bounds_m=np.array([0.0, 0, 5, 5]), boxes=np.empty((0, 5)), cylinders=np.empty((0, 3)))
     points = np.array([[1.0, 1], [4, 1], [2, 4]])
@@ -171,7 +167,7 @@ def test_in_an_empty_world_paths_are_straight() -> None:
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_a_closed_wall_leaves_no_path(planner: PlannerName) -> None:
+def test_a_closed_wall_leaves_no_path(planner: PathPlanner) -> None:
     closed = Obstacles(bounds_m=np.array([0.0, 0, 3, 2]), boxes=np.array([[1.5, 1, 0.05, 1.0, 0]]),
                        cylinders=np.empty((0, 3)))
     paths = plan_paths(closed, np.array([[0.6, 1.0], [2.4, 1.0], [0.6, 1.5]]), CLEARANCE_M, planner=planner)

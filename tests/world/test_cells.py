@@ -27,8 +27,8 @@ from sva_bench.geometry.cells import (
     cover,
     distance_field,
 )
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.recording.story import story_of
-from sva_bench.world.model import Obstacles
 from tests.recording.missions import WORLD as LINE
 from tests.recording.missions import trace
 from tests.world.maps_for_tests import write_ros_map

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear, keeps_clearance, open_heading
 from sva_bench.geometry.distances import clearance, segment_distance
-from sva_bench.world.model import Obstacles
+from sva_bench.geometry.obstacles import Obstacles
 from tests.oracles.distances import points_clearance, segment_clearance
 from tests.oracles.worlds import random_obstacles
 

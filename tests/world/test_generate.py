@@ -8,27 +8,20 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from sva_bench.choices import WorldFamily
 from sva_bench.errors import BadInput
 from sva_bench.generate.mazes import maze_walls
 from sva_bench.generate.rooms import room_walls
-from sva_bench.generate.terrain import (
-    APART_M,
-    DENSITY,
-    PASSAGE_M,
-    SITE_ROOM_M,
-    Family,
-    random_places,
-    random_terrain,
-)
+from sva_bench.generate.terrain import APART_M, DENSITY, PASSAGE_M, SITE_ROOM_M, random_places, random_terrain
 from sva_bench.travel.roadmap import surely_apart
 from tests.oracles.distances import points_clearance, segment_clearance
 
-FAMILIES: tuple[Family, ...] = get_args(Family)
+FAMILIES: tuple[WorldFamily, ...] = get_args(WorldFamily)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("seed", [0, 1])
-def test_all_free_places_hang_together_and_sites_have_room(family: Family, seed: int) -> None:
+def test_all_free_places_hang_together_and_sites_have_room(family: WorldFamily, seed: int) -> None:
     obstacles = random_terrain(family, size_m=15, density=DENSITY[family], seed=seed).obstacles
     places = random_places(obstacles, stations=3, pois=12, seed=seed)
     sites = np.array([places.base, *places.stations, *places.pois])
@@ -41,7 +34,7 @@ def test_all_free_places_hang_together_and_sites_have_room(family: Family, seed:
 
 
 @pytest.mark.parametrize("family", ["rooms", "field", "aisles"])
-def test_density_is_the_share_of_the_area_that_is_covered(family: Family) -> None:
+def test_density_is_the_share_of_the_area_that_is_covered(family: WorldFamily) -> None:
     terrain = random_terrain(family, size_m=20, density=0.08, seed=3)
     things = [shape for shape in terrain.shapes if "wall" not in shape]
     covered = sum(np.prod(s["size_m"]) if "box" in s else np.pi * s["radius_m"] ** 2 for s in things)
@@ -83,7 +76,7 @@ def test_each_room_has_a_door_of_a_metre_at_least() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_same_seed_gives_the_same_terrain_and_another_another(family: Family) -> None:
+def test_the_same_seed_gives_the_same_terrain_and_another_another(family: WorldFamily) -> None:
     def shapes(seed: int) -> object:
         return random_terrain(family, size_m=12, density=DENSITY[family], seed=seed).shapes
 

@@ -16,7 +16,8 @@ from sva_bench.files.json_lines import json_line
 from sva_bench.generate.worlds import world_from_map
 from sva_bench.world.load import load_world
 from sva_bench.world.maps.images import BadImage, grey_image
-from sva_bench.world.maps.ros import read_movingai_map, read_ros_map
+from sva_bench.world.maps.movingai import read_movingai_map
+from sva_bench.world.maps.ros import read_ros_map
 from tests.world.maps_for_tests import write_pgm, write_ros_map
 
 ROOM = "\n".join(["#" * 16] + ["#" + "." * 14 + "#"] * 12 + ["#" * 16])
@@ -171,7 +172,7 @@ def test_a_line_of_a_large_matrix_is_found_in_one_walk() -> None:
 
 
 def test_yaml_of_too_many_values_is_refused_by_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sva_bench.files.documents.MAX_YAML_VALUES", 50)
+    monkeypatch.setattr("sva_bench.files.yaml_text.MAX_YAML_VALUES", 50)
     (tmp_path / "a.yaml").write_text("a: [" + "1, " * 60 + "1]\n")
     with pytest.raises(BadFile, match="more than 50 keys and values"):
         read_yaml(tmp_path / "a.yaml")

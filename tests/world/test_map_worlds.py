@@ -13,10 +13,10 @@ from sva_bench.batch.folder import begin, settings_in, write_maps
 from sva_bench.batch.grid import Grid, Point, grid_of
 from sva_bench.cli.loading import about
 from sva_bench.errors import BadFile
-from sva_bench.files.documents import pretty_json
+from sva_bench.files.pretty import pretty_json
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.storage.stored_run import report_again
-from sva_bench.study.planning import Options
+from sva_bench.study.options import Options
+from sva_bench.study.publish import report_again
 from sva_bench.study.run import run
 from sva_bench.travel.times import UnreachableSite, plan_travel_times
 from sva_bench.world.load import load_world, world_as_dict

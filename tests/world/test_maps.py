@@ -13,9 +13,11 @@ from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 from PIL import Image
 
+from sva_bench.choices import MapMode
 from sva_bench.errors import BadFile
 from sva_bench.world.maps.images import grey_image
-from sva_bench.world.maps.ros import Mode, occupancy, read_movingai_map, read_ros_map, solid_cells
+from sva_bench.world.maps.movingai import read_movingai_map
+from sva_bench.world.maps.ros import occupancy, read_ros_map, solid_cells
 from tests.world.maps_for_tests import YAML, shared_map, write_pgm, write_ros_map
 
 SPECTRUM = np.arange(256, dtype=np.uint8)[None]
@@ -25,7 +27,9 @@ def pgm_of(level: NDArray[np.uint8]) -> bytes:
     return b"P5 %d %d 255\n" % level.shape[::-1] + level.tobytes()
 
 
-def read_spectrum(mode: Mode, *, negate: bool = False, occupied: float = 0.65, free: float = 0.1) -> NDArray[np.int8]:
+def read_spectrum(
+    mode: MapMode, *, negate: bool = False, occupied: float = 0.65, free: float = 0.1
+) -> NDArray[np.int8]:
     value = occupancy(grey_image(pgm_of(SPECTRUM)), negate=negate, occupied_thresh=occupied, free_thresh=free,
                       mode=mode)
     return np.array(value[0])
@@ -78,7 +82,7 @@ def test_a_pixel_at_a_threshold_is_occupied_or_free_as_in_current_nav2() -> None
 
 def test_what_is_between_the_thresholds_counts_as_unknown_in_every_mode() -> None:
     # Level 150: 0.412 of the way to black. Raw, 50 %.
-    cases: list[tuple[Mode, int]] = [("trinary", 150), ("scale", 150), ("raw", 50)]
+    cases: list[tuple[MapMode, int]] = [("trinary", 150), ("scale", 150), ("raw", 50)]
     for mode, level in cases:
         value = occupancy(grey_image(pgm_of(np.array([[level]], dtype=np.uint8))), negate=False, occupied_thresh=0.65,
                           free_thresh=0.196, mode=mode)

@@ -17,7 +17,8 @@ from PIL import Image
 from sva_bench.errors import BadFile
 from sva_bench.geometry.cells import boxes_of
 from sva_bench.world.maps.images import MAX_CELLS
-from sva_bench.world.maps.ros import read_movingai_map, read_ros_map
+from sva_bench.world.maps.movingai import read_movingai_map
+from sva_bench.world.maps.ros import read_ros_map
 from tests.world.maps_for_tests import YAML
 
 LONGEST_S, MOST_MB, LONGEST_COMPLAINT = 5.0, 1000, 600

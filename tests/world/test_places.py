@@ -14,9 +14,9 @@ from scipy.ndimage import label
 from sva_bench.errors import BadFile
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import Cells, distance_field
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.maps.ros import read_ros_map
-from sva_bench.world.model import Obstacles
 from sva_bench.world.places import NoRoom, Point, field_of, find_places
 from tests.oracles.worlds import random_obstacles
 from tests.world.maps_for_tests import shared_map

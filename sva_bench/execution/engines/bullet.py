@@ -15,11 +15,11 @@ from types import TracebackType
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
 from sva_bench.robot.model import CASTERS_AT, RobotModel
 from sva_bench.robot.twin import patience_steps
-from sva_bench.world.model import Obstacles
 
 
 @contextlib.contextmanager

@@ -14,11 +14,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import Cuts
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.cuts import violated_by_integers
 from sva_bench.solver.flow.expected import DirectedModel
@@ -33,7 +33,6 @@ from sva_bench.solver.units import LARGEST
 
 _log = logging.getLogger(__name__)
 
-Cuts = Literal["single", "multi", "pareto"]
 
 _TOLERANCE = 1e-9  # relative; a cut that is broken by less adds nothing
 

@@ -10,47 +10,29 @@ from __future__ import annotations
 import json
 import logging
 import math
-import os
 import re
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path, PurePosixPath
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sva_bench.arrays import BoolArray
+from sva_bench.choices import MapMode, Unknown
 from sva_bench.errors import BadFile, nearest
-from sva_bench.files.documents import Document, pretty_yaml, read_bytes, read_yaml
+from sva_bench.files.documents import Document, read_yaml
+from sva_bench.files.yaml_text import pretty_yaml
 from sva_bench.geometry.cells import Cells
-from sva_bench.world.maps.images import MAX_CELLS, BadImage, GreyImage, grey_image
+from sva_bench.world.maps.files import FARTHEST_M, WIDEST_M, MapFile, content_of, locate, normal
+from sva_bench.world.maps.images import BadImage, GreyImage, grey_image
 
 _log = logging.getLogger(__name__)
 
-Mode = Literal["trinary", "scale", "raw"]
-Unknown = Literal["occupied", "free"]
 
-MAX_BYTES = 100_000_000  # 16 million numbers in ASCII, with room to spare
-WIDEST_M, FARTHEST_M = 2000.0, 1e5  # of a world, and from its origin; as for shapes
 _USUAL_UNKNOWN, _MANY = 205, 1e-3  # the level that map_saver writes for unknown; share of cells that is no accident
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
-_MODES: tuple[Mode, ...] = ("trinary", "scale", "raw")
+_MODES: tuple[MapMode, ...] = ("trinary", "scale", "raw")
 _YES, _NO = ("true", "yes", "on", "1"), ("false", "no", "off", "0")  # YAML 1.1 has all of them, and ROS reads it
-_FREE_TERRAIN, _SOLID_TERRAIN = b".GS", b"@OTW"
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MapFile:
-    """A file that a world names, directly or by another one.
-
-    Attributes:
-        name: Relative to the world's folder, with slashes.
-        content: Its bytes as they were read.
-    """
-
-    name: str
-    content: bytes
 
 
 def read_ros_map(
@@ -89,7 +71,7 @@ def read_ros_map(
     except BadFile as error:
         raise document.error(("image",), f"{error.path}: {error.problem}") from None
     try:
-        content = _content(image_path)
+        content = content_of(image_path)
         image = grey_image(content)
     except BadImage as error:
         raise BadFile(image_path, None, "", f"{error} (the image of {path})") from None
@@ -107,8 +89,8 @@ def read_ros_map(
     _refuse_no_free_cell(document, solid, int((value < 100 * occupied).sum()), unknown)
     cells = Cells(occupied=solid[::-1], cell_m=cell_m, origin=np.array(origin),
                   unknown=(solid & (value < 100 * occupied))[::-1])
-    own = _content(path) if elsewhere is None else naming_image(document, PurePosixPath(image_name).name)
-    return cells, (MapFile(name=_normal(name), content=own), MapFile(name=image_name, content=content))
+    own = content_of(path) if elsewhere is None else naming_image(document, PurePosixPath(image_name).name)
+    return cells, (MapFile(name=normal(name), content=own), MapFile(name=image_name, content=content))
 
 
 def _say_what_is_odd(document: Document, image: GreyImage, value: NDArray[np.int8], free_thresh: float) -> None:
@@ -147,7 +129,7 @@ def naming_image(document: Document, name: str) -> bytes:
 
 
 def occupancy(
-    image: GreyImage, *, negate: bool, occupied_thresh: float, free_thresh: float, mode: Mode
+    image: GreyImage, *, negate: bool, occupied_thresh: float, free_thresh: float, mode: MapMode
 ) -> NDArray[np.int8]:
     """Occupancy of each pixel, 0 to 100 or -1, as current Nav2 reads it; in its single precision."""
     if mode == "raw":
@@ -182,94 +164,6 @@ def solid_cells(
     return result
 
 
-def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tuple[MapFile, ...]]:
-    """Read an octile map of the MovingAI benchmarks; its first row is the northernmost.
-
-    Robots drive on ``.``, ``G`` and swamp ``S``; trees ``T``, water ``W`` and ``@``, ``O`` are solid.
-
-    Raises:
-        BadFile: With file, line and what to change.
-
-    Source:
-        Sturtevant (2012), Benchmarks for grid-based pathfinding, and the format's description there.
-    """
-    path = locate(root, name)
-    content = _content(path)
-    # An editor's byte-order mark is no part of the text, and no more lines are taken apart than cells may be.
-    lines = content.removeprefix(b"\xef\xbb\xbf").split(b"\n", MAX_CELLS + 4)
-    lines = [line.removesuffix(b"\r") for line in lines]
-    while lines and not lines[-1].strip():
-        lines.pop()
-    if not lines or lines[0].split() != [b"type", b"octile"]:
-        raise BadFile(path, 1, "", "expected 'type octile', the first line of a MovingAI map")
-    size: dict[str, int] = {}
-    for number in (1, 2):
-        words = lines[number].split() if number < len(lines) else []
-        if len(words) != 2 or words[0] not in (b"height", b"width") or not words[1].isdigit() or len(words[1]) > 9:
-            raise BadFile(path, number + 1, "", "expected 'height' and 'width' with a whole number each")
-        size[words[0].decode()] = int(words[1])
-    if len(size) != 2:
-        raise BadFile(path, 3, "", "expected 'height' and 'width', each once")
-    rows, columns = size["height"], size["width"]
-    if min(rows, columns) < 1 or rows * columns > MAX_CELLS:
-        raise BadFile(path, 2, "", f"{columns} x {rows} cells; expected at least one, and at most {MAX_CELLS}")
-    if max(rows, columns) * cell_m > WIDEST_M:
-        raise BadFile(path, 2, "", f"{columns} x {rows} cells of {cell_m} m; a world may be at most {WIDEST_M:g} m "
-                      "wide: choose a smaller cell_m")
-    if len(lines) < 4 or lines[3].strip() != b"map":
-        raise BadFile(path, 4, "", "expected 'map', and then the rows")
-    body = lines[4:]
-    if len(body) != rows:
-        raise BadFile(path, len(lines), "", f"expected {rows} rows below 'map', as 'height' says, found {len(body)}")
-    for number, line in enumerate(body, start=5):
-        if len(line) != columns:
-            raise BadFile(path, number, "", f"expected {columns} cells, as 'width' says, found {len(line)}")
-    letters = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
-    free = np.isin(letters, np.frombuffer(_FREE_TERRAIN, dtype=np.uint8))
-    strange = ~(free | np.isin(letters, np.frombuffer(_SOLID_TERRAIN, dtype=np.uint8)))
-    if strange.any():
-        row, column = np.argwhere(strange)[0].tolist()
-        raise BadFile(path, row + 5, "", f"column {column + 1}: {chr(letters[row, column])!r} is no terrain; expected "
-                      "one of . G S @ O T W")
-    if not free.any():
-        raise BadFile(path, None, "", f"no cell of the map is free: all {free.size} are solid (one of @ O T W)")
-    cells = Cells(occupied=~free[::-1], cell_m=cell_m, origin=np.zeros(3))
-    return cells, (MapFile(name=_normal(name), content=content),)
-
-
-def locate(root: Path, name: str) -> Path:
-    """A file by its name relative to a folder, which it may not leave: not by ``..`` and not by a link either.
-
-    Raises:
-        BadFile: If it is elsewhere, or no file.
-    """
-    shown = name if name.isprintable() and len(name) <= 200 else repr(name[:200])
-    if not name or "\0" in name:
-        raise BadFile(root, None, "", "expected the name of a file")
-    if name.startswith(("/", "~")) or "\\" in name:
-        raise BadFile(shown, None, "", "no name relative to the world's folder, with slashes; put the file there, and "
-                      "name it so")
-    path = Path(root, _normal(name))
-    try:
-        inside = path.resolve().is_relative_to(root.resolve())
-        if inside and path.is_file():
-            return path
-        there = path.exists()
-    except (OSError, RuntimeError, ValueError):  # a name too long, links in a circle
-        inside, there = True, False
-    if not inside:
-        raise BadFile(shown, None, "", "lies outside the world's folder; copy the file there")
-    raise BadFile(shown, None, "", f"{'not a file' if there else 'no such file'} in {root}")
-
-
-def _normal(name: str) -> str:
-    return str(PurePosixPath(os.path.normpath(name)))
-
-
-def _content(path: Path) -> bytes:
-    return read_bytes(path, MAX_BYTES)
-
-
 def _image_of(document: Document) -> str:
     image = _value(document, "image")
     if not isinstance(image, str) or not image.strip() or "\0" in image:
@@ -296,7 +190,7 @@ def _image_name(document: Document, yaml_name: str, elsewhere: Path | None) -> s
     if elsewhere is None and image.startswith(("/", "~")):
         raise document.error(("image",), f"{image[:200]!r} is an absolute path; put the image beside this file and "
                              "name it without folders")
-    return _normal(str(PurePosixPath(yaml_name).parent / image))
+    return normal(str(PurePosixPath(yaml_name).parent / image))
 
 
 def _value(document: Document, key: str) -> object:
@@ -347,7 +241,7 @@ def _flag(document: Document, key: str) -> bool:
     return text in _YES
 
 
-def _mode(document: Document) -> Mode:
+def _mode(document: Document) -> MapMode:
     value = document.data.get("mode")
     if value is None:
         return "trinary"

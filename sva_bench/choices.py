@@ -1,0 +1,37 @@
+"""Every word that users choose from or read in results, once: options, files, signatures and registries share them.
+
+Nothing is imported here, so that ``--help`` need not load the modules that the words are about.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+# Inputs
+SiteKind = Literal["base", "station", "poi"]
+FailureProcess = Literal["mission", "per_leg"]
+MapMode = Literal["trinary", "scale", "raw"]
+Unknown = Literal["occupied", "free"]
+"""What cells of a map count as that are neither occupied nor free."""
+WorldFamily = Literal["rooms", "field", "aisles", "maze"]
+InstanceFamily = Literal["A", "B", "C"]
+
+# Planning
+PathPlanner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
+Objective = Literal["stochastic", "deterministic"]
+PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess"]
+"""What a plan was made for; the last two are the stochastic objective with a risk."""
+RiskKind = Literal["cvar", "excess"]
+Method = Literal["auto", "expected", "dep", "relaxed", "lshaped"]
+Cuts = Literal["single", "multi", "pareto"]
+Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
+"""Of a plan, best first."""
+
+# Execution
+Fidelity = Literal["kinematic", "rollout", "physics"]
+End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
+ENDS: tuple[End, ...] = get_args(End)
+EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]
+
+# The paper
+PaperPart = Literal["rewards", "simulation", "runtimes"]

@@ -1,0 +1,26 @@
+"""Types of the values in files, and the sections that they stand in."""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from sva_bench.files.complaints import Loc as Loc
+
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
+"""Pattern of names of worlds, sites, robots and scenarios."""
+Name = Annotated[str, StringConstraints(pattern=NAME)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]
+"""Times [s] and incentives: sums of more than 1e9 would lose the feasibility tolerance to rounding."""
+Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
+WholeNumber = Annotated[int, Field(strict=True, ge=0)]
+
+
+class Section(BaseModel):
+    """A part of a document: frozen, and an unknown key is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+SectionT = TypeVar("SectionT", bound=BaseModel)

@@ -1,0 +1,62 @@
+"""What a run can be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from sva_bench.analysis.precision import Precision
+from sva_bench.choices import Fidelity, PathPlanner
+from sva_bench.execution.execute import Settings
+from sva_bench.solver.two_stage import (
+    SolveLimits,
+)
+from sva_bench.world.model import World
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Options:
+    """What a run can be told.
+
+    Attributes:
+        seed: Root of failures and noise; plans don't depend on it.
+        trials: Trials of each plan in each scenario.
+        rollouts: Noise draws; 1 is enough without noise.
+        fidelity: How plans are executed.
+        planner: How paths are planned.
+        limits: When a solve may stop.
+        evpi: Work out the value of perfect information however many outcomes there are.
+        informed: Execute what somebody would plan who knew beforehand who is available, too.
+        assumptions: Execute plans for both failure processes under both.
+        precision: Go on with more trials and noise draws until the executed VSS is so sure.
+    """
+
+    seed: int = 0
+    trials: int = 1000
+    rollouts: int = 8
+    fidelity: Fidelity = "rollout"
+    planner: PathPlanner = "prmstar"
+    limits: SolveLimits = field(default_factory=SolveLimits)
+    evpi: bool = False
+    informed: bool = False
+    assumptions: bool = False
+    precision: Precision | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything that changes results."""
+        asked = {} if self.precision is None else {"precision_pct": self.precision.pct,
+                                                   "max_trials": self.precision.max_trials}
+        return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
+                "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
+                "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
+
+
+
+def settings_of(world: World, options: Options) -> Settings:
+    """How plans are executed in a world."""
+    return Settings(seed=options.seed, trials=options.trials, fidelity=options.fidelity,
+                    rollouts=1 if world.noise.silent else options.rollouts)

@@ -1,0 +1,118 @@
+"""Run folders written, and their pages written again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from sva_bench.execution.execute import Executed
+from sva_bench.files.atomic import draft_file
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.instance_file import write_instance
+from sva_bench.mission.plan_file import write_plan
+from sva_bench.recording.rerun import record
+from sva_bench.report.run_page import write_report
+from sva_bench.storage.run_folder import (
+    leg_columns,
+    manifest,
+    run_folder,
+    run_name,
+    stem_of,
+    write_json,
+    write_legs,
+    write_map,
+    write_outcomes,
+    write_travel_times,
+)
+from sva_bench.storage.stored_run import Content, read_content, run_folder_at
+from sva_bench.study.options import Options, Progress, settings_of
+from sva_bench.study.summing import by_case
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.load import world_as_dict
+from sva_bench.world.model import World
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run:
+    """A finished run: where it is, and its summary."""
+
+    folder: Path
+    summary: Mapping[str, Any]
+
+
+def publish(
+    world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
+    executed: list[Executed], summary: Mapping[str, Any], out: Path, clock: Stopwatch, progress: Progress,
+    identity: Mapping[str, Any] | None = None,
+) -> Run:
+    """Write the run folder; ``identity`` is what results of plans from elsewhere depend on beside the rest."""
+    resolved = world_as_dict(world)
+    name = run_name(world.name, options.seed,
+                    {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
+    stems = {key: stem_of(*key, foreign=identity is not None) for key in by_case(executed)}
+    with run_folder(out, name) as folder:
+        (folder / "plans").mkdir()
+        (folder / "recordings").mkdir()
+        if world.map_source is not None:
+            write_map(folder, world.map_source)
+        write_travel_times(folder / "travel_times.parquet", list(costs.values()))
+        for scenario, instance in instances.items():
+            write_instance(folder / f"instance-{scenario}.json", instance)
+        with clock.phase("recording"):
+            for number, done in enumerate(executed):
+                scenario, planner = done.case.scenario.name, done.case.planner
+                stem = stems[scenario, planner]
+                write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
+                record(folder / "recordings" / f"{stem}.rrd", world, done.traces,
+                       title=f"{world.name}, {scenario}, {planner}")
+                progress("recording", number + 1, len(executed))
+        legs = leg_columns(executed)
+        write_legs(folder / "legs.parquet", legs)
+        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
+                       settings_of(world, options))
+        write_json(folder / "summary.json", summary)
+        told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
+        write_json(folder / "manifest.json", told)
+        write_report(folder / "report.html", Content(
+            summary=summary, routes={k: v.case.plan.routes for k, v in by_case(executed).items()}, stems=stems,
+            legs=legs, world=world, manifest=told))
+    return Run(folder=out / name, summary=summary)
+
+
+def report_again(folder: Path) -> Path:
+    """Write the report of a finished run again, from its tables.
+
+    Raises:
+        BadInput, BadFile: If this is no run folder, or something in it is cut off, foreign or not of the same run.
+    """
+    content = read_content(run_folder_at(folder))
+    path = folder / "report.html"
+    with draft_file(path) as draft:
+        write_report(draft, content)
+    return path
+
+
+def _digests(world: World) -> dict[str, Any]:
+    """Digests of the files that a world names, by name; nothing if it names none."""
+    return {} if world.map_source is None else {"files": world.map_source.digests()}
+
+
+class Stopwatch:
+    """Wall-clock time of each phase, for the manifest alone."""
+
+    def __init__(self) -> None:
+        self.started = datetime.now(UTC).isoformat(timespec="seconds")
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        begun = time.monotonic()
+        try:
+            yield
+        finally:
+            self.seconds[name] = time.monotonic() - begun
