@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Settings
-from sva_bench.paper.simulation import rewards, rewards_page, runtimes, simulation, simulation_page, three_vehicles
+from sva_bench.paper.rewards import rewards, rewards_page, three_vehicles
+from sva_bench.paper.simulation import simulation, simulation_page
 from sva_bench.study.planning import NOMINAL, nominal_scenario
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -61,22 +61,8 @@ def test_a_world_without_scenarios_is_no_such_study(tmp_path: Path) -> None:
         simulation([bare], SETTINGS, None, lambda *_: None)
 
 
-def test_the_table_of_runtimes_is_the_benchmarks_own() -> None:
-    asked: list[list[str]] = []
-
-    def run(command: list[str], *, cwd: Path, env: dict[str, str], check: bool) -> SimpleNamespace:
-        asked.append(command)
-        assert env["PYTHONPATH"].startswith(str(cwd))
-        assert (cwd / "benchmarks" / "solver" / "paper.py").is_file()
-        assert not check
-        return SimpleNamespace(returncode=130)
-
-    assert runtimes(run) == 130
-    assert asked[0][1:5] == ["-P", "-m", "benchmarks.solver.paper", "--quick"]
-
-
 @pytest.mark.parametrize(("arguments", "said"), [
-    (["reproduce", "rewards", "worlds/maze.yaml"], "reproduce rewards takes no worlds"),
+    (["reproduce", "rewards", "worlds/maze.yaml"], "unexpected extra argument"),
     (["reproduce", "simulation", "nowhere.yaml"], "nowhere.yaml: no such file"),
     (["reproduce", "figures"], "'figures'"),
 ])

@@ -23,7 +23,9 @@ SWEEP = "format: sva-bench/sweep@1\nworlds: [small.yaml]\n"
     (("plan",), "plan [OPTIONS] WORLD-or-INSTANCE"), (("certify",), "certify [OPTIONS] INSTANCE PLAN"),
     (("batch",), "batch [OPTIONS] WORLD..."), (("batch", "status"), "batch status [OPTIONS] DIR"),
     (("batch", "retry"), "batch retry [OPTIONS] DIR"), (("report",), "report [OPTIONS] RUN"),
-    (("reproduce",), "reproduce [OPTIONS] PART [WORLD...]"), (("view",), "view [OPTIONS] RUN-or-RRD"),
+    (("reproduce",), "reproduce [OPTIONS] PART [ARGS]..."),
+    (("reproduce", "simulation"), "reproduce simulation [OPTIONS] [WORLD...]"),
+    (("view",), "view [OPTIONS] RUN-or-RRD"),
     (("world",), "world [OPTIONS] COMMAND [ARGS]..."), (("world", "draw"), "world draw [OPTIONS] WORLD"),
     (("world", "from-map"), "world from-map [OPTIONS] MAP.yaml|MAP.map"),
 ])

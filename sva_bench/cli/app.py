@@ -9,7 +9,6 @@ import typer
 from rich.markup import escape
 
 from sva_bench import __version__
-from sva_bench.choices import PaperPart
 from sva_bench.cli.batch import batch_app
 from sva_bench.cli.libraries import load_libraries
 from sva_bench.cli.making import instance_app, world_app
@@ -32,11 +31,12 @@ from sva_bench.cli.options import (
     WorkerCount,
     WorldArgument,
 )
+from sva_bench.cli.paper import paper_app
 from sva_bench.cli.plans import certify, plan, times
 from sva_bench.cli.terminal import messages, print_json, print_summary, progress_bars, set_up_logging
 from sva_bench.cli.usage import PlainCommand
 from sva_bench.errors import BadInput
-from sva_bench.files.outputs import check_folder, check_output, write_result
+from sva_bench.files.outputs import check_folder, check_output
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.workers.pool import local_workers
 
@@ -53,6 +53,7 @@ app = typer.Typer(
 app.add_typer(batch_app, name="batch")
 app.add_typer(world_app, name="world")
 app.add_typer(instance_app, name="instance")
+app.add_typer(paper_app, name="reproduce")
 
 
 @app.command(cls=PlainCommand)
@@ -192,50 +193,6 @@ def view(
         run_folder_at(recording)  # which says what it is, if it is none
     check_output(screenshot, way_out="choose another place with --screenshot")
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
-
-
-@app.command(cls=PlainCommand)
-def reproduce(
-    part: Annotated[PaperPart, typer.Argument(
-        metavar="PART", show_default=False, help="rewards (Figure 4), simulation (Figures 7 and 8) or runtimes (the "
-                                                 "tables of section 5.1).")],
-    worlds: Annotated[list[Path] | None, typer.Argument(metavar="[WORLD...]", help="simulation: the maps.",
-                                                        show_default="the four shipped ones, in worlds/")] = None,
-    trials: Trials = 1000,
-    rollouts: Rollouts = 8,
-    fidelity: FidelityOption = "rollout",
-    seed: Seed = 0,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (Markdown); default: standard "
-                                                "output.", show_default=False)] = None,
-    workers: WorkerCount = None,
-    verbose: Verbose = False,
-) -> None:
-    """The paper's experiments again, ours beside its figures."""
-    set_up_logging(verbose)
-    check_output(output)
-    if worlds and part != "simulation":
-        raise BadInput(f"reproduce {part} takes no worlds")
-    with holding_back_ctrl_c():
-        from sva_bench.cli.loading import load
-        from sva_bench.execution.execute import Settings
-        from sva_bench.paper import simulation as paper
-
-    if part == "runtimes":
-        code = paper.runtimes()
-        if code:
-            raise typer.Exit(code)
-        return
-    with progress_bars() as progress:
-        if part == "rewards":
-            page = paper.rewards_page(paper.rewards(progress=progress))
-        else:
-            maps = worlds or [Path("worlds") / f"{name}.yaml" for name in
-                              ("four-rooms", "open-field", "warehouse", "maze")]
-            loaded = [load(path) for path in maps]
-            settings = Settings(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity)
-            with local_workers(workers, _PRELOAD) as executor:
-                page = paper.simulation_page(paper.simulation(loaded, settings, executor, progress), settings)
-    write_result(output, page)
 
 
 @app.command(cls=PlainCommand)

@@ -203,7 +203,7 @@ def run(study: Study, path: Path, tell: Callable[[int, int, Row], None] = lambda
         if (row.tau, row.time_limit_s) != (study.tau, study.time_limit_s):
             raise BadInput(f"{path}: its rows were made with a time limit of {row.time_limit_s:g} s and a mission "
                            f"limit of {row.tau:g} fuel capacities, not {study.time_limit_s:g} s and {study.tau:g}: "
-                           f"pass --time-limit {row.time_limit_s:g} --tau {row.tau:g} to go on, or another -o")
+                           f"pass --time-limit {row.time_limit_s:g} --tau {row.tau:g} to go on, or another --out")
     cases = list(study.cases())
     left = [case for case in cases if case not in known]
     if left:
@@ -239,7 +239,7 @@ def _writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another folder with -o") from None
+        raise BadInput(f"{path}: cannot be written ({error.strerror}); choose another folder with --out") from None
 
 
 def _whole_lines(path: Path) -> str:
@@ -249,9 +249,9 @@ def _whole_lines(path: Path) -> str:
     except FileNotFoundError:
         return ""
     except OSError as error:
-        raise BadInput(f"{path}: cannot be read ({error.strerror}); choose another folder with -o") from None
+        raise BadInput(f"{path}: cannot be read ({error.strerror}); choose another folder with --out") from None
     except UnicodeDecodeError:
-        raise BadFile(path, None, "", "this is no text; remove the file, or choose another folder with -o") from None
+        raise BadFile(path, None, "", "this is no text; remove the file, or choose another folder with --out") from None
     return text[:text.rfind("\n") + 1]
 
 
@@ -267,7 +267,7 @@ def read_rows(path: Path) -> list[Row]:
         return []
     if header != list(NAMES):
         raise BadFile(path, 1, "", "these are not the columns of this benchmark's rows; remove the file, or choose "
-                                   "another folder with -o")
+                                   "another folder with --out")
     rows = []
     for number, cells in enumerate(lines, start=2):
         if len(cells) != len(NAMES):

@@ -1,4 +1,4 @@
-"""The paper's Figure 3 again: box plots of gaps, ours beside its own. The only importer of matplotlib."""
+"""The paper's Figure 3 again: box plots of gaps, ours beside its own."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from benchmarks.solver.grid import METHODS, Row
-from benchmarks.solver.printed import FIGURE_3, Box
-from benchmarks.solver.report import box_of
+from sva_bench.paper.printed import FIGURE_3, Box
+from sva_bench.paper.runtimes import box_of
+from sva_bench.paper.solves import METHODS, Row
 
 SIZE_IN = (7.2, 6.8)
 DPI = 200

@@ -8,18 +8,28 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.solver.grid import METHODS, Row, Study, read_rows, run
-from benchmarks.solver.paper import QUICK, main, reproduce, write_report
-from benchmarks.solver.picture import draw_gaps
-from benchmarks.solver.printed import FIGURE_3, TABLE_2, TABLE_3, Box
-from benchmarks.solver.report import checks, cuts_table, gaps_table, markdown, methods_table, runtime_table
+from sva_bench.__main__ import run_command_line
 from sva_bench.choices import Status
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.paper.gaps_picture import draw_gaps
+from sva_bench.paper.printed import FIGURE_3, TABLE_2, TABLE_3, Box
+from sva_bench.paper.runtimes import (
+    QUICK,
+    checks,
+    cuts_table,
+    gaps_table,
+    markdown,
+    methods_table,
+    reproduce,
+    runtime_table,
+    write_report,
+)
+from sva_bench.paper.solves import METHODS, Row, Study, read_rows, run
 from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import plan_stochastic
 
-PAPER = Path(__file__).parents[2] / "../shared/paper.tex"
-DOCS = Path(__file__).parents[2] / "docs"
+PAPER = Path(__file__).parents[1] / "../shared/paper.tex"
+DOCS = Path(__file__).parents[1] / "docs"
 # A mission limit of 0.6 fuel capacities leaves POIs behind, so that there is something to prove and to cut.
 TINY = Study(pois=(6,), seeds=(1,), fuel_multiples=(2.25,), availabilities=(0.75,), tau=0.6)
 
@@ -157,17 +167,21 @@ def test_the_picture_is_the_same_each_time(tmp_path: Path) -> None:
     assert one == (tmp_path / "other.png").read_bytes()
 
 
-@pytest.mark.parametrize("limit", ["0", "nan", "inf", "-1"])
-def test_a_limit_that_makes_no_sense_is_refused(limit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--quick", f"--time-limit={limit}", "-o", str(tmp_path / "out")]) == 2
-    assert "must be finite and above 0" in capsys.readouterr().err
+@pytest.mark.parametrize(("limit", "said"), [
+    ("0", "must be finite and above 0"), ("nan", "expected at least 0.0"), ("inf", "expected a finite number"),
+    ("-1", "expected at least 0.0")])
+def test_a_limit_that_makes_no_sense_is_refused(
+    limit: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command_line(["reproduce", "runtimes", f"--time-limit={limit}", "--out", str(tmp_path / "out")]) == 2
+    assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
-    assert main(["--quick", "-o", str(tmp_path / "file" / "out")]) == 2
-    assert "choose another folder with -o" in capsys.readouterr().err
+    assert run_command_line(["reproduce", "runtimes", "--out", str(tmp_path / "file" / "out")]) == 2
+    assert "choose another" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not PAPER.exists(), reason="the paper's source is not beside the project")

@@ -1,22 +1,67 @@
-"""The paper's tables again, ours beside its own, from the rows of ``grid``."""
+"""The paper's tables of runtimes (section 5.1) again, ours beside its own, from the rows of ``solves``."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from statistics import fmean, median, stdev
 from typing import TypeVar
 
 import numpy as np
 
-from benchmarks.solver.grid import METHODS, VEHICLES, Row, Study
-from benchmarks.solver.printed import FIGURE_3, FIGURE_3_LETTERS, LIMIT_S, TABLE_2, TABLE_3, Box
+from sva_bench.errors import BadInput
+from sva_bench.paper.printed import FIGURE_3, FIGURE_3_LETTERS, LIMIT_S, TABLE_2, TABLE_3, Box
+from sva_bench.paper.solves import FULL, METHODS, VEHICLES, Row, Study, read_rows, run
 
+NAME = "paper-runtimes"
+QUICK = replace(FULL, pois=(10, 20, 40, 60), seeds=(0,), availabilities=(0.75,), time_limit_s=10.0)
+"""Under ten minutes on an idle core: four sizes, one seed, one availability, all fuel capacities and methods."""
 DECOMPOSITION = "lshaped"
 """The method that the paper's tables are of."""
 Key = TypeVar("Key", float, tuple[float, ...])
 _AGREE = 2e-6  # relative; each solve is proved within 1e-6
 _IDLE = 0.9  # of a core, from which on a machine counts as idle
+
+
+def reproduce(study: Study, folder: Path, tell: Callable[[int, int, Row], None] = lambda done, of, row: None) -> str:  # noqa: ARG005
+    """Solve what is not solved yet, and write rows, report and picture into a folder; the report.
+
+    Files: ``paper-runtimes.csv`` (the rows), ``paper-runtimes.md``, ``paper-runtimes.png``.
+
+    Args:
+        study: What to solve.
+        folder: Where; a second call goes on with what is missing there.
+        tell: Called after each solve with the cases done, all cases, and the new row.
+
+    Raises:
+        SvaBenchError: If the folder holds something else, or can't be written to.
+        KeyboardInterrupt: After Ctrl-C; the report of what is done is written all the same.
+    """
+    path = folder / f"{NAME}.csv"
+    try:
+        rows = run(study, path, tell)
+    except KeyboardInterrupt:
+        cases = set(study.cases())
+        write_report([row for row in read_rows(path) if row.case in cases], study, folder)
+        raise
+    return write_report(rows, study, folder)
+
+
+def write_report(rows: Sequence[Row], study: Study, folder: Path) -> str:
+    """Write report and picture of some rows into a folder; the report."""
+    from sva_bench.paper.gaps_picture import draw_gaps  # matplotlib takes its time to load
+
+    if not rows:
+        return markdown(rows, study)
+    text = markdown(rows, study, f"{NAME}.png")
+    try:
+        draw_gaps(rows, folder / f"{NAME}.png")
+        (folder / f"{NAME}.md").write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BadInput(f"{folder}: cannot be written ({error.strerror}); choose another folder with --out") from None
+    return text
 
 
 def markdown(rows: Sequence[Row], study: Study, picture: str | None = None) -> str:
@@ -38,7 +83,7 @@ def markdown(rows: Sequence[Row], study: Study, picture: str | None = None) -> s
         "time. A gap is bound minus plan in per cent of the plan, as CPLEX has it; 0.0001 % counts as none."
         + _busy(rows),
         f"Proved: {_proofs(rows)}.",
-        "Made by `python -m benchmarks.solver.paper`; its rows are in the `.csv` beside this file.",
+        "Made by `sva-bench reproduce runtimes --whole`; its rows are in the `.csv` beside this file.",
         "Methods: `dep` is the paper's formulation (its *a*), `relaxed` its reformulation (*b*), `lshaped` its "
         "decomposition (*c*); `expected` is the one-stage model that the three collapse to, and `auto` what "
         "`sva-bench plan` takes unasked. All of them begin with the heuristic's plan.",
