@@ -34,7 +34,7 @@ def main() -> None:
     import atexit
     import signal
 
-    from sva_bench.cli import streams
+    from sva_bench.files import streams
 
     atexit.register(_end)  # first, to be called last
     output = streams.take_over()

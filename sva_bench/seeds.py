@@ -9,6 +9,9 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 
+MOST_SEED = 2**63 - 1
+"""Seeds have a column of 64 bits in every table."""
+
 
 class Stream(IntEnum):
     """What a stream is for. Append only: a number keeps its meaning for good, and none is given twice."""

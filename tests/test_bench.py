@@ -68,6 +68,18 @@ def test_the_informed_planner_comes_to_the_wait_and_see_value(world: World) -> N
         assert informed["ledger"]["out_of_fuel"] == 0.0
 
 
+@pytest.mark.parametrize("seed", range(3))  # whose first trials find different robots available
+def test_the_informed_planner_promises_the_wait_and_see_value_whoever_is_available_first(
+    world: World, seed: int,
+) -> None:
+    done = measure(world, replace(QUICK, informed=True, seed=seed, trials=20), None, lambda *_: None)
+    for scenario in done.summary["scenarios"]:
+        informed, ws = scenario["plans"]["informed"], pytest.approx(scenario["ws"])
+        assert informed["promised"] == informed["ledger"]["promised"] == informed["bound"] == ws
+        assert informed["ledger"]["assumption"] == pytest.approx(0.0)
+        assert informed["status"] == "optimal"
+
+
 def test_nothing_can_be_known_beforehand_of_failures_along_the_route(world: World) -> None:
     with pytest.raises(BadInput, match="leave out --informed"):
         measure(replace(world, execute_failure="per_leg"), replace(QUICK, informed=True), None, lambda *_: None)

@@ -17,6 +17,7 @@ import pytest
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.cli.terminal import set_up_logging
+from sva_bench.study import planning
 from tests.worlds_for_tests import SMALL
 
 QUIET = SMALL.replace("wheel_gain_sd: 0.01", "wheel_gain_sd: 0.0")
@@ -296,12 +297,62 @@ def test_ctrl_c_ends_a_run_with_130_and_leaves_nothing_half_written(after_s: flo
     (("world", "random", "--pois", "0"), "'--pois': expected at least 4, found 0"),
     (("world", "random", "--pois", "many"), "'--pois': expected a whole number, found many"),
     (("world", "random", "--density", "2"), "'--density': expected at most 1.0, found 2"),
+    (("world", "random", "--density", "0,5"),
+     "'--density': expected a number, found '0,5': write a decimal point, 0.5"),
 ])
 def test_what_is_wrong_with_an_option_is_said_with_its_value(
     arguments: tuple[str, ...], says: str, capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert run_command_line(arguments) == 2
     assert says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["execute w.yaml {}", "world draw w.yaml -o w.png --plan {}"])
+@pytest.mark.parametrize(("routes", "code", "says"), [
+    (None, 2, "p.json: no such file"), ("{", 2, "p.json:1: not valid JSON"),
+    ('{"format": "sva-bench/plan@1", "routes": {"uv9": []}}', 2, "there is no vehicle 'uv9'"),
+    ('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", 5]}}', 2,
+     'found the number 5; if it is a name, write "5"'),
+    ('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "p1", "base"]}}', 3,
+     "uv1: POI p1 is visited twice; name it once"),
+    ('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1"]}}', 3, "must start and end at the base"),
+])
+def test_a_plan_that_cannot_be_driven_is_refused_before_anything_is_planned(
+    command: str, routes: str | None, code: int, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    world_file(tmp_path).rename("w.yaml")
+    if routes is not None:
+        Path("p.json").write_text(routes)
+
+    def planned(*_: object, **__: object) -> None:
+        raise AssertionError("travel times are planned")
+
+    monkeypatch.setattr(planning, "plan_travel_times", planned)
+    assert run_command_line(command.format("p.json").split()) == code
+    said = capsys.readouterr().err
+    assert says in said
+    assert said.startswith("error: p.json:")
+
+
+@pytest.mark.parametrize("again", ["p.json", "./p.json", "link.json", "../{}/p.json"])
+def test_a_plan_that_is_given_twice_is_refused_as_that(
+    again: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    world_file(tmp_path).rename("w.yaml")
+    Path("p.json").write_text('{"format": "sva-bench/plan@1", "routes": {}}')
+    Path("sub").mkdir()
+    Path("sub/p.json").write_text('{"format": "sva-bench/plan@1", "routes": {}}')
+    again = again.format(tmp_path.name)
+    if again == "link.json":
+        again = "linked/p.json"
+        Path("linked").symlink_to(tmp_path)
+    assert run_command_line(["execute", "w.yaml", "p.json", again]) == 2
+    assert capsys.readouterr().err == f"error: {Path(again)}: this plan is given twice; name it once\n"
+    assert run_command_line(["execute", "w.yaml", "p.json", "sub/p.json"]) == 2
+    assert "there is another plan named 'p'" in capsys.readouterr().err
 
 
 def test_warnings_are_one_line_each_where_nobody_watches(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from pydantic import Field
 
 from sva_bench.errors import BadFile, ExitCode, nearest
@@ -72,6 +73,14 @@ def test_a_good_file_gives_its_data(tmp_path: Path) -> None:
     ("format: test/whole@1\nname: !!python/name:os.system a\n", 2, "name", "tag"),
     ("format: test/whole@1\nname: &n a\npart: *n\n", 3, "", "aliases are not allowed"),
     ("format: test/whole@1\nname: [a\n", 3, "", "not valid YAML"),
+    ("format: test/whole@1\nname: a\npart:\n\tsize_m: 1\n", 4, "", "a tab indents this line; write spaces"),
+    ("format: test/whole@1\nname: a\npart:\n  label: x\n\tsize_m: 1\n", 5, "", "a tab indents this line; write spaces"),
+    ("format: test/whole@1\nname: a\nparts:\n  p:\n  \tsize_m: 1\n", 5, "", "a tab indents this line; write spaces"),
+    ("format: test/whole@1\nname: a\n---\nname: b\n", 3, "", "a second document begins here ('---'); a file holds one"),
+    ("format: test/whole@1\nname: a\npart:\n  size_m: 0,5\n", 4, "part.size_m",
+     "expected a number, found the text '0,5': write a decimal point, 0.5"),
+    ("format: test/whole@1\nname: a\npart:\n  size_m: -1,25e3\n", 4, "part.size_m", "write a decimal point, -1.25e3"),
+    ("format: test/whole@1\nname: a\npart: {size_m: 0,5}\n", 3, "part.5", "write a decimal point"),
     ("format: test/whole@1\n? [a, b]\n: c\n", 2, "", "a key must be a plain word"),
 ])
 def test_each_complaint_names_line_and_key(tmp_path: Path, text: str, line: int, key: str, says: str) -> None:
@@ -95,6 +104,34 @@ def test_what_is_no_plain_file_of_text_is_refused(tmp_path: Path) -> None:
     (tmp_path / "huge.yaml").write_bytes(b"#" * (MAX_YAML_BYTES + 1))
     with pytest.raises(BadFile, match="at most"):
         read_yaml(tmp_path / "huge.yaml")
+
+
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "GIF", "PPM", "BMP", "TIFF"])
+def test_a_picture_is_called_one_and_told_what_to_name_instead(kind: str, tmp_path: Path) -> None:
+    for suffix in (".yaml", ".json"):
+        path = (tmp_path / "picture").with_suffix(suffix)
+        Image.new("RGB", (40, 30)).save(path, format=kind)
+        read = read_yaml if suffix == ".yaml" else read_json
+        with pytest.raises(BadFile, match=f"this is a {kind} image, no text: name the YAML file"):
+            read(path)
+
+
+@pytest.mark.parametrize(("text", "at", "says"), [
+    ('{"format": "test/whole@1", "name": 5}', "name",
+     'expected a word, found the number 5; if it is a name, write "5"'),
+    ('{"format": "test/whole@1", "name": true}', "name",
+     'expected a word, found true; if it is a name, write "true"'),
+    ('{"format": "test/whole@1", "name": 0.5}', "name", 'write "0.5"'),
+    ('{"name": "a"}', "", 'add "format": "test/whole@1"'), ("[]", "", 'starts with "format": "test/whole@1"'),
+])
+def test_advice_about_json_is_json(text: str, at: str, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "file.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BadFile) as caught:
+        validate(read_json(path), Whole, "test/whole@1")
+    assert caught.value.key == at
+    assert says in caught.value.problem
+    assert "'" not in caught.value.problem.replace("'format'", "")
 
 
 @pytest.mark.parametrize("text", [

@@ -307,3 +307,40 @@ def test_a_run_that_was_not_finished_is_called_so(tmp_path: Path, capsys: pytest
     (tmp_path / ".small-seed0-0123.7.tmp").mkdir()
     assert run_command_line(["report", str(tmp_path / ".small-seed0-0123.7.tmp")]) == 2
     assert "a run that was not finished" in " ".join(capsys.readouterr().err.split())
+
+
+def files_of(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*")
+                  if path.is_file() and path.suffix in (".json", ".parquet"))
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("kind", ["run", "execution"])
+def test_a_run_folder_without_any_of_its_files_is_called_incomplete(
+    kind: str, folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [name for name in files_of(folders[kind]) if not name.startswith("instance-")]  # no page shows instances
+    assert {"manifest.json", "summary.json", "legs.parquet", "outcomes.parquet", "travel_times.parquet"} < set(names)
+    assert any(name.startswith("plans/") for name in names)
+    for name in names:
+        work = tmp_path / "work"
+        shutil.copytree(folders[kind], work)
+        (work / name).unlink()
+        assert run_command_line(["report", str(work), "--csv"]) == 2, name
+        said = " ".join(capsys.readouterr().err.split())
+        where = "" if name == "manifest.json" else ", it stands in manifest.json"
+        assert f"the run folder is incomplete: {name} is missing; run its command again{where}" in said
+        shutil.rmtree(work)
+
+
+def test_a_run_folder_without_recordings_is_called_incomplete(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for spoil in (shutil.rmtree, lambda path: [file.unlink() for file in path.iterdir()]):
+        work = tmp_path / "work"
+        shutil.copytree(folders["run"], work)
+        spoil(work / "recordings")
+        assert run_command_line(["view", str(work), "--web"]) == 2
+        assert "the run folder is incomplete: recordings/*.rrd is missing; run its command again" in " ".join(
+            capsys.readouterr().err.split())
+        shutil.rmtree(work)

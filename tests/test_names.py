@@ -75,7 +75,7 @@ def test_no_two_plans_of_a_run_share_a_file_name() -> None:
 
 @pytest.mark.parametrize(("paths", "said"), [
     (["a.json", "other/a.json"], "there is another plan named 'a', a.json"),
-    (["a.json", "a.json"], "there is another plan"),
+    (["a.json", "a.json"], "a.json: this plan is given twice; name it once"),
     (["Plan.json", "plan.json"], "in more than capitals"),
     (["\u00e9.json", "e\u0301.json"], "there is another plan"),  # one letter, written in two ways
     (["stra\u00dfe.json", "STRASSE.json"], "there is another plan"),

@@ -71,6 +71,22 @@ def test_results_that_a_full_disk_loses_are_told_with_two(line: str, tmp_path: P
     assert "standard output cannot be written to (No space left on device)" in done.stderr
 
 
+@pytest.mark.parametrize("line", [
+    "plan tiny.json", "plan tiny.json -o -", "times small.yaml", "instance random", "world random",
+    "world schema", "reproduce rewards", "certify tiny.json plan.json --json", "run small.yaml --json",
+    "batch small.yaml --json"])
+def test_a_result_that_a_closed_output_would_lose_is_refused_before_any_work(line: str, tmp_path: Path) -> None:
+    (tmp_path / "tiny.json").write_text(TINY)
+    (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
+    (tmp_path / "plan.json").write_text('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}')
+    done = shell(f"sva-bench {line} >&-", tmp_path)
+    assert done.returncode == 2
+    assert "standard output is closed, and the result would be lost; " in done.stderr
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1  # and nothing before it
+    assert not (tmp_path / "runs").exists()
+
+
 def test_the_plan_of_a_closed_error_output_is_not_written_into_a_file_that_was_opened_later(tmp_path: Path) -> None:
     # Descriptor 2 is free then, and the next file that is opened gets it.
     (tmp_path / "tiny.json").write_text(TINY)

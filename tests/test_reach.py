@@ -9,8 +9,9 @@ import pytest
 
 from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached
 from sva_bench.cli.terminal import print_summary
+from sva_bench.study.given_plans import read_plans
 from sva_bench.study.options import Options
-from sva_bench.study.planning import plan_costs, read_plans
+from sva_bench.study.planning import check_plans, plan_costs
 from sva_bench.study.publish import Run
 from sva_bench.study.run import execute_plans, run
 from tests.test_cli import sva_bench, world_file
@@ -103,7 +104,8 @@ def executed(folder: Path, plans: dict[str, dict[str, list[str]]]) -> Run:
         paths[name] = folder / f"{name}.json"
         paths[name].write_text(json.dumps({"format": "sva-bench/plan@1", "routes": routes}))
     costs = plan_costs(world, "prmstar", lambda *_: None)
-    read = read_plans(world, costs, paths, allow_infeasible=True)
+    read = read_plans(world, paths)
+    check_plans(world, costs, read, paths, allow_infeasible=True)
     return execute_plans(world, read, QUICK, folder / "runs", None, lambda *_: None, costs)
 
 

@@ -8,6 +8,7 @@ from typing import get_args
 
 import pytest
 
+from sva_bench.__main__ import run_command_line
 from sva_bench.batch.cache import Cache
 from sva_bench.batch.estimates import estimates
 from sva_bench.batch.folder import begin, settings_in
@@ -38,7 +39,8 @@ def world(folder: Path, name: str = "small") -> Path:
 
 
 def test_seeds_are_numbers_and_ranges() -> None:
-    assert seeds_of(["3", "0-2", "2,7"]) == (3, 0, 1, 2, 7)
+    assert seeds_of(["3", "0-2", "7"]) == (3, 0, 1, 2, 7)
+    assert seeds_of([str(2**63 - 1)]) == (2**63 - 1,)
 
 
 @pytest.mark.parametrize("word", ["", "x", "-1", "5-3", "1-2-3", "0-999999999", "1.5"])
@@ -59,9 +61,40 @@ def test_what_sets_nothing_is_refused(word: str) -> None:
 
 
 def test_planners_are_known_ones() -> None:
-    assert planners_of(["rrtconnect", "prmstar", "prmstar"]) == ("prmstar", "rrtconnect")
+    assert planners_of(["rrtconnect", "prmstar"]) == ("prmstar", "rrtconnect")
     with pytest.raises(BadInput, match="prmstar"):
         planners_of(["prm"])
+
+
+@pytest.mark.parametrize("words", [["0,0"], ["0", "0"], ["3-5", "4"], ["1", "0-2,7"], [" 2", "2"]])
+def test_a_seed_that_is_given_twice_is_refused(words: list[str]) -> None:
+    with pytest.raises(BadInput, match=r"--seed .*: the seed \d is given twice; give each once"):
+        seeds_of(words)
+
+
+@pytest.mark.parametrize("word", [str(2**63), f"0,{2**63}", f"0-{2**63}", "9" * 40, "9" * 5000])
+def test_a_seed_beyond_what_tables_hold_is_refused_with_the_bound(word: str) -> None:
+    with pytest.raises(BadInput, match=r"--seed '\d.*a seed is 9223372036854775807 at most") as caught:
+        seeds_of([word])
+    assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize(("line", "option"), [
+    ("--seed 0 --seed 0", "--seed "), ("--planner prmstar --planner prmstar", "--planner prmstar"),
+    ("--scenario half --scenario half", "--scenario half"), ("--set noise.wheel_gain_sd=0,0", "--set noise")])
+def test_what_a_batch_is_given_twice_is_refused_by_option(
+    line: str, option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command_line(["batch", str(world(tmp_path)), *line.split(), "--dry-run"]) == 2
+    assert capsys.readouterr().err.startswith(f"error: {option}")
+
+
+@pytest.mark.parametrize("key", ["seeds: [1, 0-2]", "planners: [fmt, fmt]", "scenarios: [half, half]"])
+def test_what_a_sweep_file_names_twice_is_refused_by_line(key: str, tmp_path: Path) -> None:
+    path = tmp_path / "sweep.yaml"
+    path.write_text(f"format: sva-bench/sweep@1\nworlds: [{world(tmp_path).name}]\n{key}\n", encoding="utf-8")
+    with pytest.raises(BadFile, match=rf"sweep\.yaml:3: {key.split(':')[0]}.* twice"):
+        grid_of(sweep_of([path], Sweep()))
 
 
 def test_a_sweep_file_is_the_same_as_its_options_and_options_come_first(tmp_path: Path) -> None:
@@ -211,7 +244,7 @@ def test_a_dry_run_counts_what_is_left(tmp_path: Path) -> None:
     assert listed[0].processor_s > 0
     done = sva_bench("batch", world(tmp_path), "--trials", 25, "--dry-run", "--cache", "cache", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "1 units, 200 rows" in done.stdout
+    assert "1 unit, 200 rows" in done.stdout
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small.world.yaml"]
 
 

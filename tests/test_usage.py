@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 
+from sva_bench import seeds
 from sva_bench.__main__ import run_command_line
+from sva_bench.cli import options
+from sva_bench.cli.app import app
 from sva_bench.files.seal import refuse_others, sealed
 from tests.test_cli import TINY
 from tests.worlds_for_tests import SMALL
@@ -144,3 +150,59 @@ def test_the_map_of_a_world_of_another_ending_is_not_written_over(
     assert "w-map/a.map: this map belongs to another world" in capsys.readouterr().err
     assert (tmp_path / "w-map" / "a.map").read_text() == open_field
     refuse_others(tmp_path / "w.yaml", {"w-map/a.map": b"of a newer map"})  # its own may be renewed
+
+
+def commands(group: Any = None, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Every command, and the words that call it."""
+    group = group or typer.main.get_command(app)
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands(command, (*words, name))
+        else:
+            yield (*words, name), command
+
+
+OPTIONS = [(words, parameter) for words, command in commands() for parameter in command.params
+           if parameter.param_type_name == "option" and not parameter.is_flag and parameter.name != "help"]
+
+
+@pytest.mark.parametrize(("words", "option"), [(words, max(p.opts, key=len)) for words, p in OPTIONS])
+def test_an_empty_value_is_refused_by_the_name_of_its_option(
+    words: tuple[str, ...], option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    values = ["", ""] if option == "--base" else [""]
+    assert run_command_line([*words, "x.yaml", option, *values]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"error: {option}: its value is empty"), said
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", [words for words, command in commands() if any(
+    parameter.param_type_name == "argument" for parameter in command.params)], ids=" ".join)
+def test_an_empty_argument_is_refused(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command_line([*words, "", ""]) == 2
+    assert "its value is empty" in capsys.readouterr().err or words in (("view",), ("report",))
+
+
+SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
+
+
+def test_every_command_that_draws_takes_a_seed() -> None:
+    assert {" ".join(words) for words in SEEDED} == {
+        "run", "execute", "reproduce simulation", "batch over", "world random", "world from-map", "instance random"}
+    assert options.MOST_SEED == seeds.MOST_SEED
+
+
+@pytest.mark.parametrize("words", SEEDED, ids=" ".join)
+def test_a_seed_beyond_64_bits_is_refused_by_option_with_the_bound(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments = {"reproduce": ["rewards"], "instance random": [], "world random": [], "execute": ["w.yaml", "p.json"],
+                 "world from-map": ["m.map", "-o", "w.yaml"]}.get(" ".join(words), ["w.yaml"])
+    assert run_command_line([*words, *arguments, "--seed", str(2**63)]) == 2
+    said = capsys.readouterr().err
+    assert "--seed" in said
+    assert str(2**63 - 1) in said, said

@@ -9,6 +9,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -116,34 +117,39 @@ def settings_in(folder: Path) -> tuple[Part, SettingsEntry]:
 
 
 def refuse_other_settings(folder: Path, settings: Mapping[str, Any]) -> None:
-    """Refuse to go on with a folder of other settings, naming the first difference."""
+    """Refuse to go on with a folder of other settings, naming what differs with both values."""
     held, now = settings_in(folder)[0].data, json.loads(json.dumps(settings))
-    if held != now:
-        key, was, is_now = _difference(held, now)
-        plain = all(isinstance(value, bool | int | float | str | None) for value in (was, is_now))
-        told = f" ({_shown(was)} there, {_shown(is_now)} now)" if plain else ""
-        raise BadFile(folder / "manifest.json", None, key, f"differs from the batch in this folder{told}; use the "
-                      "same settings, or choose another folder with --out")
+    differences = list(islice(_differences(held, now), _MOST_TOLD + 1))
+    if not differences:
+        return
+    told = [f"{key} ({_shown(was)} there, {_shown(is_now)} now)" for key, was, is_now in differences[:_MOST_TOLD]]
+    more = ["and more"] if len(differences) > _MOST_TOLD else []
+    raise BadFile(folder / "manifest.json", None, "settings", "not those of the batch in this folder: "
+                  f"{', '.join([*told, *more])}; use the same settings, or choose another folder with --out")
 
 
-_ABSENT = "absent"
+_ABSENT = object()
+_MOST_TOLD = 12
 
 
-def _difference(held: Any, now: Any, key: str = "settings") -> tuple[str, Any, Any]:
-    """The first key at which two settings differ, and both values."""
+def _differences(held: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Each key at which two settings differ, and both values."""
     if isinstance(held, dict) and isinstance(now, dict):
         for name in [*held, *(name for name in now if name not in held)]:
-            if name not in held or name not in now or held[name] != now[name]:
-                return _difference(held.get(name, _ABSENT), now.get(name, _ABSENT), f"{key}.{name}")
-    if isinstance(held, list) and isinstance(now, list) and len(held) == len(now):
+            yield from _differences(held.get(name, _ABSENT), now.get(name, _ABSENT), f"{key}.{name}" if key else name)
+    elif isinstance(held, list) and isinstance(now, list) and len(held) == len(now) and \
+            any(isinstance(item, dict | list) for item in [*held, *now]):
         for number, (one, other) in enumerate(zip(held, now, strict=True)):
-            if one != other:
-                return _difference(one, other, f"{key}[{number}]")
-    return key, held, now
+            yield from _differences(one, other, f"{key}[{number}]")
+    elif held is _ABSENT or now is _ABSENT or held != now:
+        yield key, held, now
 
 
 def _shown(value: Any) -> str:
-    return _ABSENT if value is _ABSENT or value == _ABSENT else json.dumps(value)[:60]
+    if value is _ABSENT:
+        return "absent"
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def shard_path(folder: Path, unit: str) -> Path:

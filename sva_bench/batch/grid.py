@@ -126,7 +126,7 @@ def refuse_too_many(points: int, seeds: int, trials: int, unit_trials: int) -> N
     ranges = -(-trials // unit_trials)
     units = points * seeds * ranges
     if units > MOST_UNITS:
-        raise BadInput(f"{units} units ({points} worlds and variants x {seeds} seeds x {ranges} ranges of trials); a "
+        raise BadInput(f"{units} units (worlds and variants: {points}, seeds: {seeds}, ranges of trials: {ranges}); a "
                        f"batch has {MOST_UNITS} at most: take fewer seeds, or more trials a unit (--unit-trials)")
 
 

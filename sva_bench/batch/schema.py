@@ -9,12 +9,8 @@ from pydantic import Field, model_validator
 from sva_bench.analysis.unseen import UNHAPPY
 from sva_bench.choices import ENDS, Fidelity, PathPlanner
 from sva_bench.files.fields import Name, Number, Section, WholeNumber
-from sva_bench.storage.results_schema import MOST_ROLLOUTS, MOST_TRIALS, Facts, Words
+from sva_bench.storage.results_schema import MOST_ROLLOUTS, MOST_TRIALS, Facts, Seed, Words
 
-MOST_SEED = 10**18 - 1
-"""Seeds have a column of 64 bits in every table."""
-
-Seed = Annotated[int, Field(strict=True, ge=0, le=MOST_SEED)]
 _Sum = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e25, le=1e25)]
 _Square = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e40)]
 _Count = Annotated[int, Field(strict=True, ge=0, le=10**12)]
@@ -56,7 +52,7 @@ class ManifestFile(Section):
 class FailureEntry(Section):
     unit: Words
     world: Words
-    seed: WholeNumber
+    seed: Seed
     reason: Words
     attempts: WholeNumber
 

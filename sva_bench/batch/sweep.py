@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -14,14 +15,16 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field
 
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
-from sva_bench.batch.schema import Seed
 from sva_bench.choices import FailureProcess, Fidelity, PathPlanner
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
+from sva_bench.files.complaints import shown
 from sva_bench.files.digest import digest
 from sva_bench.files.documents import Document, Loc, parse_yaml, read_yaml, validate
 from sva_bench.files.fields import Name, Number, Section
 from sva_bench.files.patterns import has_pattern, matching
+from sva_bench.seeds import MOST_SEED
 from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.storage.results_schema import Seed
 from sva_bench.study.options import Options, Progress
 from sva_bench.world.model import World
 from sva_bench.world.variants import adapted, option_of, world_with
@@ -152,8 +155,10 @@ def seeds_of(words: Sequence[str], what: str = "--seed ") -> tuple[int, ...]:
     seeds: list[int] = []
     for part in ",".join(words).split(","):
         ends = part.strip().split("-")
-        if len(ends) > 2 or not all(end.strip().isdecimal() and len(end) < 19 for end in ends):
+        if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
             raise BadInput(f"{what}{part.strip()!r}: expected a whole number, or a range like 0-9")
+        if any(len(end) > 100 or int(end) > MOST_SEED for end in ends):
+            raise BadInput(f"{what}{shown(part.strip())}: a seed is {MOST_SEED} at most (2^63 - 1)")
         first, last = int(ends[0]), int(ends[-1])
         if last < first or last - first >= MOST_SEEDS:
             raise BadInput(f"{what}{part.strip()!r}: a range goes from the smaller to the greater, over "
@@ -161,15 +166,20 @@ def seeds_of(words: Sequence[str], what: str = "--seed ") -> tuple[int, ...]:
         seeds += range(first, last + 1)
         if len(seeds) > MOST_SEEDS:
             raise BadInput(f"{what}{part.strip()!r}: more than {MOST_SEEDS} seeds in all")
-    return tuple(dict.fromkeys(seeds))
+    twice = next((seed for seed, count in Counter(seeds).items() if count > 1), None)
+    if twice is not None:  # the same trials again would pass for more of them
+        raise BadInput(f"{what}{shown(','.join(words))}: the seed {twice} is given twice; give each once")
+    return tuple(seeds)
 
 
 def planners_of(words: Sequence[str]) -> tuple[PathPlanner, ...]:
-    """Planners as told, each once."""
+    """Planners as told."""
     known = get_args(PathPlanner)
     for word in words:
         if word not in known:
             raise BadInput(f"--planner {word}: there is no such planner; {nearest(word, list(known))}")
+        if words.count(word) > 1:
+            raise BadInput(f"--planner {word}: given twice; give it once")
     return tuple(planner for planner in known if planner in words)
 
 
@@ -207,6 +217,8 @@ def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
     for key, values in vary.items():
         if len({json.dumps(value) for value in values}) < len(values):
             raise sweep.wrong("vary", ("set", key), f"--set {key}", "a value stands there twice")
+    if len(set(planners)) < len(planners):
+        raise sweep.wrong("planners", ("planners",), "--planner", "a planner stands there twice; name each once")
     options = _options_of(sweep)
     unit_trials = sweep.unit_trials or (UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS)
     seeds = sweep.seeds or (0,)
@@ -261,6 +273,9 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
                 if name not in known:
                     raise sweep.wrong("scenarios", ("scenarios", number), f"--scenario {name}",
                                       f"{path} has no scenario {name!r}; {nearest(name, known)}")
+                if name in (sweep.scenarios or ())[:number]:
+                    raise sweep.wrong("scenarios", ("scenarios", number), f"--scenario {name}",
+                                      "given twice; give it once")
             yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure),
                             held),
                    [f"{key}={json.dumps(value)}" for key, value in values.items()])

@@ -152,23 +152,25 @@ def execute(
     """
     with holding_back_ctrl_c():
         from sva_bench.cli.loading import about, by_name, load
+        from sva_bench.study.given_plans import read_plans
 
     set_up_logging(verbose)
     check_folder(out, "--out")
     named = by_name(plans)
     loaded = load(world, scenario, margin, execute_failure=execute_failure)
+    read = read_plans(loaded, named)
     load_libraries()
     with holding_back_ctrl_c():
         from sva_bench.storage.run_folder import tidy
         from sva_bench.study.options import Options
-        from sva_bench.study.planning import plan_costs, read_plans
+        from sva_bench.study.planning import check_plans, plan_costs
         from sva_bench.study.run import execute_plans
 
     tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
-        read = read_plans(loaded, costs, named, allow_infeasible=allow_infeasible)
+        check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, _PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
     _show(result.summary, result.folder, as_json, csv=csv)
@@ -187,11 +189,12 @@ def view(
     """Open recordings in the Rerun viewer."""
     with holding_back_ctrl_c():
         from sva_bench.recording.viewer import view as open_viewer
-        from sva_bench.storage.stored_run import run_folder_at
+        from sva_bench.storage.stored_run import missing, run_folder_at
 
-    if recording.is_dir() and not (recording / "recordings").is_dir():
-        run_folder_at(recording)  # which says what it is, if it is none
-    check_output(screenshot, way_out="choose another place with --screenshot")
+    if recording.is_dir() and next((recording / "recordings").glob("*.rrd"), None) is None:
+        raise missing(run_folder_at(recording), recording / "recordings" / "*.rrd")  # or what it is, if it is none
+    if screenshot is not None:
+        check_output(screenshot, way_out="choose another place with --screenshot")
     open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
 
 

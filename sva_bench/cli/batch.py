@@ -27,6 +27,7 @@ from sva_bench.cli.terminal import messages, print_json, progress_bars, results,
 from sva_bench.cli.usage import PlainCommand, UnnamedCommand, WorldsFirst
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.files.outputs import check_folder
+from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 
 if TYPE_CHECKING:
@@ -169,7 +170,8 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     console = results()
     state = "at work" if running else "complete" if len(done) == len(units) else "not at work; --resume goes on" \
         if len(done) + len(failures) < len(units) else "over"
-    console.print(f"{len(done)} of {len(units)} units done, {len(failures)} failed: {state}", highlight=False)
+    console.print(f"{len(done)} of {counted(len(units), 'unit')} done, {len(failures)} failed: {state}",
+                  highlight=False)
     if done:
         console.print(over_maps(summary["aggregate"], "VSS over maps, so far"))
     print_failed(summary["failed"], console)
@@ -237,8 +239,9 @@ def _run(
                                 retry=again)
     except KeyboardInterrupt:
         done = len(units_in(folder) & set(grid.units()))
-        raise Interrupted(f"interrupted: {done} of {len(grid.units())} units are done and kept in {folder}; the same "
-                          "command goes on with --resume") from None
+        units = counted(len(grid.units()), "unit is", "units are")
+        raise Interrupted(f"interrupted: {done} of {units} done and kept in {folder}; the same command goes on with "
+                          "--resume") from None
     if as_csv:
         write_tables(folder, summary)
     if as_json:
@@ -248,5 +251,5 @@ def _run(
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
     if summary["failed"]:
         if as_json:
-            messages.print(f"{len(summary['failed'])} units were given up", highlight=False)
+            messages.print(f"{counted(len(summary['failed']), 'unit was', 'units were')} given up", highlight=False)
         raise typer.Exit(ExitCode.UNFINISHED_TRIALS)

@@ -13,6 +13,7 @@ from sva_bench.cli.terminal import messages
 from sva_bench.errors import BadInput
 from sva_bench.files.documents import read_yaml
 from sva_bench.files.mistaken import what_it_is
+from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.world.load import load_world
@@ -62,8 +63,8 @@ def instance_of_world(
     with about(path):
         costs = plan_costs(world, planner, progress)
     for cost in costs.values():
-        messages.print(f"{cost.times.model.name}: {cost.pairs} travel times, {cost.changed_pct:.1f} % repaired, by up "
-                       f"to {cost.max_excess_pct:.1f} %", highlight=False)
+        messages.print(f"{cost.times.model.name}: {counted(cost.pairs, 'travel time')}, {cost.changed_pct:.1f} % "
+                       f"repaired, by up to {cost.max_excess_pct:.1f} %", highlight=False)
     return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))
 
 
@@ -96,8 +97,14 @@ def by_name(paths: Sequence[Path]) -> dict[str, Path]:
             raise BadInput(f"{path}: a plan goes by the name of its file, and this one is longer than {_LONGEST_NAME} "
                            "bytes; rename it")
         plain = unicodedata.normalize("NFKC", name).casefold()
+        if plain in known and _same_file(path, known[plain]):
+            raise BadInput(f"{path}: this plan is given twice; name it once")
         if plain in known:
             raise BadInput(f"{path}: there is another plan named {name!r}, {known[plain]}; the names of the files must "
                            "differ, and in more than capitals")
         found[name] = known[plain] = path
     return found
+
+
+def _same_file(path: Path, other: Path) -> bool:
+    return path == other or (path.exists() and other.exists() and path.samefile(other))

@@ -9,11 +9,12 @@ from typing import Annotated
 import typer
 
 from sva_bench.choices import InstanceFamily, Unknown, WorldFamily
-from sva_bench.cli.options import Force, PlannerOption, Verbose, WorldArgument, finite
+from sva_bench.cli.options import MOST_SEED, Force, PlannerOption, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import print_json, progress_bars, results, set_up_logging
 from sva_bench.cli.usage import PlainCommand
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_beside, write_result
+from sva_bench.files.printable import counted
 from sva_bench.files.seal import refuse_edited, refuse_others, sealed
 from sva_bench.interrupts import holding_back_ctrl_c
 
@@ -42,7 +43,7 @@ def check_world(
     console = results()
     for cost in costs.values():
         longest = int(cost.repaired_ms.max()) / 1000
-        console.print(f"{cost.times.model.name}: {cost.pairs} travel times of up to {longest:.1f} s, "
+        console.print(f"{cost.times.model.name}: {counted(cost.pairs, 'travel time')} of up to {longest:.1f} s, "
                       f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
                       highlight=False)
     reach = reach_of(loaded, costs)
@@ -52,7 +53,7 @@ def check_world(
     counts = {"station": len(loaded.stations), "POI": len(loaded.pois), "robot": len(loaded.robots),
               "scenario": len(loaded.scenarios)}
     console.print(f"{loaded.name} {verdict}: "
-                  + ", ".join(f"{count} {what}{'s' * (count != 1)}" for what, count in counts.items()), highlight=False)
+                  + ", ".join(counted(count, what) for what, count in counts.items()), highlight=False)
 
 
 @world_app.command("random", cls=PlainCommand)
@@ -68,7 +69,7 @@ def make_random_world(
     pois: Annotated[int, typer.Option(min=4, max=100, help="Points of interest, at least two for each robot.")] = 10,
     stations: Annotated[int, typer.Option(min=0, max=30, help="Refuelling stations.")] = 5,
     robots: Annotated[int, typer.Option(min=2, max=10, help="Robots; half of them, rounded down, are uncertain.")] = 2,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of terrain, sites and incentives.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of terrain, sites and incentives.")] = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="World file to write; default: standard "
                                                 "output.", show_default=False)] = None,
     force: Force = False,
@@ -108,7 +109,7 @@ def make_world_from_map(
         show_default="1.0")] = None,
     unknown: Annotated[Unknown | None, typer.Option(help="What unknown cells of a ROS map count as.",
                                                     show_default="occupied")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of points of interest and incentives.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of points of interest and incentives.")] = 0,
     force: Force = False,
     verbose: Verbose = False,
 ) -> None:
@@ -165,11 +166,15 @@ def draw(
     if loaded.map_source is not None:  # a map may be a picture of that name
         check_output(output, *(world.parent / file.name for file in loaded.map_source.files))
     with holding_back_ctrl_c():
+        from sva_bench.study.given_plans import read_plans
+
+    read = None if plan is None else read_plans(loaded, {"plan": plan})["plan"]
+    with holding_back_ctrl_c():
         from sva_bench.study.pictures import picture_of
 
     with about(world), progress_bars() as progress:
-        content = picture_of(loaded, "svg" if kind == "svg" else "png", roadmap=roadmap, paths=paths, plan=plan,
-                             progress=progress)
+        content = picture_of(loaded, "svg" if kind == "svg" else "png", roadmap=roadmap, paths=paths,
+                             progress=progress, plan=read, plan_file=plan)
     write_result(output, content)
 
 
@@ -195,7 +200,7 @@ def random_instances(
     tau: Annotated[float | None, typer.Option(min=0.01, max=1000, callback=finite, help="Mission limit in fuel "
                                               "capacities.", show_default="the family's")] = None,
     directed: Annotated[bool, typer.Option("--directed", help="Legs cost up to a tenth more, each way.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of places and incentives.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of places and incentives.")] = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Instance file to write; default: standard "
                                                 "output.", show_default=False)] = None,
 ) -> None:

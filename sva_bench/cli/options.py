@@ -13,10 +13,11 @@ from sva_bench.choices import (
     Fidelity,
     PathPlanner,
 )
+from sva_bench.errors import BadInput
+from sva_bench.files.streams import CLOSED, output_is_closed
 from sva_bench.workers.pool import count_of
 
 # Spelt out, not imported: the modules that own them take a second to load, and --help should not.
-
 
 
 def finite(value: float | None) -> float | None:
@@ -26,9 +27,17 @@ def finite(value: float | None) -> float | None:
     return value
 
 
+def read_by_somebody(asked: bool) -> bool:
+    """Refuse to print to a standard output that is closed, before any work."""
+    if asked and output_is_closed():
+        raise BadInput(f"--json: {CLOSED}; open it, or leave out --json")
+    return asked
+
+
 WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
+AsJson = Annotated[bool, typer.Option("--json", callback=read_by_somebody, help="Print the result as JSON, and nothing "
+                                      "else.")]
 PlannerOption = Annotated[PathPlanner, typer.Option(help="OMPL planner: one PRM* roadmap, or pair by pair RRTConnect "
                                                      "(noisy), FMT*, BFMT* or Informed RRT* (slow).")]
 MarginOption = Annotated[float | None, typer.Option(
@@ -37,7 +46,8 @@ MarginOption = Annotated[float | None, typer.Option(
 TimeLimit = Annotated[float | None, typer.Option(
     metavar="S", min=0, callback=finite, help="Stop each solve after so many seconds and take its best plan.",
     show_default="none")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of failures and noise; plans don't depend on it.")]
+MOST_SEED = 2**63 - 1
+Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of failures and noise; plans don't depend on it.")]
 Trials = Annotated[int, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.")]
 Rollouts = Annotated[int, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod ROLLOUTS.")]
 FidelityOption = Annotated[Fidelity, typer.Option(

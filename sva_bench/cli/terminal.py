@@ -15,7 +15,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.segment import Segment
 from rich.table import Table
 
-from sva_bench.files.printable import printable
+from sva_bench.errors import BadInput
+from sva_bench.files.printable import counted, printable
+from sva_bench.files.streams import CLOSED, output_is_closed
 from sva_bench.interrupts import holding_back_ctrl_c
 
 
@@ -42,7 +44,13 @@ def results() -> Console:
 
 
 def print_json(data: Any) -> None:
-    """Print a result as JSON on standard output."""
+    """Print a result as JSON on standard output.
+
+    Raises:
+        BadInput: If that is closed.
+    """
+    if output_is_closed():
+        raise BadInput(f"{CLOSED}; open it")
     sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
@@ -103,8 +111,8 @@ def print_summary(summary: Any) -> None:
 
     console = results()
     scenarios, travel = summary["scenarios"], summary["travel"]
-    table = Table(title=f"{summary['world']}, seed {summary['seed']}: {summary['trials']} trials, "
-                        f"{summary['rollouts']} rollouts, {summary['fidelity']}", title_justify="left")
+    table = Table(title=f"{summary['world']}, seed {summary['seed']}: {counted(summary['trials'], 'trial')}, "
+                        f"{counted(summary['rollouts'], 'rollout')}, {summary['fidelity']}", title_justify="left")
     compared = "vss" in scenarios[0]
     judged = any("lost" in plan for plan in scenarios[0]["plans"].values())  # plans from anywhere may lose robots
     for heading in ("scenario", "plan", *(("robots lost",) if judged else ()), "promised", "expected",
@@ -136,12 +144,12 @@ def print_summary(summary: Any) -> None:
         bad = [f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if end in ends]
         if bad:
             unhappy.append(f"{', '.join(bad)} ({name})")
-    console.print(f"{travel['pairs']} travel times, {travel['triangle_violations_pct']:.1f} % repaired, by up to "
-                  f"{travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed under "
-                  f"{summary['failure']['execute']} failures.", highlight=False)
+    console.print(f"{counted(travel['pairs'], 'travel time')}, {travel['triangle_violations_pct']:.1f} % repaired, "
+                  f"by up to {travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed "
+                  f"under {summary['failure']['execute']} failures.", highlight=False)
     if unhappy:
-        console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
-                      highlight=False)
+        console.print(f"Of {counted(missions, 'robot mission')} ended otherwise than home or by draw: "
+                      f"{'; '.join(unhappy)}.", highlight=False)
     for scenario in scenarios:
         if scenario.get("comparisons"):
             console.print(f"{scenario['name']}: {ranked(scenario)}", highlight=False, markup=False)

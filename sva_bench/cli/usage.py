@@ -7,9 +7,26 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from sva_bench.errors import BadInput
+
 
 class PlainCommand(TyperCommand):
-    """A command whose arguments stand in its usage line by their names alone: ``execute [OPTIONS] WORLD PLAN...``."""
+    """A command whose arguments stand in its usage line by their names alone: ``execute [OPTIONS] WORLD PLAN...``.
+
+    Empty values are refused: of a path, ``''`` would be the current folder, and mostly is a variable that isn't set.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse what is empty, before it is taken for something."""
+        given, _, parameters = self.make_parser(ctx).parse_args(args=list(args))
+        for parameter in parameters:
+            value = given.get(parameter.name)
+            if "" in (value if isinstance(value, tuple | list) else (value,)):
+                option = parameter.param_type_name == "option"
+                name = max(parameter.opts, key=len) if option else parameter.metavar
+                raise BadInput(f"{name}: its value is empty, as of a variable that isn't set; give one"
+                               + (", or leave the option out" if option and not parameter.required else ""))
+        return super().parse_args(ctx, args)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """The words of the usage line after the command's name."""

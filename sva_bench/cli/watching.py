@@ -17,6 +17,7 @@ from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.batch.estimates import Estimate
 from sva_bench.batch.run import Progress
 from sva_bench.cli.terminal import messages, results
+from sva_bench.files.printable import counted
 from sva_bench.report.wording import over_few_maps, verdict, with_interval
 
 _LINE_S = 10.0
@@ -39,7 +40,7 @@ def watching() -> Iterator[Callable[[Progress], None]]:
     def greet(progress: Progress) -> None:
         nonlocal begun
         if not begun and progress.done:
-            messages.print(f"{progress.done} of {progress.units} units are measured already", highlight=False)
+            messages.print(f"{progress.done} of {counted(progress.units, 'unit')} measured already", highlight=False)
         begun = True
 
     if not messages.is_terminal:
@@ -63,7 +64,7 @@ def watching() -> Iterator[Callable[[Progress], None]]:
 
 def how_far(progress: Progress) -> str:
     """Units done, failed, rate and time left."""
-    text = f"{progress.done} of {progress.units} units done, {progress.failed} failed"
+    text = f"{progress.done} of {counted(progress.units, 'unit')} done, {progress.failed} failed"
     if progress.rate is not None and progress.left_s is not None:
         text += f", {progress.rate:.2g} a second, {timedelta(seconds=round(progress.left_s))} left"
     return text
@@ -94,8 +95,8 @@ def print_batch(summary: Any, console: Console | None = None) -> None:
     console = console or results()
     worlds, seeds = len(summary["worlds"]), len(summary["seeds"])
     varied = any(row["variant"] for row in summary["maps"])
-    table = Table(title=f"{worlds} world{'s' * (worlds > 1)}, {seeds} seed{'s' * (seeds > 1)}, "
-                        f"{summary['trials']} trials, {summary['fidelity']}", title_justify="left")
+    table = Table(title=f"{counted(worlds, 'world')}, {counted(seeds, 'seed')}, {counted(summary['trials'], 'trial')}, "
+                        f"{summary['fidelity']}", title_justify="left")
     for heading in ("world", *(("variant",) if varied else ()), "scenario", "stochastic", "deterministic",
                     "VSS [95 %]", "VSS %"):
         # Names of worlds tell them apart by their ends.
@@ -149,8 +150,8 @@ def print_grid(listed: Sequence[Estimate]) -> None:
     if len(listed) > _MOST_LISTED:
         console.print(f"and {len(listed) - _MOST_LISTED} more", highlight=False)
     seconds = sum(e.processor_s for e in listed)
-    console.print(f"{sum(e.units for e in listed)} units, {sum(e.rows for e in listed)} rows; about "
-                  f"{sum(e.disk_bytes for e in listed) / 1e6:.1f} MB and {timedelta(seconds=round(seconds))} of "
+    console.print(f"{counted(sum(e.units for e in listed), 'unit')}, {counted(sum(e.rows for e in listed), 'row')}; "
+                  f"about {sum(e.disk_bytes for e in listed) / 1e6:.1f} MB and {timedelta(seconds=round(seconds))} of "
                   "processor time, to be divided by the number of workers. Time is rough until travel times and plans "
                   "are in the cache.", highlight=False, soft_wrap=True)
 

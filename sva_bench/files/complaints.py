@@ -9,12 +9,13 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from sva_bench.errors import nearest
+from sva_bench.files.printable import counted
 
 Loc = tuple[str | int, ...]
 
 
 def first_complaint(
-    data: Any, schema: type[BaseModel], error: ValidationError, written: Callable[[Loc], str | None] = lambda _: None,
+    data: Any, schema: type[BaseModel], error: ValidationError, written: Callable[[Loc], str | None] | None = None,
 ) -> tuple[Loc, str]:
     """Where the first thing to mend stands, and what to change there.
 
@@ -22,7 +23,7 @@ def first_complaint(
         data: The document's data.
         schema: The pydantic model that refused it.
         error: How it did.
-        written: How the file writes the scalar at a place; ``None`` where there is none.
+        written: How a YAML file writes the scalar at a place; ``None`` where there is none. Of JSON, nothing.
     """
     # An unknown key explains a missing one beside it better than the other way round.
     details = sorted(_as_meant(data, error.errors()), key=lambda d: d["type"] != "extra_forbidden")
@@ -33,6 +34,8 @@ def first_complaint(
         known = _keys_at(schema, detail["loc"][:-1])
         if key in known:  # of another alternative
             return loc, f"the key {shown(key)} doesn't go with the other keys here; remove one or the other"
+        if key.isdecimal() and detail["input"] is None:  # {size_m: 0,5} has a key 5
+            return loc, f"unknown key {shown(key)}; if it is what follows a decimal comma, write a decimal point"
         return loc, f"unknown key {shown(key)}; {nearest(key, known)}"
     if detail["type"] == "missing":
         return loc, f"the key {detail['loc'][-1]!r} is missing; add it"
@@ -41,13 +44,18 @@ def first_complaint(
         return loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit"
     message = _plainly(detail)
     found = detail["input"]
-    text = written(loc) or (None if found is None else str(found).lower())
+    text = (written(loc) if written else None) or (None if found is None else str(found).lower())
     if detail["type"] == "string_type" and not isinstance(found, dict | list) and text is not None:
+        if written is None:
+            kind = f"the number {text}" if not isinstance(found, bool) else text
+            return loc, f'expected a word, found {kind}; if it is a name, write "{text}"'
         kind = "nothing" if found is None else "a truth value" if isinstance(found, bool) else "a number"
         return loc, f"expected a word, and {text} without quotes is {kind}; if it is a name, write '{text}'"
     also = f", found {shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
     if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
-        also = f", found the text {shown(found)}" + (": take the quotes away" if _numeric(found) else "")
+        also = f", found the text {shown(found)}" + (": take the quotes away" if _numeric(found) else _comma(found))
+    if detail["type"] == "too_long" and written and all(isinstance(item, int) for item in found):
+        also = "; if commas among them are decimal ones, write decimal points"
     return loc, message[:1].lower() + message[1:] + also
 
 
@@ -58,15 +66,26 @@ def of_an_option(error: ValidationError) -> str:
     found = str(detail["input"])
     if detail["type"] == "value_error":  # ours or typer's, which say the value
         return message
-    return f"{message}, found {found if found.isalnum() else shown(found)}"
+    return f"{message}, found {found if found.isalnum() else shown(found)}{_comma(found)}"
 
 
 def _plainly(detail: Any) -> str:
     kind = detail["type"]
+    if kind in ("too_short", "too_long"):
+        least, most = detail["ctx"].get("min_length"), detail["ctx"].get("max_length")
+        bound = f"least {counted(least, 'entry', 'entries')}" if kind == "too_short" else \
+            f"most {counted(most, 'entry', 'entries')}"
+        return f"expected at {bound}, found {detail['ctx']['actual_length']}"
     if kind in _PLAINLY:
         return _PLAINLY[kind].format(**detail.get("ctx", {}))
     said: str = detail["msg"]
     return said.removeprefix("Value error, ")
+
+
+def _comma(text: str) -> str:
+    """What to change in a number with a decimal comma; nothing of other text."""
+    return f": write a decimal point, {text.replace(',', '.')}" if text.count(",") == 1 and len(text) <= 40 \
+        and _numeric(text.replace(",", ".")) else ""
 
 
 def _numeric(text: str) -> bool:
@@ -77,8 +96,6 @@ def _numeric(text: str) -> bool:
 
 
 _PLAINLY = {  # what pydantic says of its own types, said of the file
-    "too_short": "expected at least {min_length} entries, found {actual_length}",
-    "too_long": "expected at most {max_length} entries, found {actual_length}",
     "dict_type": "expected a mapping", "model_type": "expected a mapping", "list_type": "expected a list",
     "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
     "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",

@@ -22,7 +22,8 @@ from sva_bench.files.complaints import Loc as Loc
 from sva_bench.files.complaints import dotted, first_complaint, shown
 from sva_bench.files.fields import SectionT
 from sva_bench.files.json_lines import json_line
-from sva_bench.files.mistaken import what_it_is
+from sva_bench.files.mistaken import what_it_is, what_the_bytes_are
+from sva_bench.files.printable import counted
 from sva_bench.files.yaml_text import MAX_DEPTH, Node, compose, line_in, plain_data, written_in
 
 MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
@@ -33,8 +34,7 @@ class Document:
     """Plain data read from a file, which knows the line of each key."""
 
     def __init__(self, path: Path, data: Any, text: str, root: Node | None = None) -> None:
-        self.path, self.data, self.text = path, data, text
-        self._root = root
+        self.path, self.data, self.text, self._root, self.is_json = path, data, text, root, root is None
 
     def error(self, loc: Loc, problem: str) -> BadFile:
         """A complaint about the value at ``loc``, e.g. ``("sites", "pois", "p1")``."""
@@ -66,7 +66,8 @@ class Document:
         while True:
             name, words = _next_name(at, words)
             if isinstance(at, list) and not (isinstance(name, int) and name < len(at)):
-                raise self.error((), f"{key}: there is a list of {len(at)} items at {name!r}; count them from 0")
+                raise self.error((), f"{key}: there is a list of {counted(len(at), 'item')} at {name!r}; "
+                                 "count them from 0")
             if not isinstance(at, dict | list):
                 raise self.error((), f"{key}: there is nothing called {name!r} to set")
             if words and loc in (named or {}) and not (isinstance(at, dict) and name in at):
@@ -177,16 +178,18 @@ def validate(document: Document, schema: type[SectionT], kind: str) -> SectionT:
     try:
         return schema.model_validate(document.data)
     except ValidationError as error:
-        raise document.error(*first_complaint(document.data, schema, error, document.written)) from None
+        written = None if document.is_json else document.written
+        raise document.error(*first_complaint(document.data, schema, error, written)) from None
 
 
 def check_kind(document: Document, kind: str) -> None:
     """Refuse a document that is not a mapping of the declared kind."""
+    line = f'"format": "{kind}"' if document.is_json else f"'format: {kind}'"
     if not isinstance(document.data, dict):
-        raise document.error((), f"expected a mapping that starts with 'format: {kind}'")
+        raise document.error((), f"expected a mapping that starts with {line}")
     found, known = document.data.get("format"), what_it_is(document.data)
     if found is None:
-        raise document.error((), known or f"the key 'format' is missing; add 'format: {kind}'")
+        raise document.error((), known or f"the key 'format' is missing; add {line}")
     if found != kind:
         other = isinstance(found, str) and found.partition("@")[0] != kind.partition("@")[0]
         hint = f"; {known}" if other and known is not None else ""
@@ -224,10 +227,12 @@ def _read(path: Path, limit: int) -> str:
     content = read_bytes(path, limit)
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise BadFile(path, None, "", "UTF-16 text; save it as UTF-8")
+    if (known := what_the_bytes_are(content)) is not None:
+        raise BadFile(path, None, "", known)
     try:
         text = content.decode("utf-8-sig")  # a byte-order mark, as editors write it, is no part of the text
     except UnicodeDecodeError as error:
-        raise BadFile(path, None, "", f"not UTF-8 text (byte {error.start})") from None
+        raise BadFile(path, None, "", f"not UTF-8 text (byte {error.start}); save it as UTF-8") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

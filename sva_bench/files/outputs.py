@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sva_bench.errors import BadInput
 from sva_bench.files.atomic import try_out, why, write_file
+from sva_bench.files.streams import CLOSED, output_is_closed
 
 ANOTHER_PLACE = "choose another place with -o"
 
@@ -27,9 +28,11 @@ def check_output(path: Path | None, *sources: Path, way_out: str = ANOTHER_PLACE
         way_out: What to change.
 
     Raises:
-        BadInput: If the folder isn't there or takes no files, this is a folder, or one of the sources.
+        BadInput: If the folder isn't there or takes no files, this is a folder, or one of the sources; or if it is
+            standard output, and that is closed.
     """
     if path is None or is_standard_output(path):
+        _refuse_closed()
         return
     target = Path(os.path.realpath(path))
     try:
@@ -82,6 +85,7 @@ def write_result(path: Path | None, content: str | bytes) -> None:
         raise BadInput(f"{name!r}: this name is no UTF-8, and no file of ours can hold it; rename what it is of"
                        ) from None
     if path is None or is_standard_output(path):
+        _refuse_closed()
         if isinstance(content, str):
             sys.stdout.write(content)
         else:
@@ -111,6 +115,11 @@ def write_beside(path: Path, name: str, content: bytes) -> None:
     except OSError as error:
         raise BadInput(f"{target.parent}: cannot be made ({why(error)}); {ANOTHER_PLACE}") from None
     write_result(target, content)
+
+
+def _refuse_closed() -> None:
+    if output_is_closed():
+        raise BadInput(f"{CLOSED}; open it, or name a file with -o")
 
 
 def _refuse_frozen(target: Path) -> None:

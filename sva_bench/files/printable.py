@@ -41,3 +41,8 @@ def all_text(data: Any) -> bool:
     if isinstance(data, list):
         return all(map(all_text, data))
     return not isinstance(data, str) or is_text(data)
+
+
+def counted(count: int, noun: str, plural: str | None = None) -> str:
+    """``1 map``, ``2 maps``."""
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"

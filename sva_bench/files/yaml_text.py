@@ -18,7 +18,7 @@ from ruamel.yaml.nodes import Node as Node
 from sva_bench.errors import BadFile
 from sva_bench.files.complaints import Loc as Loc
 from sva_bench.files.complaints import dotted, shown
-from sva_bench.files.mistaken import what_the_text_is
+from sva_bench.files.mistaken import what_is_no_yaml, what_the_text_is
 
 MAX_DEPTH = 32
 MAX_YAML_VALUES = 200_000  # keys and values; a world of 10 000 obstacles has 120 000, which take 5 s to read
@@ -54,9 +54,10 @@ def compose(text: str, path: Path) -> Node | None:
         if (known := what_the_text_is(text)) is not None:
             raise BadFile(path, None, "", known) from None
         if not isinstance(error, MarkedYAMLError):
-            raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}") from None
+            raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}; remove it") from None
         mark = error.problem_mark or error.context_mark
-        raise BadFile(path, mark.line + 1 if mark else None, "", f"not valid YAML: {error.problem}") from None
+        said = what_is_no_yaml(text, mark.line if mark else 0, str(error.problem))
+        raise BadFile(path, mark.line + 1 if mark else None, "", said) from None
     except RecursionError:
         raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
     except (ValueError, OverflowError):

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadInput
+from sva_bench.files.printable import counted
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import unless_interrupted
 from sva_bench.robot.model import USUAL_MODEL
@@ -104,8 +105,8 @@ def propose_mission(
     """
     pois = [site.name for site in sites if site.kind == "poi"]
     if robots < 2 or len(pois) < 2 * robots:
-        raise BadInput(f"{robots} robots and {len(pois)} POIs leave nothing to decide; choose at least two robots, and "
-                       "two POIs for each")
+        raise BadInput(f"{counted(robots, 'robot')} and {counted(len(pois), 'POI')} leave nothing to decide; choose "
+                       "at least two robots, and two POIs for each")
     names, certain = tuple(f"uv{k + 1}" for k in range(robots)), robots - robots // 2
     first: Proposal | None = None
     for draw in range(_DRAWS):
@@ -124,8 +125,8 @@ def propose_mission(
             return proposal
         first = first or proposal
     if first is None:
-        raise BadInput(f"no mission found for {len(pois)} POIs and {robots} robots that is neither trivial nor "
-                       "hopeless; choose another seed, or more POIs")
+        raise BadInput(f"no mission found for {counted(len(pois), 'POI')} and {counted(robots, 'robot')} that is "
+                       "neither trivial nor hopeless; choose another seed, or more POIs")
     return first
 
 

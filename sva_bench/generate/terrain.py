@@ -16,6 +16,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import WorldFamily
 from sva_bench.errors import BadInput
+from sva_bench.files.printable import counted
 from sva_bench.generate.mazes import maze_walls
 from sva_bench.generate.rooms import room_walls
 from sva_bench.geometry.distances import clearance, segment_distance
@@ -131,9 +132,9 @@ def random_places(obstacles: Obstacles, *, stations: int, pois: int, seed: int) 
             if place is not None and (best is None or worth(place) > worth(best)):
                 best = place
         if best is None:
-            raise BadInput(f"{stations} stations and {pois} POIs do not fit: there is room for {len(found)} sites that "
-                           f"keep {APART_M:g} m from each other and {SITE_ROOM_M:g} m from obstacles; choose fewer, or "
-                           "a larger or emptier world")
+            raise BadInput(f"{counted(stations, 'station')} and {pois} POIs do not fit: there is room for "
+                           f"{counted(len(found), 'site')} that keep {APART_M:g} m from each other and {SITE_ROOM_M:g} "
+                           "m from obstacles; choose fewer, or a larger or emptier world")
         found.append(best)
 
     # Of a few places the one farthest from all others: sites spread out without standing in a grid.

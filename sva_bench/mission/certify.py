@@ -66,7 +66,10 @@ def certify(instance: Instance, plan: Plan) -> Certificate:
             if site == instance.base or site in instance.stations:
                 continue
             if name in visited:
-                reasons.append(f"{vehicle.name}: POI {name} is visited already, by {visited[name]}")
+                twice = f"{vehicle.name}: POI {name} is visited twice; name it once" \
+                    if visited[name] == vehicle.name else \
+                    f"{vehicle.name}: POI {name} is visited already, by {visited[name]}; leave it to one of them"
+                reasons += [twice] if twice not in reasons else []
             visited[name] = vehicle.name
             earned.append(float(vehicle.incentives[site]))
         expected += route_value(earned, vehicle.availability, instance.failure)
@@ -93,8 +96,9 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
     for i, j in itertools.pairwise(sites):
         leg = float(vehicle.fuel_s[i, j])
         where = f"{instance.sites[i]} -> {instance.sites[j]}"
-        if i == j:
-            reasons.append(f"{name}: {instance.sites[i]} follows itself; name a stop once")
+        if i == j:  # of POIs, and of the base in the middle, it is said that they stand there twice
+            if i in instance.stations or len(sites) == 2:
+                reasons.append(f"{name}: {instance.sites[i]} follows itself; name a stop once")
         elif leg == INFINITE:
             reasons.append(f"{name}: there is no way {where}")
         since_refuel += leg

@@ -16,6 +16,7 @@ from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_json, validate
 from sva_bench.files.fields import Bounded, Name, Probability, Section
 from sva_bench.files.pretty import pretty_json
+from sva_bench.files.printable import counted
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.mission.instance import Instance, Vehicle
 
@@ -71,7 +72,8 @@ def read_instance(path: Path) -> Instance:
     if file.base in file.stations:
         raise document.error(("stations",), f"the base {file.base!r} is listed here; vehicles never refuel there")
     if file.stop_s is not None and len(file.stop_s) != len(sites):
-        raise document.error(("stop_s",), f"expected {len(sites)} entries, one for each site, found {len(file.stop_s)}")
+        raise document.error(("stop_s",), f"expected {counted(len(sites), 'entry', 'entries')}, one for each site, "
+                             f"found {len(file.stop_s)}")
     common = None if file.fuel_s is None else _matrix(document, ("fuel_s",), file.fuel_s, len(sites))
     _refuse_twice(document, ("vehicles",), [v.name for v in file.vehicles])
     joint = _joint(document, file)
@@ -144,10 +146,11 @@ def _vehicle(
 
 def _matrix(document: Document, loc: tuple[str | int, ...], rows: list[list[float | None]], n: int) -> FloatArray:
     if len(rows) != n:
-        raise document.error(loc, f"expected {n} rows, one for each site, found {len(rows)}")
+        raise document.error(loc, f"expected {counted(n, 'row')}, one for each site, found {len(rows)}")
     for i, row in enumerate(rows):
         if len(row) != n:
-            raise document.error((*loc, i), f"expected {n} entries, one for each site, found {len(row)}")
+            raise document.error((*loc, i), f"expected {counted(n, 'entry', 'entries')}, one for each site, "
+                                 f"found {len(row)}")
         if row[i] not in (0, None):
             raise document.error((*loc, i, i), f"the diagonal must be 0, found {row[i]}")
     matrix = np.array([[math.inf if cost is None else cost for cost in row] for row in rows], dtype=np.float64)

@@ -13,6 +13,7 @@ from sva_bench.analysis.summary import totals
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Drives, Settings, execute
+from sva_bench.files.printable import counted
 from sva_bench.report.wording import verdict, with_interval
 from sva_bench.study.options import Options, Progress
 from sva_bench.study.planning import NOMINAL, plan_costs, plan_scenarios
@@ -62,9 +63,10 @@ def simulation_page(rows: Sequence[Mapping[str, Any]], settings: Settings) -> st
     """The rows beside the paper's figures, as Markdown."""
     scenarios = list(dict.fromkeys(row["scenario"] for row in rows))
     lines = ["# The simulation study (the paper's Figures 7 and 8)", "",
-             f"`sva-bench reproduce simulation`: {settings.trials} trials, {settings.rollouts} noise draws, fidelity "
-             f"{settings.fidelity}, seed {settings.seed}. Plans are made for `mission` failures. The paper executes "
-             "them under `per_leg` failures; beside it they are executed under those they were made for.", "",
+             f"`sva-bench reproduce simulation`: {counted(settings.trials, 'trial')}, "
+             f"{counted(settings.rollouts, 'noise draw')}, fidelity {settings.fidelity}, seed {settings.seed}. "
+             "Plans are made for `mission` failures. The paper executes them under `per_leg` failures; beside it they "
+             "are executed under those they were made for.", "",
              "## Over maps", "",
              "| scenario | VSS % per_leg, mean over maps | VSS % mission, mean over maps | the paper |",
              "| --- | ---: | ---: | --- |"]

@@ -17,6 +17,7 @@ from typing import get_args
 
 from sva_bench.choices import Status
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.files.printable import counted
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
@@ -271,7 +272,7 @@ def read_rows(path: Path) -> list[Row]:
     rows = []
     for number, cells in enumerate(lines, start=2):
         if len(cells) != len(NAMES):
-            raise BadFile(path, number, "", f"{len(cells)} cells in place of {len(NAMES)}; remove the line")
+            raise BadFile(path, number, "", f"{counted(len(cells), 'cell')} in place of {len(NAMES)}; remove the line")
         rows.append(_row(path, number, dict(zip(NAMES, cells, strict=True))))
     return rows
 

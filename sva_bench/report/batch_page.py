@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from sva_bench.analysis.reach import maps_without_reach
+from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, write_page
 from sva_bench.report.wording import (
     VSS_PCT,
     listed,
-    number,
     optional,
     over_few_maps,
     per_cent,
@@ -45,13 +45,13 @@ def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
     failed = [[entry["unit"], entry["world"], str(entry["seed"]), entry["reason"]] for entry in summary["failed"]]
     caution = over_few_maps(rows)
     parts = [
-        f"<h1>Value of the stochastic solution over {number(len(summary['worlds']), 'map')}</h1>",
+        f"<h1>Value of the stochastic solution over {counted(len(summary['worlds']), 'map')}</h1>",
         f"<div class=answer><p>{sentence(_over_maps(rows))}</p>{note(VSS_PCT)}</div>",
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
         *(note(said) for said in maps_without_reach(summary["units"])),
-        note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, fidelity {summary['fidelity']}; 95 "
+        note(f"{counted(summary['trials'], 'trial')} of each plan in each scenario, fidelity {summary['fidelity']}; 95 "
              "% intervals in brackets. Over maps, the maps are the sample."),
         *([heading("Given up"), table(["unit", "map", "seed", "reason"], failed, words=(0, 1, 3))] if failed else []),
         *pictures,

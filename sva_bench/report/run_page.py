@@ -11,6 +11,7 @@ from urllib.parse import quote
 import numpy as np
 
 from sva_bench.analysis.reach import infeasible, lost_robots, nothing_reached
+from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.wording import (
@@ -19,7 +20,6 @@ from sva_bench.report.wording import (
     answer,
     assumption_rows,
     finding,
-    number,
     optional,
     per_cent,
     ranked,
@@ -46,8 +46,8 @@ def write_report(path: Path, content: Content) -> None:
         f"<h1>{text(summary['world'])}: {question}, and how sure is that?</h1>",
         *_answer(summary),
         *(_comparison(scenarios) if compared else _ranking(scenarios)),
-        note(f"{number(summary['trials'], 'trial')} of each plan in each scenario, "
-             f"{number(summary['rollouts'], 'noise draw')}, fidelity {summary['fidelity']}, seed {summary['seed']}; "
+        note(f"{counted(summary['trials'], 'trial')} of each plan in each scenario, "
+             f"{counted(summary['rollouts'], 'noise draw')}, fidelity {summary['fidelity']}, seed {summary['seed']}; "
              f"planned under {summary['failure']['plan']}, executed under {summary['failure']['execute']} failures. "
              "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
         *_charts(scenarios, compared=compared),
@@ -207,8 +207,9 @@ def _world(world: World) -> list[str]:
         from sva_bench.report.drawing import Overlays, draw_world, for_page
 
     picture = for_page(draw_world(world, "svg", Overlays()).decode(), "world", f"The world {world.name} from above")
-    return [heading("The world"), figure(picture, f"{world.name}: {len(world.stations)} stations, {len(world.pois)} "
-                                         "points of interest with what each robot earns there.")]
+    return [heading("The world"), figure(picture, f"{world.name}: {counted(len(world.stations), 'station')}, "
+                                         f"{counted(len(world.pois), 'point of interest', 'points of interest')} with "
+                                         "what each robot earns there.")]
 
 
 def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> list[str]:

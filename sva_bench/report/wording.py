@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sva_bench.analysis.reach import NOTHING, beyond_reach, infeasible_plans, nothing_reached, warned
+from sva_bench.files.printable import counted
 
 
 def answer(summary: Mapping[str, Any]) -> str:
@@ -106,8 +107,8 @@ def remarks(summary: Mapping[str, Any]) -> list[str]:
     if asked is not None:
         reached = "no interval" if asked["reached_pct"] is None else f"{asked['reached_pct']:.2g} %"
         said.append(f"Precision asked for: VSS within {asked['asked_pct']:g} % of the stochastic plan's incentive; "
-                    f"reached: {reached} after {number(summary['trials'], 'trial')} under "
-                    f"{number(summary['rollouts'], 'noise draw')}"
+                    f"reached: {reached} after {counted(summary['trials'], 'trial')} under "
+                    f"{counted(summary['rollouts'], 'noise draw')}"
                     f"{'' if asked['met'] else ', the most that were allowed'}.")
     known = [f"{s['name']} {verdict(s['evpi_executed'])}" for s in summary["scenarios"] if "evpi_executed" in s]
     if known:
@@ -159,7 +160,7 @@ def with_interval(estimate: Mapping[str, Any], digits: int = 1, unit: str = "") 
     interval = estimate["ci95"]
     return f"{estimate['mean']:.{digits}f}{unit}" + (
         "" if interval is None else f" [{interval[0]:.{digits}f}, {interval[1]:.{digits}f}]") + (
-        f" ({number(estimate['maps'], 'map')})" if "maps" in estimate else "")
+        f" ({counted(estimate['maps'], 'map')})" if "maps" in estimate else "")
 
 
 def per_cent(figure: float | None) -> str:
@@ -170,11 +171,6 @@ def per_cent(figure: float | None) -> str:
 def optional(figure: float | None) -> str:
     """A figure, or nothing where there is none."""
     return "–" if figure is None else f"{figure:.1f}"
-
-
-def number(count: int, noun: str) -> str:
-    """``1 map``, ``2 maps``."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def listed(words: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from sva_bench.choices import End, FailureProcess, Fidelity, Status
 from sva_bench.files.fields import Name, Probability, Section, WholeNumber
 from sva_bench.files.printable import is_name
+from sva_bench.seeds import MOST_SEED
 
 MOST_TRIALS, MOST_ROLLOUTS = 10_000_000, 10_000_000
 
@@ -34,6 +35,7 @@ def _is_shown(name: str) -> str:
 Figure = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e15, le=1e15)]
 """A sum of incentives, or a percentage of one; a page adds, subtracts and draws them."""
 Interval = Annotated[list[Figure], Field(min_length=2, max_length=2), AfterValidator(_in_order)]
+Seed = Annotated[WholeNumber, Field(le=MOST_SEED)]
 Words = Annotated[str, Field(max_length=10_000)]
 AnyText = Annotated[Any, AfterValidator(_is_text)]
 """Of the command line, which may hold what is no UTF-8."""
@@ -223,7 +225,7 @@ class Head(Section):
     """What every summary says first."""
 
     world: Name
-    seed: WholeNumber
+    seed: Seed
     trials: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
     rollouts: Annotated[int, Field(strict=True, ge=1, le=MOST_ROLLOUTS)]
     fidelity: Fidelity
@@ -265,7 +267,7 @@ class ManifestFile(Section):
 
     format: Literal["sva-bench/manifest@1"]
     version: Words
-    seed: WholeNumber
+    seed: Seed
     options: dict[str, Any]
     command: Annotated[list[AnyText], Field(max_length=10_000)]
     started: Words

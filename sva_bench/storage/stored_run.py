@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from sva_bench.choices import ENDS
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.atomic import draft_file
 from sva_bench.files.documents import read_json
+from sva_bench.files.printable import counted
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
@@ -56,6 +58,7 @@ def run_folder_at(path: Path) -> Path:
 
     Raises:
         BadInput: If it is none: says what it is.
+        BadFile: If it lacks its summary.
     """
     if not path.exists():
         raise BadInput(f"{path}: no such folder; name a run folder, as in runs/<world>-seed0-<hash>")
@@ -66,12 +69,32 @@ def run_folder_at(path: Path) -> Path:
                        "batch status' with this folder says how far it is")
     if path.name.startswith(".") and path.suffix == ".tmp":
         raise BadInput(f"{path}: a run that was not finished; run its command again")
+    if not (path / "summary.json").exists() and (path / "outcomes.parquet").exists():
+        raise missing(path, path / "summary.json")
     if not (path / "summary.json").is_file():
         within = [entry for entry in sorted(path.iterdir()) if (entry / "summary.json").is_file()]
         hint = f"name one of the folders in it, such as {within[0]}" if within else \
             "name one as in runs/<world>-seed0-<hash>"
         raise BadInput(f"{path}: no run folder of ours (summary.json is missing); {hint}")
     return path
+
+
+@contextlib.contextmanager
+def _complete(folder: Path) -> Iterator[None]:
+    """What isn't there of a run folder is said of the folder, with the way out."""
+    try:
+        yield
+    except BadFile as error:
+        if Path(error.path).is_relative_to(folder) and not Path(error.path).exists():
+            raise missing(folder, Path(error.path)) from None
+        raise
+
+
+def missing(folder: Path, path: Path) -> BadFile:
+    """What is said of a run folder that a file of it isn't in."""
+    where = ", it stands in manifest.json" if (folder / "manifest.json").exists() else ""
+    return BadFile(folder, None, "", f"the run folder is incomplete: {path.relative_to(folder)} is missing; run its "
+                   f"command again{where}")
 
 
 def is_batch(folder: Path) -> bool:
@@ -93,7 +116,7 @@ def write_csv(folder: Path) -> list[Path]:
     written = []
     for name, schema in (("legs", LEGS), ("outcomes", OUTCOMES), ("travel_times", TRAVEL_TIMES)):
         path = folder / f"{name}.csv"
-        with draft_file(path) as draft:
+        with draft_file(path) as draft, _complete(folder):
             write_table_as_csv(folder / f"{name}.parquet", draft, schema)
         written.append(path)
     return written
@@ -105,6 +128,11 @@ def read_content(folder: Path) -> Content:
     Raises:
         BadFile: If a file is missing, cut off, foreign or not of the same run.
     """
+    with _complete(folder):
+        return _content(folder)
+
+
+def _content(folder: Path) -> Content:
     document, summary = read_ours(folder / "summary.json", SummaryFile, "sva-bench/summary@1")
     told, manifest = read_ours(folder / "manifest.json", ManifestFile, "sva-bench/manifest@1")
     world = world_of(Part(told, ("world",), manifest.world), folder / MAP)
@@ -183,5 +211,7 @@ def _check_outcomes(path: Path, plans: Mapping[tuple[str, str], float], trials: 
         found = sums[scenario, name] / trials
         if counts[scenario, name] != trials * robots or not np.isclose(found, mean, rtol=_AGREE, atol=_AGREE):
             raise BadFile(path, None, "incentive", f"these aren't the trials of summary.json: {scenario}, {name} "
-                          f"collected {mean:.6g} there and {found:.6g} here, in {counts[scenario, name] // robots} "
-                          "trials; run the command in manifest.json again")
+                          f"collected {mean:.6g} there and {found:.6g} here, in "
+                          f"{counted(counts[scenario, name] // robots, 'trial')}; run the command in manifest.json "
+                          "again")
+

@@ -17,6 +17,7 @@ import pyarrow.csv as pcsv
 import pyarrow.parquet as pq
 
 from sva_bench.errors import BadFile
+from sva_bench.files.printable import counted
 
 MOST_ROWS = 200_000_000
 """Rows of a table that are read: ten million trials of two plans by two robots in five scenarios."""
@@ -124,7 +125,7 @@ def _check_head(path: Path, file: pq.ParquetFile, schema: pa.Schema, rows: int |
         if found != field.type:
             raise BadFile(path, None, field.name, f"expected a column of type {field.type}, found {found}; {_AGAIN}")
     if rows is not None and head.num_rows != rows:
-        raise BadFile(path, None, "", f"{head.num_rows} rows, where {rows} belong; {_AGAIN}")
+        raise BadFile(path, None, "", f"{counted(head.num_rows, 'row')}, where {rows} belong; {_AGAIN}")
     if head.num_rows > most:
         raise BadFile(path, None, "", f"{head.num_rows} rows; at most {most} are read")
     groups = [head.row_group(number) for number in range(head.num_row_groups)]

@@ -25,11 +25,20 @@ class InformedPlans:
 
     Attributes:
         plans: The plan for each set of available robots.
-        expected: Their expected value.
+        expected: Their expected value, over who turns out to be available: wait and see.
+        bound: Upper bound on it.
     """
 
     plans: Mapping[frozenset[str], Plan]
     expected: float
+    bound: float
+
+    def promised(self, executed: Executed) -> Executed:
+        """The informed planner's trials, with what its plans promise together in place of what the first one does."""
+        stopped = [plan.status for plan in self.plans.values() if plan.status != "optimal"]
+        together = replace(executed.case.plan, value=self.expected, bound=self.bound,
+                           status=stopped[0] if stopped else "optimal")
+        return replace(executed, case=replace(executed.case, plan=together))
 
 
 def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, force: bool) -> InformedPlans:
@@ -53,7 +62,8 @@ def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, 
         sure = replace(instance, joint=None, failure="mission", vehicles=tuple(
             replace(v, availability=1.0 if v.name in available else 0.0) for v in instance.vehicles))
         plans[available] = unless_interrupted(plan_stochastic(sure, limits, known=known))
-    return InformedPlans(plans=plans, expected=sum(sets[s] * (plan.value or 0.0) for s, plan in plans.items()))
+    return InformedPlans(plans=plans, expected=sum(sets[s] * (plan.value or 0.0) for s, plan in plans.items()),
+                         bound=sum(sets[s] * (plan.bound or 0.0) for s, plan in plans.items()))
 
 
 def cases_of(scenario: Scenario, informed: InformedPlans) -> list[Case]:

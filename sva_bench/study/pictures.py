@@ -11,14 +11,15 @@ import numpy as np
 from sva_bench.mission.plan import Plan
 from sva_bench.report.drawing import Kind, Leg, Overlays, draw_world
 from sva_bench.study.options import Progress
-from sva_bench.study.planning import plan_costs, read_plans
+from sva_bench.study.planning import check_plans, plan_costs
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import roadmap_edges
 from sva_bench.world.model import World
 
 
 def picture_of(
-    world: World, kind: Kind, *, roadmap: bool, paths: bool, plan: Path | None, progress: Progress,
+    world: World, kind: Kind, *, roadmap: bool, paths: bool, progress: Progress,
+    plan: Plan | None = None, plan_file: Path | None = None,
 ) -> bytes:
     """A picture of a world, with what is planned in it on request.
 
@@ -26,11 +27,12 @@ def picture_of(
         world: The world.
         kind: ``png`` or ``svg``.
         roadmap, paths: Whether to show them; those of the widest robot where there are several models.
-        plan: A plan file whose routes to show; one that breaks fuel or limit is shown too, with a warning.
         progress: Told how far it is.
+        plan, plan_file: A plan whose routes to show, and its file; one that breaks fuel or limit is shown too, with a
+            warning.
 
     Raises:
-        BadFile, InfeasiblePlan: If the plan can't be read, or not be driven whatever the fuel.
+        InfeasiblePlan: If the plan can't be driven whatever the fuel.
         UnreachableSite: If something planned is asked for, and a site can't be reached.
     """
     if not (roadmap or paths or plan):
@@ -43,9 +45,9 @@ def picture_of(
         edges = roadmap_edges(world.obstacles, points, widest.clearance_m)
     ways = [path for i, row in enumerate(widest.paths) for path in row[i + 1:] if path is not None] if paths else []
     routes: dict[str, list[Leg]] = {}
-    if plan is not None:
-        (read,) = read_plans(world, costs, {plan.stem: plan}, allow_infeasible=True).values()
-        routes = routes_of(world, costs, read)
+    if plan is not None and plan_file is not None:
+        check_plans(world, costs, {"plan": plan}, {"plan": plan_file}, allow_infeasible=True)
+        routes = routes_of(world, costs, plan)
     return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(ways), routes=routes))
 
 

@@ -1,9 +1,9 @@
-"""What is planned for a world: fuel costs, instances and plans of each scenario; plans from elsewhere are read here."""
+"""What is planned for a world: fuel costs, instances and plans of each scenario; plans from elsewhere are checked."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,10 @@ import numpy as np
 
 from sva_bench.analysis.reach import reached
 from sva_bench.choices import PathPlanner
-from sva_bench.errors import BadInput, ExitCode, SvaBenchError
+from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import Plan, unless_interrupted
-from sva_bench.mission.plan_file import read_plan
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.two_stage import (
     Knowledge,
@@ -27,6 +26,7 @@ from sva_bench.solver.two_stage import (
     wait_and_see,
 )
 from sva_bench.study.assumptions import PlansByProcess
+from sva_bench.study.given_plans import InfeasiblePlan, instance_name
 from sva_bench.study.informed import InformedPlans, plan_informed
 from sva_bench.study.options import Options, Progress
 from sva_bench.study.summing import model_is_executed
@@ -134,7 +134,7 @@ def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario
     """The instance of one scenario: all that a solver needs, and no world."""
     sites = tuple(site.name for site in world.sites)
     return Instance(
-        name=world.name if scenario.name == NOMINAL else f"{world.name}-{scenario.name}", sites=sites, base=0,
+        name=instance_name(world, None if scenario.name == NOMINAL else scenario.name), sites=sites, base=0,
         stations=tuple(sites.index(site.name) for site in world.stations),
         stop_s=np.array([site.stop_s for site in world.sites]), failure=world.plan_failure, joint=scenario.joint,
         vehicles=tuple(Vehicle(
@@ -166,46 +166,31 @@ def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
                    [poi.name for poi in world.pois])
 
 
-def read_plans(
-    world: World, costs: Mapping[str, FuelCosts], paths: Mapping[str, Path], *, allow_infeasible: bool,
-) -> dict[str, Plan]:
-    """Read plan files for a world, by the names that they go by.
+def check_plans(
+    world: World, costs: Mapping[str, FuelCosts], plans: Mapping[str, Plan], paths: Mapping[str, Path], *,
+    allow_infeasible: bool,
+) -> None:
+    """Refuse plans from elsewhere that the world's travel times make infeasible.
+
+    Args:
+        world, costs: The world, and its fuel costs.
+        plans, paths: The plans and their files, by the names that they go by.
+        allow_infeasible: Warn of those that break fuel or limit alone.
 
     Raises:
-        BadFile: If a file is no plan, or names robots or sites that the world doesn't have.
         InfeasiblePlan: If a plan cannot be driven; or breaks fuel or limit, and that isn't allowed.
     """
     instance = instance_of(world, costs, nominal_scenario(world))
-    names = {instance.name, *(instance_of(world, costs, scenario).name for scenario in world.scenarios)}
-    plans = {}
-    for name, path in paths.items():
-        plan = read_plan(path, instance)
-        if plan.instance is not None and plan.instance not in names:
-            _log.warning("%s was made for %s, not for %s", path, plan.instance, world.name)
+    for name, plan in plans.items():
         certificate = certify(instance, replace(plan, value=None))
         if not certificate.feasible:
             never = certify(unlimited(instance), replace(plan, value=None)).reasons if allow_infeasible else ()
             if never or not allow_infeasible:
-                raise InfeasiblePlan(path, never or certificate.reasons)
-            _log.warning("%s is infeasible, and used all the same: %s", path, "; ".join(certificate.reasons))
-        plans[name] = plan
-    return plans
+                raise InfeasiblePlan(paths[name], never or certificate.reasons)
+            _log.warning("%s is infeasible, and used all the same: %s", paths[name], "; ".join(certificate.reasons))
 
 
 def unlimited(instance: Instance) -> Instance:
     """The instance with all the fuel and time in the world."""
     return replace(instance, vehicles=tuple(
         replace(v, fuel_capacity_s=np.inf, mission_limit_s=np.inf) for v in instance.vehicles))
-
-
-class InfeasiblePlan(SvaBenchError):
-    """A plan that its certificate refuses."""
-
-    exit_code = ExitCode.INFEASIBLE_PLAN
-
-    def __init__(self, path: Path, reasons: Sequence[str]) -> None:
-        super().__init__(path, reasons)
-        self.path, self.reasons = path, reasons
-
-    def __str__(self) -> str:
-        return f"{self.path}: the plan is infeasible:\n  " + "\n  ".join(self.reasons)

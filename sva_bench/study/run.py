@@ -11,6 +11,7 @@ from typing import Any
 from sva_bench.analysis.summary import Judged, comparison_summary
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Drives, Executed, execute
+from sva_bench.files.printable import counted
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.plan import Plan
 from sva_bench.study.assumptions import cross_table
@@ -138,6 +139,6 @@ def refuse_too_many_rows(world: World, trials: int, plans: int) -> None:
     """Refuse a run whose trials would not fit into memory: all of them are at hand until its figures are worked out."""
     rows = trials * len(world.scenarios) * plans * len(world.robots)
     if rows > MOST_ROWS:
-        raise BadInput(f"{rows} outcomes ({trials} trials x {len(world.scenarios)} scenarios x {plans} plans x "
-                       f"{len(world.robots)} robots); a run keeps {MOST_ROWS} at most: take fewer trials, or a batch, "
-                       "which measures them unit by unit")
+        raise BadInput(f"{rows} outcomes ({counted(trials, 'trial')} x {counted(len(world.scenarios), 'scenario')} x "
+                       f"{counted(plans, 'plan')} x {counted(len(world.robots), 'robot')}); a run keeps "
+                       f"{MOST_ROWS} at most: take fewer trials, or a batch, which measures them unit by unit")

@@ -44,7 +44,8 @@ def summarise(
             worst=runs.get((scenario.name, WORST)), ws=known["ws"], evpi=known["evpi"],
             value_of_process=known["value_of_process"],
             informed=None if plans.informed is None else Judged(
-                expected=plans.informed.expected, executed=runs[scenario.name, INFORMED]),
+                expected=plans.informed.expected,
+                executed=plans.informed.promised(runs[scenario.name, INFORMED])),
         ), robots, noisy=not world.noise.silent))
     summary = head(world, options, settings, costs) | {"reproducible": proved(planned), "scenarios": scenarios}
     return summary if options.precision is None else summary | {"precision": options.precision.as_dict(summary)}

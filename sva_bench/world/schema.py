@@ -9,12 +9,14 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator
 
 from sva_bench.choices import FailureProcess
 from sva_bench.files.fields import Bounded, Name, Number, Positive, Probability, Section, WholeNumber
+from sva_bench.seeds import MOST_SEED
 from sva_bench.world.places import APART_M
 
 KIND = "sva-bench/world@1"
 Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
 Size = Annotated[Positive, Field(ge=1e-6, le=1e5)]  # physics knows nothing smaller
 Angle = Annotated[Number, Field(ge=-1e6, le=1e6)]
+Seed = Annotated[WholeNumber, Field(le=MOST_SEED)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 
 
@@ -113,7 +115,7 @@ class RandomPois(Section):
     """POIs drawn from what is free and connected to the base."""
 
     random: Annotated[WholeNumber, Field(ge=1, le=1000)]
-    seed: WholeNumber
+    seed: Seed
     min_spacing_m: Annotated[Positive, Field(ge=0.01, le=1000)] = APART_M
     stop_s: Bounded = 0.0
 
@@ -157,7 +159,7 @@ class Drawn(Section):
 
     uniform: Annotated[list[Bounded], Field(min_length=2, max_length=2)]
     zero_share: Probability = 0.0
-    seed: WholeNumber
+    seed: Seed
 
     @field_validator("uniform")
     @classmethod

@@ -96,4 +96,6 @@ def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:
     for name in names:
         if name not in known:
             raise BadInput(f"--scenario {name}: the world has no such scenario; {nearest(name, known)}")
-    return list(dict.fromkeys(names))
+        if names.count(name) > 1:
+            raise BadInput(f"--scenario {name}: given twice; give it once")
+    return list(names)

@@ -159,7 +159,7 @@ def spoil(folder: Path, what: str) -> None:
     ("cut off", r"outcomes\.parquet: no table of ours, or cut off"),
     ("nan", r"legs\.parquet: driven_s: holds what is no number"),
     ("foreign", r"outcomes\.parquet: incentive: these aren't the trials of summary\.json: half, stochastic"),
-    ("missing", r"legs\.parquet: no table of ours"),
+    ("missing", r"the run folder is incomplete: legs\.parquet is missing; run its command again"),
     ("older", r"summary\.json:\d+: scenarios\[0\]\.vss\.executed: the key 'executed' is missing; add it"),
     ("vss", r"vss\.executed\.mean: expected what the stochastic plan collects beyond the other"),
     ("interval", r"executed: ci95: the mean, .* lies outside"),

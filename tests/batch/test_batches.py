@@ -107,7 +107,7 @@ def test_a_batch_that_did_nothing_yet_is_in_nobodys_way(tmp_path: Path) -> None:
 
     begin(out, settings(10), resume=False)
     write_maps(out, {"maps-0/map.pgm": b"P5"})
-    with pytest.raises(BadFile, match=r"settings\.options\.trials"):
+    with pytest.raises(BadFile, match=r"options\.trials \(10 there, 20 now\)"):
         begin(out, settings(20), resume=True)
     begin(out, settings(20), resume=False)
     assert settings_in(out)[0].data == settings(20)
@@ -242,3 +242,23 @@ def test_a_batch_folder_holds_the_maps_that_it_takes_to_go_on(tmp_path: Path, ca
     again = sva_bench("batch", "retry", "out", "--cache", str(cache), "--workers", "1", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     assert lost.read_bytes() == content
+
+
+def test_settings_that_differ_are_named_each_with_both_values(tmp_path: Path) -> None:
+    grid = Grid(points=[Point(world=world_of(tmp_path), planner="prmstar")], seeds=[0], options=Options(trials=10),
+                unit_trials=10)
+    (tmp_path / "out").mkdir()
+    begin(tmp_path / "out", grid.settings(), resume=False)
+    now = json.loads(json.dumps(grid.settings()))
+    now["options"]["trials"], now["options"]["gap"], now["seeds"] = 20, 0.5, [0, 1]
+    with pytest.raises(BadFile) as refused:
+        begin(tmp_path / "out", now, resume=True)
+    assert ("settings: not those of the batch in this folder: seeds ([0] there, [0, 1] now), options.trials (10 there, "
+            "20 now), options.gap (1e-06 there, 0.5 now); use the same settings") in str(refused.value)
+    del now["options"]["gap"]
+    with pytest.raises(BadFile, match=r"options\.gap \(1e-06 there, absent now\)"):
+        begin(tmp_path / "out", now, resume=True)
+    now["points"] = {str(number): {} for number in range(1000)}
+    with pytest.raises(BadFile, match="and more; use") as refused:
+        begin(tmp_path / "out", now, resume=True)
+    assert len(str(refused.value)) < 3000

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sva_bench.errors import BadFile
+from sva_bench.files.printable import counted
 from sva_bench.geometry.cells import Cells
 from sva_bench.world.maps.files import WIDEST_M, MapFile, content_of, locate, normal
 from sva_bench.world.maps.images import MAX_CELLS
@@ -52,10 +53,11 @@ def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tupl
         raise BadFile(path, 4, "", "expected 'map', and then the rows")
     body = lines[4:]
     if len(body) != rows:
-        raise BadFile(path, len(lines), "", f"expected {rows} rows below 'map', as 'height' says, found {len(body)}")
+        raise BadFile(path, len(lines), "", f"expected {counted(rows, 'row')} below 'map', as 'height' says, "
+                      f"found {len(body)}")
     for number, line in enumerate(body, start=5):
         if len(line) != columns:
-            raise BadFile(path, number, "", f"expected {columns} cells, as 'width' says, found {len(line)}")
+            raise BadFile(path, number, "", f"expected {counted(columns, 'cell')}, as 'width' says, found {len(line)}")
     letters = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
     free = np.isin(letters, np.frombuffer(_FREE_TERRAIN, dtype=np.uint8))
     strange = ~(free | np.isin(letters, np.frombuffer(_SOLID_TERRAIN, dtype=np.uint8)))

@@ -7,6 +7,8 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from sva_bench.files.printable import counted
+
 _SPACE = b" \t\r\n\v\f"
 _AT_A_TIME = 1 << 20  # bytes
 _NUMBER = re.compile(rb"(?:\s|#[^\n\r]*[\n\r])+(\d{1,9})(?!\d)")
@@ -55,7 +57,7 @@ def plain_levels(content: bytes) -> NDArray[np.float64]:
             count, begin = count + len(part), end
         found = found[:count]
     if len(found) < wanted:
-        raise ValueError(f"it ends after {len(found)} of {wanted} numbers")
+        raise ValueError(f"it ends after {len(found)} of {counted(wanted, 'number')}")
     shape = (rows, columns) if colours == 1 else (rows, columns, 3)
     return found[:wanted].reshape(shape) / most
 

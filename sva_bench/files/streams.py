@@ -9,6 +9,7 @@ import sys
 from typing import Any
 
 STANDARD_OUTPUT, STANDARD_ERROR = 1, 2
+CLOSED = "standard output is closed, and the result would be lost"
 
 
 class Stream(io.FileIO):
@@ -16,11 +17,13 @@ class Stream(io.FileIO):
 
     Attributes:
         lost: Why something was lost that somebody wants; ``None`` if nothing was. A reader who has gone wants nothing.
+        leads_nowhere: Whether it was closed before this process began.
     """
 
-    def __init__(self, descriptor: int) -> None:
+    def __init__(self, descriptor: int, *, leads_nowhere: bool = False) -> None:
         super().__init__(descriptor, "wb", closefd=False)
         self.lost: str | None = None
+        self.leads_nowhere = leads_nowhere
 
     def write(self, content: Any) -> int:
         """Write some or all of it, and say how many bytes."""
@@ -43,15 +46,24 @@ def take_over() -> Stream:
     Descriptors that were closed lead nowhere from now on: else the next file to be opened would be one of them, and
     what is printed would be written into it.
     """
+    closed = set()
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
         except OSError:
+            closed.add(descriptor)
             _to_nowhere(descriptor)
-    output, errors = Stream(STANDARD_OUTPUT), Stream(STANDARD_ERROR)
+    output = Stream(STANDARD_OUTPUT, leads_nowhere=STANDARD_OUTPUT in closed)
+    errors = Stream(STANDARD_ERROR, leads_nowhere=STANDARD_ERROR in closed)
     sys.stdout = _text(output, sys.stdout, line_by_line=output.isatty())
     sys.stderr = _text(errors, sys.stderr, line_by_line=True)
     return output
+
+
+def output_is_closed() -> bool:
+    """Whether standard output was closed when this process began: a result that goes nowhere else would be lost."""
+    stream = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return sys.stdout is None or (isinstance(stream, Stream) and stream.leads_nowhere)
 
 
 def _text(stream: Stream, before: Any, *, line_by_line: bool) -> io.TextIOWrapper:

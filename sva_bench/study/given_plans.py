@@ -1,0 +1,69 @@
+"""Plans from elsewhere, read and checked as far as goes without travel times: what is wrong is said at once."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sva_bench.errors import ExitCode, SvaBenchError
+from sva_bench.mission.certify import certify
+from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.mission.plan import Plan
+from sva_bench.mission.plan_file import read_plan
+from sva_bench.world.model import World
+
+_log = logging.getLogger(__name__)
+
+
+class InfeasiblePlan(SvaBenchError):
+    """A plan that its certificate refuses."""
+
+    exit_code = ExitCode.INFEASIBLE_PLAN
+
+    def __init__(self, path: Path, reasons: Sequence[str]) -> None:
+        super().__init__(path, reasons)
+        self.path, self.reasons = path, reasons
+
+    def __str__(self) -> str:
+        return f"{self.path}: the plan is infeasible:\n  " + "\n  ".join(self.reasons)
+
+
+def read_plans(world: World, paths: Mapping[str, Path]) -> dict[str, Plan]:
+    """Read plan files for a world, by the names that they go by.
+
+    Raises:
+        BadFile: If a file is no plan, or names robots or sites that the world doesn't have.
+        InfeasiblePlan: If a plan could not be driven whatever the travel times.
+    """
+    instance = _without_times(world)
+    names = {instance_name(world), *(instance_name(world, scenario.name) for scenario in world.scenarios)}
+    plans = {}
+    for name, path in paths.items():
+        plan = read_plan(path, instance)
+        if plan.instance is not None and plan.instance not in names:
+            _log.warning("%s was made for %s, not for %s", path, plan.instance, world.name)
+        certificate = certify(instance, replace(plan, value=None))
+        if not certificate.feasible:
+            raise InfeasiblePlan(path, certificate.reasons)
+        plans[name] = plan
+    return plans
+
+
+def instance_name(world: World, scenario: str | None = None) -> str:
+    """Name of the instance of a world's scenario, or of the availabilities under ``robots:``."""
+    return world.name if scenario is None else f"{world.name}-{scenario}"
+
+
+def _without_times(world: World) -> Instance:
+    """The world's instance in which every leg is free: what breaks its rules breaks those of any travel times."""
+    sites = tuple(site.name for site in world.sites)
+    free, nothing = np.zeros((len(sites), len(sites))), np.zeros(len(sites))
+    return Instance(
+        name=world.name, sites=sites, base=0, stations=tuple(sites.index(site.name) for site in world.stations),
+        stop_s=nothing, vehicles=tuple(Vehicle(
+            name=robot.name, fuel_capacity_s=np.inf, mission_limit_s=np.inf, availability=1.0, fuel_s=free,
+            incentives=nothing) for robot in world.robots))
