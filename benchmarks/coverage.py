@@ -32,8 +32,9 @@ from sva_bench.execution.outcome import Assignment, settle
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.plan import Route
+from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
-from sva_bench.study.planning import plan_costs, plan_scenarios
+from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -91,3 +93,12 @@ def test_the_file_that_a_heavy_library_belongs_in_does_import_it(library: str) -
 def test_no_module_wants_splitting(module: str) -> None:
     lines = len((PACKAGE / module).read_text(encoding="utf-8").splitlines())
     assert lines <= MOST_LINES, f"sva_bench/{module} has {lines} lines: it wants to be two"
+
+
+def test_a_check_loads_neither_physics_nor_solvers_nor_statistics() -> None:
+    # They take longer to load than a check of most worlds takes.
+    heavy = {"pybullet", "highspy", "networkx", "scipy.stats", "scipy.optimize"}
+    code = ("import sys, sva_bench.cli.app, sva_bench.study.costs, sva_bench.cli.loading, sva_bench.analysis.reach\n"
+            f"print(sorted({heavy!r} & set(sys.modules)))")
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "[]"

@@ -13,8 +13,9 @@ from sva_bench.generate import mission as proposal
 from sva_bench.generate.mission import propose_mission
 from sva_bench.solver import two_stage
 from sva_bench.study import informed, planning
+from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
-from sva_bench.study.planning import plan_costs, plan_scenarios
+from sva_bench.study.planning import plan_scenarios
 from tests.worlds_for_tests import world_of
 
 

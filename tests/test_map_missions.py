@@ -9,8 +9,9 @@ import pytest
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.mission.certify import expected_value
+from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
-from sva_bench.study.planning import plan_costs, plan_scenarios
+from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.load import load_world
 from tests.test_cli import sva_bench
 from tests.world.maps_for_tests import SHARED, shared_map, write_ros_map

@@ -9,9 +9,10 @@ import pytest
 
 from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached
 from sva_bench.cli.terminal import print_summary
+from sva_bench.study.costs import plan_costs
 from sva_bench.study.given_plans import read_plans
 from sva_bench.study.options import Options
-from sva_bench.study.planning import check_plans, plan_costs
+from sva_bench.study.planning import check_plans
 from sva_bench.study.publish import Run
 from sva_bench.study.run import execute_plans, run
 from tests.test_cli import sva_bench, world_file

@@ -8,7 +8,7 @@ import pytest
 
 from sva_bench.mission.certify import certify
 from sva_bench.mission.plan_file import read_plan
-from sva_bench.study.planning import instance_of, nominal_scenario, plan_costs
+from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs
 from sva_bench.world.load import load_world
 
 ROOT = Path(__file__).parents[1]

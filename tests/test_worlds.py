@@ -22,8 +22,9 @@ from sva_bench.mission.certify import expected_value
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.two_stage import knowledge_of, plan_nominal
+from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.options import Options
-from sva_bench.study.planning import instance_of, plan_costs, plan_scenarios
+from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.load import world_of
 from sva_bench.world.model import Site, World
 from tests.test_cli import sva_bench

@@ -12,7 +12,7 @@ from sva_bench.batch.folder import units_in
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob
 from sva_bench.batch.strands import strand
-from sva_bench.study.options import Progress
+from sva_bench.study.costs import Progress
 from sva_bench.workers.engine import Job
 
 # Measured on a core of a shared virtual machine.

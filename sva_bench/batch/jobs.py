@@ -26,8 +26,9 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.robot.model import RobotModel
+from sva_bench.study.costs import instance_of
 from sva_bench.study.options import Options
-from sva_bench.study.planning import Planned, instance_of, plan_scenarios
+from sva_bench.study.planning import Planned, plan_scenarios
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.times import TravelTimes, plan_travel_times
 from sva_bench.world.model import World

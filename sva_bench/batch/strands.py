@@ -9,8 +9,9 @@ from sva_bench.analysis.summary import promise_of
 from sva_bench.batch.grid import Grid, Point, options_at
 from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob, TrialsJob
 from sva_bench.execution.execute import Case, drives_ahead
+from sva_bench.study.costs import reach_of
 from sva_bench.study.options import Options, settings_of
-from sva_bench.study.planning import Planned, reach_of
+from sva_bench.study.planning import Planned
 from sva_bench.study.summing import head, known_ahead, proved
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.workers.engine import Job

@@ -25,7 +25,8 @@ from sva_bench.files.patterns import has_pattern, matching
 from sva_bench.seeds import MOST_SEED
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.storage.results_schema import Seed
-from sva_bench.study.options import Options, Progress
+from sva_bench.study.costs import Progress
+from sva_bench.study.options import Options
 from sva_bench.world.model import World
 from sva_bench.world.variants import adapted, option_of, world_with
 

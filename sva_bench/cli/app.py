@@ -162,8 +162,9 @@ def execute(
     load_libraries()
     with holding_back_ctrl_c():
         from sva_bench.storage.run_folder import tidy
+        from sva_bench.study.costs import plan_costs
         from sva_bench.study.options import Options
-        from sva_bench.study.planning import check_plans, plan_costs
+        from sva_bench.study.planning import check_plans
         from sva_bench.study.run import execute_plans
 
     tidy(out)

@@ -58,7 +58,7 @@ def instance_of_world(
     """The instance of a world's scenario; of the availabilities under ``robots:`` by default."""
     world = load(path, [scenario] if scenario else None, margin)
     with holding_back_ctrl_c():  # after the world: its errors are said at once
-        from sva_bench.study.planning import instance_of, nominal_scenario, plan_costs
+        from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs
 
     with about(path):
         costs = plan_costs(world, planner, progress)

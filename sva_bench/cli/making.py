@@ -36,7 +36,7 @@ def check_world(
     loaded = load(world)
     with holding_back_ctrl_c():
         from sva_bench.analysis.reach import NOTHING, beyond_reach
-        from sva_bench.study.planning import plan_costs, reach_of
+        from sva_bench.study.costs import plan_costs, reach_of
 
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)

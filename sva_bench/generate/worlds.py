@@ -189,7 +189,7 @@ def with_mission(
     """
     with holding_back_ctrl_c():  # after terrain and sites: what does not fit is said at once
         from sva_bench.generate.mission import propose_mission
-        from sva_bench.study.planning import plan_costs
+        from sva_bench.study.costs import plan_costs
 
     head = {"format": KIND, "name": name, **data}
     robot = {"model": USUAL_MODEL, "incentives": {}}

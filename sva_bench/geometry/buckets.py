@@ -101,6 +101,8 @@ def solids_passed(checker: FloatArray, ax: float, ay: float, bx: float, by: floa
     at_cylinders, at_starts, at_items = int(checker[10]), int(checker[11]), int(checker[12])
     if ax > bx:
         ax, ay, bx, by = bx, by, ax, ay
+    along_x, along_y, mx, my = bx - ax, by - ay, 0.5 * (ax + bx), 0.5 * (ay + by)
+    long = math.sqrt(along_x * along_x + along_y * along_y)
     # A steep one is held against all rows between its ends: few columns, and no rounding blown up by the slope.
     slope = (by - ay) / (bx - ax) if bx - ax > 1e-3 * abs(by - ay) else 0.0
     first = min(max(math.floor((ax - x0) / side - 1e-6), 0), columns - 1)
@@ -122,8 +124,16 @@ def solids_passed(checker: FloatArray, ax: float, ay: float, bx: float, by: floa
                 k = int(checker[at])
                 passed += 1
                 if k < boxes:
-                    b = checker[_HEAD + 6 * k:_HEAD + 6 * k + 6]
-                    if segment_box(ax, ay, bx, by, b[0], b[1], b[2], b[3], b[4], b[5], needed) < needed:
+                    b = _HEAD + 6 * k
+                    cx, cy, hx, hy = checker[b], checker[b + 1], checker[b + 2], checker[b + 3]
+                    # Most boxes lie far from the segment's line, or from the circle about it: said at once, without
+                    # roots, with more to spare than rounding takes.
+                    far = (hx + hy + needed) * (1 + 1e-9) + 1e-9
+                    if abs(along_x * (cy - ay) - along_y * (cx - ax)) > far * long:
+                        continue
+                    if (cx - mx) ** 2 + (cy - my) ** 2 > (0.5 * long + far) ** 2:
+                        continue
+                    if segment_box(ax, ay, bx, by, cx, cy, hx, hy, checker[b + 4], checker[b + 5], needed) < needed:
                         return -passed
                 else:
                     c = checker[at_cylinders + 3 * (k - boxes):at_cylinders + 3 * (k - boxes) + 3]

@@ -13,7 +13,7 @@ from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import unless_interrupted
 from sva_bench.report.wording import per_cent
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_deterministic, plan_nominal, plan_stochastic
-from sva_bench.study.options import Progress
+from sva_bench.study.costs import Progress
 
 CASES = (1.0, 0.75, 0.25, 0.0)
 """Availability of the last robot in the paper's cases 1 to 4, and in its scenarios S1 to S4."""

@@ -15,8 +15,9 @@ from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Drives, Settings, execute
 from sva_bench.files.printable import counted
 from sva_bench.report.wording import verdict, with_interval
-from sva_bench.study.options import Options, Progress
-from sva_bench.study.planning import NOMINAL, plan_costs, plan_scenarios
+from sva_bench.study.costs import NOMINAL, Progress, plan_costs
+from sva_bench.study.options import Options
+from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.model import World
 
 

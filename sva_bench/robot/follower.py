@@ -80,6 +80,18 @@ def new_state() -> FloatArray:
     return np.zeros(4)
 
 
+def sight_m(limits: FloatArray, dt: float) -> float:
+    """Farther ahead along its path than this, nothing makes a difference to a control step [m].
+
+    Args:
+        limits: ``RobotModel.limits``.
+        dt: Time between control steps [s].
+    """
+    # The nearest point may be so far ahead; from there it looks to its lookahead point, and how far it has to brake.
+    braking = limits[0] ** 2 / (2.0 * _BRAKING * limits[2]) + limits[0] * dt
+    return float(_SEARCH_M + max(LOOKAHEAD_M, braking) + _REACHED_M)
+
+
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def arc_lengths(path: FloatArray) -> FloatArray:
     """Arc length at each vertex of a polyline, shape (n,)."""
@@ -92,7 +104,9 @@ def arc_lengths(path: FloatArray) -> FloatArray:
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def wrap(angle: float) -> float:
     """The same angle in [-pi, pi)."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+    turned = angle + math.pi
+    # Nearly always it is within already, where the remainder would be the number itself, and slow to find.
+    return (turned if 0.0 <= turned < 2.0 * math.pi else turned % (2.0 * math.pi)) - math.pi
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -109,18 +123,20 @@ def _edge_at(arc: FloatArray, s: float) -> int:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _point_at(path: FloatArray, arc: FloatArray, s: float) -> tuple[float, float]:
-    k = _edge_at(arc, s)
+def _point_at(path: FloatArray, arc: FloatArray, s: float, k: int) -> tuple[float, float]:
+    """The point at arc length ``s``, on edge ``k`` or not far beyond."""
+    while k < len(arc) - 2 and arc[k + 1] <= s:
+        k += 1
     length = arc[k + 1] - arc[k]
     share = 0.0 if length <= 0.0 else min(max((s - arc[k]) / length, 0.0), 1.0)
     return (path[k, 0] + share * (path[k + 1, 0] - path[k, 0]), path[k, 1] + share * (path[k + 1, 1] - path[k, 1]))
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float) -> float:
-    """Arc length of the path point nearest to (x, y), looked for between ``s`` and a little ahead."""
-    best, best_s = np.inf, s
+def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float) -> tuple[float, int]:
+    """Arc length of the path point nearest to (x, y), looked for between ``s`` and a little ahead; and its edge."""
     k = _edge_at(arc, s)
+    best_x, best_y, best, best_s, best_k = 0.0, 0.0, np.inf, s, k  # ``best`` is squared
     while k < len(path) - 1 and arc[k] <= s + _SEARCH_M:
         dx, dy = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
         length = arc[k + 1] - arc[k]
@@ -128,11 +144,16 @@ def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float
             share = ((x - path[k, 0]) * dx + (y - path[k, 1]) * dy) / (length * length)
             here = min(max(arc[k] + share * length, max(arc[k], s)), min(arc[k + 1], s + _SEARCH_M))
             share = (here - arc[k]) / length
-            distance = math.hypot(path[k, 0] + share * dx - x, path[k, 1] + share * dy - y)
-            if distance < best - 1e-12:
-                best, best_s = distance, here
+            aside_x, aside_y = path[k, 0] + share * dx - x, path[k, 1] + share * dy - y
+            squared = aside_x * aside_x + aside_y * aside_y
+            # Nearer by 1e-12 m or more; only where squares leave that in doubt are roots drawn, which are slow.
+            nearer = best == np.inf or best - squared > 2e-12 * (1.0 + best)
+            if not nearer and squared <= best * (1 + 1e-9):
+                nearer = math.hypot(aside_x, aside_y) < math.hypot(best_x, best_y) - 1e-12
+            if nearer:
+                best_x, best_y, best, best_s, best_k = aside_x, aside_y, squared, here, k
         k += 1
-    return best_s
+    return best_s, best_k
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -173,8 +194,8 @@ def control(
     if phase == TURN_TO_PATH and end < _REACHED_M:
         phase = TURN_TO_HEADING
     if phase in (TURN_TO_PATH, DRIVE):
-        s = _nearest_arc(path, arc, s, x, y)
-        ahead_x, ahead_y = _point_at(path, arc, min(s + LOOKAHEAD_M, end))
+        s, edge = _nearest_arc(path, arc, s, x, y)
+        ahead_x, ahead_y = _point_at(path, arc, min(s + LOOKAHEAD_M, end), edge)
         aside = wrap(math.atan2(ahead_y - y, ahead_x - x) - yaw)
         left = end - s
         if left < _REACHED_M:

@@ -10,8 +10,8 @@ import numpy as np
 
 from sva_bench.mission.plan import Plan
 from sva_bench.report.drawing import Kind, Leg, Overlays, draw_world
-from sva_bench.study.options import Progress
-from sva_bench.study.planning import check_plans, plan_costs
+from sva_bench.study.costs import Progress, plan_costs
+from sva_bench.study.planning import check_plans
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import roadmap_edges
 from sva_bench.world.model import World

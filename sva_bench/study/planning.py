@@ -6,17 +6,13 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.reach import reached
-from sva_bench.choices import PathPlanner
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify, expected_value
-from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, unless_interrupted
-from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.two_stage import (
     Knowledge,
     knowledge_of,
@@ -26,18 +22,15 @@ from sva_bench.solver.two_stage import (
     wait_and_see,
 )
 from sva_bench.study.assumptions import PlansByProcess
-from sva_bench.study.given_plans import InfeasiblePlan, instance_name
+from sva_bench.study.costs import Progress, instance_of, nominal_scenario
+from sva_bench.study.given_plans import InfeasiblePlan
 from sva_bench.study.informed import InformedPlans, plan_informed
-from sva_bench.study.options import Options, Progress
+from sva_bench.study.options import Options
 from sva_bench.study.summing import model_is_executed
-from sva_bench.travel.fuel import FuelCosts, fuel_costs
-from sva_bench.travel.times import plan_travel_times
-from sva_bench.world.model import Scenario, World
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import World
 
 _log = logging.getLogger(__name__)
-
-NOMINAL = "nominal"
-"""The scenario of the availabilities under ``robots:``."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,53 +110,6 @@ def plan_scenarios(
             by_process=by_process)
         progress("solving", number + 1, len(world.scenarios))
     return planned
-
-
-def plan_costs(world: World, planner: PathPlanner, progress: Progress) -> dict[str, FuelCosts]:
-    """Fuel costs of each robot model in the world, by its name."""
-    models = {robot.model.name: robot.model for robot in world.robots}
-    costs = {}
-    for number, (name, model) in enumerate(models.items()):
-        progress("planning paths", number, len(models))
-        costs[name] = fuel_costs(plan_travel_times(world, model, planner), world.margin)
-        progress("planning paths", number + 1, len(models))
-    return costs
-
-
-def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario) -> Instance:
-    """The instance of one scenario: all that a solver needs, and no world."""
-    sites = tuple(site.name for site in world.sites)
-    return Instance(
-        name=instance_name(world, None if scenario.name == NOMINAL else scenario.name), sites=sites, base=0,
-        stations=tuple(sites.index(site.name) for site in world.stations),
-        stop_s=np.array([site.stop_s for site in world.sites]), failure=world.plan_failure, joint=scenario.joint,
-        vehicles=tuple(Vehicle(
-            name=robot.name, fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s,
-            availability=scenario.availability[robot.name], fuel_s=costs[robot.model.name].cost_s,
-            incentives=np.array([robot.incentives.get(site, 0.0) for site in sites])) for robot in world.robots),
-    )
-
-
-def nominal_scenario(world: World) -> Scenario:
-    """The availabilities as they stand under ``robots:``."""
-    return Scenario(name=NOMINAL, availability={robot.name: robot.availability for robot in world.robots})
-
-
-def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list[str]]:
-    """POIs that a robot cannot visit and come home from, even alone and refuelling at will; by robot."""
-    instance = instance_of(world, costs, nominal_scenario(world))
-    lost = {}
-    for vehicle, road in zip(instance.vehicles, knowledge_of(instance).roads, strict=True):
-        pois = [instance.sites[poi] for poi in instance.pois if quickest(road, (poi,)) is None]
-        if pois:
-            lost[vehicle.name] = pois
-    return lost
-
-
-def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
-    """What robots cannot reach within fuel and limit, as every summary says it."""
-    return reached(out_of_reach(world, costs), [robot.name for robot in world.robots],
-                   [poi.name for poi in world.pois])
 
 
 def check_plans(

@@ -30,7 +30,8 @@ from sva_bench.storage.run_folder import (
     write_travel_times,
 )
 from sva_bench.storage.stored_run import Content, read_content, run_folder_at
-from sva_bench.study.options import Options, Progress, settings_of
+from sva_bench.study.costs import Progress
+from sva_bench.study.options import Options, settings_of
 from sva_bench.study.summing import by_case
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.load import world_as_dict

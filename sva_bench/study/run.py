@@ -15,9 +15,10 @@ from sva_bench.files.printable import counted
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.plan import Plan
 from sva_bench.study.assumptions import cross_table
+from sva_bench.study.costs import Progress, instance_of, plan_costs, reach_of
 from sva_bench.study.informed import cases_of, is_part, put_together
-from sva_bench.study.options import Options, Progress, settings_of
-from sva_bench.study.planning import Planned, instance_of, plan_costs, plan_scenarios, reach_of, unlimited
+from sva_bench.study.options import Options, settings_of
+from sva_bench.study.planning import Planned, plan_scenarios, unlimited
 from sva_bench.study.publish import Run, Stopwatch, publish
 from sva_bench.study.summing import WORST, by_case, head, model_is_executed, summarise
 from sva_bench.travel.fuel import FuelCosts

@@ -67,10 +67,7 @@ def lattice_ways(
         if end is None or came[end] < 0:
             ways.append(None)
             continue
-        chain = [end]
-        while chain[-1] != start:
-            chain.append(int(came[chain[-1]]))
-        index = np.column_stack(np.divmod(np.array(chain[::-1]), parts.shape[1]))
+        index = np.column_stack(np.divmod(_chain(came, end)[::-1], parts.shape[1]))
         way = np.concatenate([points[:1], field.places(index), points[goal:goal + 1]])
         ways.append(_pulled(checker, np.ascontiguousarray(way)))
     return ways
@@ -163,6 +160,20 @@ def _go_on(
                 tail += 1
             link += 1
     state[0], state[1] = head, tail
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _chain(came: NDArray[np.int32], end: int) -> IntArray:
+    """Places on the way back from one to where the search began, which came from itself."""
+    count, place = 1, end
+    while came[place] != place:
+        place = came[place]
+        count += 1
+    chain = np.empty(count, dtype=np.int64)
+    chain[0] = end
+    for k in range(1, count):
+        chain[k] = came[chain[k - 1]]
+    return chain
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

@@ -246,13 +246,13 @@ def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | N
     paths: list[list[FloatArray | None]] = [[None] * n for _ in range(n)]
     known = nothing_known()
     for i in range(n):
+        length = np.full(len(roadmap.vertices), np.inf)
+        length[at[i]] = 0.0
+        via = np.full(len(length), -1, dtype=np.int64)
         for j in range(i + 1, n):
             if not math.isfinite(lengths[i, at[j]]):
                 continue
-            chain = [at[j]]
-            while chain[-1] != at[i]:
-                chain.append(int(before[i, chain[-1]]))
-            path = taut(roadmap.checker, roadmap.vertices, np.array(chain[::-1]), _WINDOW, known)
+            path = taut(roadmap.checker, roadmap.vertices, before[i], at[i], at[j], _WINDOW, known, length, via)
             path[0], path[-1] = points[i], points[j]
             paths[i][j], paths[j][i] = path, path[::-1].copy()
     return paths
@@ -273,8 +273,12 @@ def _with_edges(
         ends: Where the edges end [m], shape (n, 2); places that the roadmap lacks are added.
         pairs: Which two of them each edge joins, shape (e, 2).
     """
-    number = {vertex: k for k, vertex in enumerate(map(tuple, vertices.tolist()))}
-    known = np.array([number.get(tuple(end), -1) for end in ends.tolist()], dtype=np.int64)
+    # By x, then y, as complex numbers are compared; of vertices in one place the last.
+    places = np.ascontiguousarray(vertices).view(np.complex128)[:, 0]
+    order = np.argsort(places, kind="stable")
+    wanted = np.ascontiguousarray(ends).view(np.complex128)[:, 0]
+    at = order[np.searchsorted(places[order], wanted, side="right") - 1]
+    known = np.where(places[at] == wanted, at, -1)
     new = np.flatnonzero(known < 0)
     known[new] = len(vertices) + np.arange(len(new))
     vertices = np.concatenate([vertices, ends[new]])
@@ -283,7 +287,8 @@ def _with_edges(
     rows, columns = np.concatenate([old.row, heads]), np.concatenate([old.col, tails])
     # Each edge once: a sparse matrix adds up what stands twice.
     low, high = np.minimum(rows, columns).astype(np.int64), np.maximum(rows, columns).astype(np.int64)
-    low, high = np.divmod(np.unique(low * len(vertices) + high), len(vertices))
+    numbers = np.sort(low * len(vertices) + high)
+    low, high = np.divmod(numbers[np.diff(numbers, prepend=-1) > 0], len(vertices))
     length = np.maximum(np.hypot(*(vertices[low] - vertices[high]).T), 1e-12)  # a stored 0 would be no edge
     return vertices, csr_array((length, (low, high)), shape=(len(vertices), len(vertices)))
 

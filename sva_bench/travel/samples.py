@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 from numba import njit
-from scipy.stats import qmc
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.geometry.buckets import keeps_clearance
@@ -80,14 +79,34 @@ def roadmap_samples(obstacles: Obstacles, clearance_m: float, count: int, arcs: 
         along = _along_edges(obstacles, clearance_m + _GRAZE_M, count // 2 - len(boundary))
         boundary = np.concatenate([boundary, _free(obstacles, along, clearance_m)])
     low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
-    halton = qmc.Halton(2, scramble=False)
     spread = np.empty((0, 2))
     wanted = count - len(boundary)
-    for _ in range(8):  # an eighth of the area free is the least that fills the count
-        spread = np.concatenate([spread, _free(obstacles, low + halton.random(count) * (high - low), clearance_m)])
+    for part in range(8):  # an eighth of the area free is the least that fills the count
+        drawn = low + halton(part * count, count) * (high - low)
+        spread = np.concatenate([spread, _free(obstacles, drawn, clearance_m)])
         if len(spread) >= wanted:
             break
     return np.concatenate([boundary, spread[:wanted]])
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def halton(first: int, count: int) -> FloatArray:
+    """Points of the plane's Halton sequence, from number ``first`` on; shape (count, 2).
+
+    SciPy has it too, to the same bits, in a package that takes half a second to import.
+
+    Source:
+        Halton (1960), with bases 2 and 3.
+    """
+    points = np.zeros((count, 2))
+    for axis, base in enumerate((2, 3)):
+        for k in range(count):
+            share, left = 1.0 / base, first + k
+            while left > 0:
+                points[k, axis] += left % base * share
+                share /= base
+                left //= base
+    return points
 
 
 def _corners_of_boxes(obstacles: Obstacles) -> FloatArray:
@@ -148,21 +167,25 @@ def _apart(points: FloatArray, gap: float) -> IntArray:
     """Indices of points of which no two are nearer than ``gap``: each that is far enough from those before it."""
     low_x, low_y = points[:, 0].min(), points[:, 1].min()
     wide, high = points[:, 0].max() - low_x, points[:, 1].max() - low_y
-    side = max(gap, max(wide, high) / 1000)  # so many squares along each side at most
+    side, squared = max(gap, max(wide, high) / 1000), gap * gap  # so many squares along each side at most
     columns, rows = math.floor(wide / side) + 1, math.floor(high / side) + 1
-    newest = np.full(columns * rows, -1, dtype=np.int64)  # of each square
-    before = np.full(len(points), -1, dtype=np.int64)  # the one that was kept there before it
+    newest = np.full(columns * rows, -1, dtype=np.int32)  # of each square
+    before = np.full(len(points), -1, dtype=np.int32)  # the one that was kept there before it
     kept = np.empty(len(points), dtype=np.int64)
     count = 0
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         column, row = math.floor((x - low_x) / side), math.floor((y - low_y) / side)
         far = True
-        for r in range(max(row - 1, 0), min(row + 2, rows)):
-            for c in range(max(column - 1, 0), min(column + 2, columns)):
+        # Its own square first, where one that is near most likely lies.
+        for r in (row, row - 1, row + 1):
+            for c in (column, column - 1, column + 1):
+                if not far or r < 0 or r >= rows or c < 0 or c >= columns:
+                    continue
                 other = newest[r * columns + c]
                 while other >= 0 and far:
-                    far = math.hypot(points[other, 0] - x, points[other, 1] - y) >= gap
+                    dx, dy = points[other, 0] - x, points[other, 1] - y
+                    far = dx * dx + dy * dy >= squared
                     other = before[other]
         if far:
             before[k] = newest[row * columns + column]

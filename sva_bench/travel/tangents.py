@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.geometry.buckets import keeps_clear, solids_passed
@@ -25,7 +26,7 @@ _AT_A_TIME = 5_000_000  # of them, before Ctrl-C is listened to
 _EDGE = 100  # what a tangent that is found costs, in this unit: as an edge of the roadmap, later
 _SEEN = 8  # points that are looked at, or squares, for the price of one solid
 _FEW = 2000  # points whose tangents are looked for at once, whatever their length
-_LINES = 1 << 18  # that are remembered
+_LINES = 1 << 20  # that are remembered
 _RING = 1.4  # else those up to some length, then those up to so much more, and so on
 
 
@@ -263,39 +264,60 @@ def _with(found: IntArray, count: int, i: int, j: int) -> tuple[IntArray, int]:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def taut(checker: FloatArray, vertices: FloatArray, chain: IntArray, window: int, known: IntArray) -> FloatArray:
+def taut(
+    checker: FloatArray, vertices: FloatArray, before: NDArray[np.int32], start: int, goal: int, window: int,
+    known: IntArray, length: FloatArray, via: IntArray,
+) -> FloatArray:
     """The shortest path by way of some of a path's vertices, in their order.
+
+    Paths from one start share their beginnings, on a tree: what was worked out for one path serves the others.
 
     Args:
         checker: As ``clearance_checker`` makes it.
         vertices: Those of the roadmap [m], shape (v, 2).
-        chain: Which of them the path runs through, shape (n,); it keeps the clearance.
+        before: The vertex before each on its path from the start; those paths keep the clearance; shape (v,).
+        start, goal: The vertices that the path joins.
         window: How many vertices at most are cut off at a time.
         known: What was found out about lines between vertices for other paths, as ``nothing_known`` makes it.
+        length: Length of the shortest way to each vertex from this start [m], as far as worked out for other paths,
+            else ``inf``; 0 at the start. Brought up to date, shape (v,).
+        via: The vertex before it on that way, shape (v,).
     """
-    n = len(chain)
-    length = np.full(n, np.inf)
-    before = np.zeros(n, dtype=np.int64)
-    length[0] = 0.0
-    for j in range(1, n):
-        for i in range(max(j - window, 0), j):
-            ax, ay, bx, by = vertices[chain[i], 0], vertices[chain[i], 1], vertices[chain[j], 0], vertices[chain[j], 1]
-            way = length[i] + math.hypot(bx - ax, by - ay)
-            if way < length[j]:
-                free = i == j - 1
-                if not free:
-                    line = 2 * (chain[i] * len(vertices) + chain[j])
-                    slot = (line * 0x9E3779B1 >> 12) % len(known)
-                    if known[slot] != line and known[slot] != line + 1:
-                        known[slot] = line + keeps_clear(checker, ax, ay, bx, by)
-                    free = known[slot] == line + 1
-                if free:
-                    length[j], before[j] = way, i
-    kept = [n - 1]
-    while kept[-1] > 0:
-        kept.append(before[kept[-1]])
-    shorter: FloatArray = vertices[chain[np.array(kept[::-1])]]
+    new, vertex = [goal], before[goal]
+    while length[new[-1]] == np.inf:
+        new.append(vertex)
+        vertex = before[vertex]
+    back = np.empty(window, dtype=np.int64)
+    for k in range(len(new) - 2, -1, -1):
+        here, count = new[k], 0
+        vertex = before[here]
+        while count < window and vertex >= 0:
+            back[count] = vertex
+            vertex = before[vertex]
+            count += 1
+        for step in range(count - 1, -1, -1):
+            there = back[step]
+            ax, ay, bx, by = vertices[there, 0], vertices[there, 1], vertices[here, 0], vertices[here, 1]
+            way = length[there] + math.hypot(bx - ax, by - ay)
+            if way < length[here]:
+                number = there * len(vertices) + here
+                if step == 0 or _is_free(checker, known, number, ax, ay, bx, by):
+                    length[here], via[here] = way, there
+    kept = [goal]
+    while kept[-1] != start:
+        kept.append(via[kept[-1]])
+    shorter: FloatArray = vertices[np.array(kept[::-1])]
     return shorter
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _is_free(checker: FloatArray, known: IntArray, number: int, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether a line keeps the clearance, remembered by its number."""
+    line = 2 * number
+    slot = (line * 0x9E3779B1 >> 12) % len(known)
+    if known[slot] != line and known[slot] != line + 1:
+        known[slot] = line + keeps_clear(checker, ax, ay, bx, by)
+    return bool(known[slot] == line + 1)
 
 
 def nothing_known() -> IntArray:

@@ -16,7 +16,7 @@ from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.passages import widest_passage
 from sva_bench.robot.follower import Stretch, stretches
 from sva_bench.robot.model import RobotModel
-from sva_bench.robot.twin import drive
+from sva_bench.robot.twin import leg_times
 from sva_bench.travel.roadmap import plan_paths
 from sva_bench.world.model import World
 from sva_bench.world.places import CLEARANCE_MARGINS_M as CLEARANCE_MARGINS_M
@@ -152,13 +152,11 @@ def _times_ms(world: World, model: RobotModel, paths: list[list[FloatArray | Non
     n = len(world.sites)
     times = np.zeros((n, n), dtype=np.int64)
     for i, origin in enumerate(world.sites):
-        for j, destination in enumerate(world.sites):
-            path = paths[i][j]
-            if path is None:
-                continue
-            pose = np.array([origin.x_m, origin.y_m, origin.heading_rad])
-            time_s, _ = drive(model, stretches(path, destination.heading_rad), pose)
+        pose = np.array([origin.x_m, origin.y_m, origin.heading_rad])
+        courses = {j: stretches(path, world.sites[j].heading_rad)
+                   for j, path in enumerate(paths[i]) if path is not None}
+        for j, time_s in zip(courses, leg_times(model, list(courses.values()), pose).tolist(), strict=True):
             if not math.isfinite(time_s):
-                raise NeverArrives(model.name, origin.name, destination.name)
+                raise NeverArrives(model.name, origin.name, world.sites[j].name)
             times[i, j] = max(round(time_s * 1000), 1)  # the model needs a positive cost between different sites
     return times

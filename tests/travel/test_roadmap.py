@@ -12,11 +12,13 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.stats import qmc
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import PathPlanner
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.travel.roadmap import plan_paths, roadmap_edges
+from sva_bench.travel.samples import halton
 from tests.oracles.distances import path_clearance
 from tests.oracles.visibility import shortest_lengths
 from tests.oracles.worlds import free_places, random_obstacles
@@ -174,3 +176,9 @@ def test_a_closed_wall_leaves_no_path(planner: PathPlanner) -> None:
     assert paths[0][1] is None
     assert paths[1][2] is None
     assert paths[0][2] is not None
+
+
+def test_the_halton_sequence_is_that_of_scipy_bit_by_bit_wherever_it_begins() -> None:
+    usual = qmc.Halton(2, scramble=False)
+    for first in (0, 3000, 6000):
+        np.testing.assert_array_equal(halton(first, 3000), usual.random(3000))

@@ -1,0 +1,74 @@
+"""What driving costs in a world, the instances made of that, and what no robot reaches: all before a plan is made.
+
+Apart from the planning, since a check of a world needs neither solvers nor physics, and these take a second to load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from sva_bench.analysis.reach import reached
+from sva_bench.choices import PathPlanner
+from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.solver.routes.refuelling import quickest, road_of
+from sva_bench.study.given_plans import instance_name
+from sva_bench.travel.fuel import FuelCosts, fuel_costs
+from sva_bench.travel.times import plan_travel_times
+from sva_bench.world.model import Scenario, World
+
+NOMINAL = "nominal"
+"""The scenario of the availabilities under ``robots:``."""
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+def plan_costs(world: World, planner: PathPlanner, progress: Progress) -> dict[str, FuelCosts]:
+    """Fuel costs of each robot model in the world, by its name."""
+    models = {robot.model.name: robot.model for robot in world.robots}
+    costs = {}
+    for number, (name, model) in enumerate(models.items()):
+        progress("planning paths", number, len(models))
+        costs[name] = fuel_costs(plan_travel_times(world, model, planner), world.margin)
+        progress("planning paths", number + 1, len(models))
+    return costs
+
+
+def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario) -> Instance:
+    """The instance of one scenario: all that a solver needs, and no world."""
+    sites = tuple(site.name for site in world.sites)
+    return Instance(
+        name=instance_name(world, None if scenario.name == NOMINAL else scenario.name), sites=sites, base=0,
+        stations=tuple(sites.index(site.name) for site in world.stations),
+        stop_s=np.array([site.stop_s for site in world.sites]), failure=world.plan_failure, joint=scenario.joint,
+        vehicles=tuple(Vehicle(
+            name=robot.name, fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s,
+            availability=scenario.availability[robot.name], fuel_s=costs[robot.model.name].cost_s,
+            incentives=np.array([robot.incentives.get(site, 0.0) for site in sites])) for robot in world.robots),
+    )
+
+
+def nominal_scenario(world: World) -> Scenario:
+    """The availabilities as they stand under ``robots:``."""
+    return Scenario(name=NOMINAL, availability={robot.name: robot.availability for robot in world.robots})
+
+
+def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list[str]]:
+    """POIs that a robot cannot visit and come home from, even alone and refuelling at will; by robot."""
+    instance = instance_of(world, costs, nominal_scenario(world))
+    lost = {}
+    for vehicle in instance.vehicles:
+        road = road_of(instance, vehicle)
+        pois = [instance.sites[poi] for poi in instance.pois if quickest(road, (poi,)) is None]
+        if pois:
+            lost[vehicle.name] = pois
+    return lost
+
+
+def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
+    """What robots cannot reach within fuel and limit, as every summary says it."""
+    return reached(out_of_reach(world, costs), [robot.name for robot in world.robots],
+                   [poi.name for poi in world.pois])
