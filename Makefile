@@ -1,6 +1,15 @@
-PYTHON ?= python3.11
-BIN := .venv/bin
-STAMP := .venv/.installed
+# Python 3.11, 3.12 or 3.13: the first that is here, or one's own choice (make test PYTHON=python3.13). The default's
+# environment is .venv, that of another .venv-3.13 and so on.
+DEFAULT := $(firstword $(foreach python,python3.11 python3.12 python3.13,$(shell $(python) -c 'print("$(python)")' 2>&-)))
+PYTHON ?= $(DEFAULT)
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+ifeq ($(filter 3.11 3.12 3.13,$(VERSION)),)
+$(error Python 3.11, 3.12 or 3.13 is wanted, and $(or $(PYTHON),none of them) is $(or $(VERSION),not to be started): say which with PYTHON=python3.12)
+endif
+VENV := .venv$(if $(filter python$(VERSION),$(DEFAULT)),,-$(VERSION))
+BIN := $(VENV)/bin
+LOCK := requirements-$(VERSION).lock
+STAMP := $(VENV)/lib/python$(VERSION)/.installed
 
 .PHONY: run test test-long lint setup lock bench clean bench-solver bench-paper
 
@@ -19,23 +28,25 @@ lint: setup
 
 setup: $(STAMP)
 
-$(STAMP): requirements.lock pyproject.toml
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
+$(STAMP): $(LOCK) pyproject.toml
+	$(PYTHON) -m venv $(if $(wildcard $(VENV)/lib/python$(VERSION)),,--clear) $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $(LOCK)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	# Compile the solver once, before many processes want it at a time; smaller instances never get to its pricing.
-	$(BIN)/sva-bench instance random --family B --pois 12 -o .venv/warm.json
-	$(BIN)/sva-bench plan .venv/warm.json -o .venv/warm-plan.json
+	$(BIN)/sva-bench instance random --family B --pois 12 -o $(VENV)/warm.json
+	$(BIN)/sva-bench plan $(VENV)/warm.json -o $(VENV)/warm-plan.json
 	touch $@
 
-lock: setup  ## pin the dependencies anew
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-tools
-	$(BIN)/pip-compile --quiet --extra dev --all-build-deps --allow-unsafe --generate-hashes --strip-extras \
-	  --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-annotate --no-header \
-	  --output-file requirements.lock pyproject.toml
+lock:  ## pin the dependencies anew, for one Python: make lock PYTHON=python3.13
+	$(PYTHON) -m venv --clear $(VENV)-lock
+	$(VENV)-lock/bin/python -m pip install --quiet --disable-pip-version-check pip-tools
+	$(VENV)-lock/bin/pip-compile --quiet --upgrade --extra dev --all-build-deps --allow-unsafe --generate-hashes \
+	  --strip-extras --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-annotate --no-header \
+	  --output-file $(LOCK) pyproject.toml
+	rm -r $(VENV)-lock
 
 clean:
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 bench-solver: setup  ## the speed that the solver promises, by class: takes an hour
 	$(BIN)/python -m benchmarks.solver.classes

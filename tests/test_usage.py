@@ -34,6 +34,7 @@ SWEEP = "format: sva-bench/sweep@1\nworlds: [small.yaml]\n"
     (("view",), "view [OPTIONS] RUN-or-RRD"),
     (("world",), "world [OPTIONS] COMMAND [ARGS]..."), (("world", "draw"), "world draw [OPTIONS] WORLD"),
     (("world", "from-map"), "world from-map [OPTIONS] MAP.yaml|MAP.map"),
+    (("world", "example"), "world example [OPTIONS] [NAME]"),
 ])
 def test_a_usage_line_is_what_is_typed(
     command: tuple[str, ...], usage: str, capsys: pytest.CaptureFixture[str]

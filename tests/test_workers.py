@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,27 @@ def test_no_process_of_ours_outlives_a_program_that_had_workers() -> None:
         assert program.communicate() == ("1\n", "")
 
 
+ORPHAN = """
+import ctypes, os, time
+from sva_bench.workers.pool import die_with
+ctypes.CDLL = lambda *_, **__: object()  # a C library without prctl, as that of macOS
+die_with(int(os.environ["PARENT"]))
+print("there", flush=True)
+time.sleep(60)
+"""
+
+
+def test_workers_die_with_their_parent_where_the_kernel_sees_to_nothing() -> None:
+    with subprocess.Popen(["sh", "-c", 'PARENT=$$ "$0" -c "$1" & wait', sys.executable, ORPHAN],
+                          stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        assert parent.stdout.readline() == "there\n"
+        parent.kill()
+        begun = time.monotonic()
+        parent.stdout.read()  # until nobody is left who could write
+        assert time.monotonic() - begun < 30
+
+
 def _stat(path: Path) -> list[str]:
     """What the kernel says of a process, from its state on; its session comes fourth."""
     try:
@@ -90,3 +112,8 @@ def test_more_workers_than_a_machine_can_use_are_refused_by_number() -> None:
     assert count_of(16) == 16
     with pytest.raises(BadInput, match=rf"--workers 99999999: at most {max(4 * cores, 16)} .* {cores} cores"):
         count_of(99_999_999)
+
+
+def test_where_the_system_tells_no_cores_of_a_process_all_of_them_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert count_of(None) == os.cpu_count()

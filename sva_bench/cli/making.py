@@ -1,4 +1,4 @@
-"""Commands that check and make worlds and instances."""
+"""Commands that check, make and copy worlds, and make instances."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 from sva_bench.choices import InstanceFamily, Unknown, WorldFamily
 from sva_bench.cli.options import MOST_SEED, Force, PlannerOption, Verbose, WorldArgument, finite
-from sva_bench.cli.terminal import print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
 from sva_bench.cli.usage import PlainCommand
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_beside, write_result
@@ -18,7 +18,7 @@ from sva_bench.files.printable import counted
 from sva_bench.files.seal import refuse_edited, refuse_others, sealed
 from sva_bench.interrupts import holding_back_ctrl_c
 
-world_app = typer.Typer(no_args_is_help=True, help="Check, make and draw worlds.", rich_markup_mode="rich")
+world_app = typer.Typer(no_args_is_help=True, help="Check, make, copy and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
 
 
@@ -140,6 +140,38 @@ def make_world_from_map(
         for file in files:  # before the world that names them
             write_beside(output, file.name, file.content)
         write_result(output, sealed(text))
+
+
+@world_app.command("example", cls=PlainCommand)
+def copy_example(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Which of them.", show_default=False)] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="WORLD.yaml", help="World file to write; "
+                                                "default: standard output.", show_default=False)] = None,
+    listed: Annotated[bool, typer.Option("--list", help="List them, each with its plans.")] = False,
+    force: Force = False,
+) -> None:
+    """Copy one of the shipped worlds, to run or to change."""
+    with holding_back_ctrl_c():
+        from sva_bench.generate.examples import example_names, example_plans, example_title, example_world
+
+    if listed:
+        if name is not None or output is not None:
+            raise BadInput("--list takes neither a name nor -o")
+        width = max(map(len, example_names()))
+        for each in example_names():
+            typer.echo(f"{each:{width}}  {example_title(each)}")
+            for plan in example_plans(each):
+                typer.echo(f"{'':{width}}  {plan}")
+        return
+    if name is None:
+        raise BadInput(f"say which world: {', '.join(example_names())}; --list says more of them")
+    text = example_world(name).read_text(encoding="utf-8")
+    check_output(output)
+    if output is not None:
+        refuse_edited(output, force=force)
+    write_result(output, sealed(text))
+    for plan in example_plans(name):
+        messages.print(f"a plan for it: {plan}", highlight=False, markup=False, soft_wrap=True)
 
 
 @world_app.command("draw", cls=PlainCommand)

@@ -39,7 +39,7 @@ def rewards(output: Page = None, verbose: Verbose = False) -> None:
 @paper_app.command(cls=PlainCommand)
 def simulation(
     worlds: Annotated[list[Path] | None, typer.Argument(metavar="[WORLD...]", help="The maps.",
-                                                        show_default="the four shipped ones, in worlds/")] = None,
+                                                        show_default="four of the shipped ones")] = None,
     trials: Trials = 1000,
     rollouts: Rollouts = 8,
     fidelity: FidelityOption = "rollout",
@@ -54,9 +54,10 @@ def simulation(
     with holding_back_ctrl_c():
         from sva_bench.cli.loading import load
         from sva_bench.execution.execute import Settings
+        from sva_bench.generate.examples import example_world
         from sva_bench.paper import simulation as paper
 
-    loaded = [load(path) for path in worlds or [Path("worlds") / f"{name}.yaml" for name in _SHIPPED]]
+    loaded = [load(path) for path in worlds or [example_world(name) for name in _SHIPPED]]
     settings = Settings(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity)
     with progress_bars() as progress, local_workers(workers, "sva_bench.execution.execute") as executor:
         page = paper.simulation_page(paper.simulation(loaded, settings, executor, progress), settings)

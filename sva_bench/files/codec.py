@@ -15,6 +15,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 _LENGTH_BYTES = 8
 _DTYPES = {np.float64: "<f8", np.int64: "<i8", np.bool_: "|b1"}
@@ -95,6 +96,8 @@ def _codec(form: Any) -> _Codec:
         return _of_dataclass(form)
     if origin is np.ndarray:
         return _of_arrays(get_args(inner[1])[0])
+    if origin is NDArray:  # with a name of its own from NumPy 2.5 on, where Python (3.12) has such aliases
+        return _of_arrays(inner[0])
     if origin in (Union, types.UnionType) and len(inner) == 2 and type(None) in inner:
         return _optional(_codec(inner[0] if inner[1] is type(None) else inner[1]))
     if origin is Literal:

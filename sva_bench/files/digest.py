@@ -7,13 +7,13 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import fields, is_dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sva_bench import __version__
+from sva_bench.files.versions import library_versions
 
 
 def digest(*parts: Any) -> str:
@@ -59,9 +59,4 @@ def code_digest() -> str:
     package = Path(__file__).parents[1]
     files = {str(path.relative_to(package)): hashlib.sha256(path.read_bytes()).hexdigest()
              for path in package.rglob("*.py")}
-    libraries = {name: version(name) for name in PACKAGES}
-    return hashlib.sha256(json.dumps([__version__, files, libraries], sort_keys=True).encode()).hexdigest()
-
-
-
-PACKAGES = ("numpy", "scipy", "numba", "pybullet", "ompl", "highspy", "networkx", "rerun-sdk", "pyarrow")
+    return hashlib.sha256(json.dumps([__version__, files, library_versions()], sort_keys=True).encode()).hexdigest()

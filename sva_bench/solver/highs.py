@@ -178,11 +178,24 @@ def _branch_and_bound(
     )
 
 
+class _Silent(highspy.Highs):  # type: ignore[misc]
+    """HiGHS without a banner, which belongs on no one's standard output.
+
+    It comes with the first call of all that is no option; from 1.16 on that is this one, in the constructor.
+    """
+
+    def enableCallbacks(self) -> None:
+        """Turn output off, and callbacks on."""
+        _option(self, "output_flag", False)
+        super().enableCallbacks()
+
+
 def _open(model: LinearModel) -> Any:
     """A solver that holds the model's linear relaxation."""
-    solver = highspy.Highs()
-    _option(solver, "output_flag", False)  # first: a banner belongs on no one's standard output
+    solver = _Silent()
+    # From 1.16 on HiGHS searches a tree on several threads unless told not to: order and ties would be the machine's.
     _option(solver, "threads", 1)
+    _option(solver, "parallel", "off")
     _option(solver, "random_seed", 0)
     _option(solver, "primal_feasibility_tolerance", INTEGRALITY)
     columns, rows = len(model.objective), model.rows
@@ -244,7 +257,7 @@ def _status(solver: Any) -> SolveStatus:
     raise RuntimeError(f"HiGHS: unexpected model status {solver.modelStatusToString(status)}")
 
 
-def _option(solver: Any, name: str, value: bool | int | float) -> None:
+def _option(solver: Any, name: str, value: bool | int | float | str) -> None:
     _check(solver.setOptionValue(name, value), f"option {name}")
 
 

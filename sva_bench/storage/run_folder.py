@@ -5,12 +5,10 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 import platform
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +17,12 @@ import pyarrow as pa
 from sva_bench import __version__
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.files.atomic import draft_folder, remove_left_behind
-from sva_bench.files.digest import PACKAGES
 from sva_bench.files.pretty import pretty_json
+from sva_bench.files.versions import library_versions
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
 from sva_bench.travel.fuel import FuelCosts
+from sva_bench.workers.pool import usable_cores
 from sva_bench.world.model import MapSource
 
 _RUN_NAME = re.compile(r".+-seed\d+-[0-9a-f]{8}")
@@ -80,8 +79,8 @@ def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], st
         "command": ["sva-bench", *sys.argv[1:]], "started": started,
         "seconds": {phase: round(taken, 3) for phase, taken in seconds.items()},
         "machine": {"platform": platform.platform(), "python": platform.python_version(),
-                    "cpus": len(os.sched_getaffinity(0))},
-        "packages": {name: version(name) for name in PACKAGES}, "world": dict(world),
+                    "cpus": usable_cores()},
+        "packages": library_versions(), "world": dict(world),
     }
 
 

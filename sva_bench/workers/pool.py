@@ -7,6 +7,8 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -38,13 +40,21 @@ class WorkerLost(SvaBenchError):
                 "workers (--workers 1), trials or rollouts; a batch tries such units again")
 
 
+def usable_cores() -> int:
+    """How many cores this process may run on; where the system doesn't tell (macOS), all that there are."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
 def count_of(wanted: int | None) -> int:
     """How many worker processes: as many as wanted, else one a core.
 
     Raises:
         BadInput: If that is more than this machine can have any use for.
     """
-    cores = len(os.sched_getaffinity(0))
+    cores = usable_cores()
     most = max(MOST_PER_CORE * cores, FEWEST_MOST)
     if wanted is not None and wanted > most:
         raise BadInput(f"--workers {wanted}: at most {most} on this machine, which has {cores} cores")
@@ -127,14 +137,27 @@ def _without_main_module() -> Iterator[None]:
 
 
 def die_with(parent: int) -> None:
-    """Have the kernel kill this process as soon as its parent has gone, however it went and whatever this one is at.
+    """Have this process killed as soon as its parent has gone, however it went and whatever this one is at.
+
+    By the kernel where it does that (Linux); elsewhere by a thread that looks each second, when compiled code lets it.
 
     Args:
         parent: The parent's process id, for it may have gone already.
     """
-    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    prctl = getattr(ctypes.CDLL(None, use_errno=True), "prctl", None)
+    if prctl is None:
+        threading.Thread(target=_die_after, args=(parent,), daemon=True).start()
+        return
+    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+def _die_after(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_LOOK_S)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 _PR_SET_PDEATHSIG = 1
+_LOOK_S = 1.0
