@@ -94,6 +94,7 @@ def plan(
         else:
             instance = read_instance(source)
         with holding_back_ctrl_c():  # after reading: what is wrong is said at once
+            from sva_bench.mission.failures import MODEL
             from sva_bench.solver.risk import RiskMeasure
             from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
 
@@ -107,7 +108,7 @@ def plan(
             elif objective == "stochastic":
                 made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
             else:
-                stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
+                stochastic = plan_stochastic(replace(instance, failure=MODEL), limits, method=method,
                                              cuts=cuts_used)
                 made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
             write_result(output, pretty_json(plan_as_dict(made)))

@@ -21,6 +21,7 @@ from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.mission.failures import MODEL
 from sva_bench.robot.model import BUILT_IN, USUAL_MODEL
 from sva_bench.seeds import key_of
 from sva_bench.world.load import world_of
@@ -201,7 +202,7 @@ def with_mission(
                                key=(*bare.obstacles.key(), *places))
     progress("choosing a mission", 1, 1)
     text = pretty_yaml(
-        {**head, **proposal.sections(), "failure": "mission", "margin": bare.margin,
+        {**head, **proposal.sections(), "failure": MODEL, "margin": bare.margin,
          "noise": {"wheel_gain_sd": WHEEL_GAIN_SD}},
         {**remarks, **proposal.remarks(), **dict.fromkeys(_SPACED, "\n")})
     world_of(parse_yaml(text, path), ground=ground)  # what is written can be read

@@ -16,7 +16,7 @@ from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_json, validate
 from sva_bench.files.fields import Bounded, Name, Probability, Section
 from sva_bench.files.pretty import pretty_json
-from sva_bench.mission.failures import JointState, marginals
+from sva_bench.mission.failures import JointState, marginals, without_joint
 from sva_bench.mission.instance import Instance, Vehicle
 
 KIND = "sva-bench/instance@1"
@@ -75,6 +75,9 @@ def read_instance(path: Path) -> Instance:
     common = None if file.fuel_s is None else _matrix(document, ("fuel_s",), file.fuel_s, len(sites))
     _refuse_twice(document, ("vehicles",), [v.name for v in file.vehicles])
     joint = _joint(document, file)
+    if joint is not None and (other := without_joint([file.failure])):
+        raise document.error(("joint_availability",), f"under {other} vehicles fail independently; leave it out, or "
+                             "choose another failure process")
     vehicles = tuple(_vehicle(document, k, v, file, common, joint) for k, v in enumerate(file.vehicles))
     return Instance(
         name=file.name, sites=sites, base=sites.index(file.base), stations=tuple(sites.index(r) for r in file.stations),

@@ -14,6 +14,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.choices import Cuts, PlanObjective, Status
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
+from sva_bench.mission.failures import MODEL, PlanningTerms, Reliability, process_of
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver.flow.recourse import refuse_free_legs, refuse_seldom_available
@@ -87,10 +88,13 @@ def plan_stochastic(
     Raises:
         BadInput: If the incumbent is infeasible, or the method doesn't serve the instance.
     """
-    if instance.failure == "per_leg" and method != "auto":
-        raise BadInput(f"instance {instance.name}: {method} plans under mission, the instance fails per leg; take the "
-                       "method auto, or set its failure to mission")
-    return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known, method, cuts)
+    process = process_of(instance.failure)
+    if not process.collapses and method != "auto":
+        raise BadInput(f"instance {instance.name}: {method} plans under {MODEL}, the instance fails {process.how}; "
+                       f"take the method auto, or set its failure to {MODEL}")
+    terms = process.terms([Reliability(availability=v.availability, mission_limit_s=v.mission_limit_s)
+                           for v in instance.vehicles])
+    return _plan(instance, "stochastic", terms, limits, incumbent, known, method, cuts)
 
 
 def plan_averse(
@@ -101,9 +105,10 @@ def plan_averse(
     Raises:
         BadInput: If the instance fails per leg, or too many outcomes are possible.
     """
-    if instance.failure == "per_leg":
-        raise BadInput(f"instance {instance.name}: measures of risk are over the outcomes of mission, the instance "
-                       "fails per leg; set its failure to mission")
+    process = process_of(instance.failure)
+    if not process.collapses:
+        raise BadInput(f"instance {instance.name}: measures of risk are over the outcomes of {MODEL}, the instance "
+                       f"fails {process.how}; set its failure to {MODEL}")
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
     known.check(instance)
@@ -136,8 +141,8 @@ def plan_nominal(
 
     It depends on no availability, so all scenarios can share it.
     """
-    return _plan(replace(instance, failure="mission"), "deterministic", np.ones(len(instance.vehicles)), limits,
-                 incumbent, known, method, cuts)
+    terms = PlanningTerms(share=np.ones(len(instance.vehicles)))
+    return _plan(replace(instance, failure=MODEL), "deterministic", terms, limits, incumbent, known, method, cuts)
 
 
 def plan_deterministic(
@@ -158,7 +163,7 @@ def plan_deterministic(
     Source:
         ``docs/model.md``, section "Ties".
     """
-    instance = replace(instance, failure="mission")
+    instance = replace(instance, failure=MODEL)
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
     known.check(instance)
@@ -231,7 +236,7 @@ def wait_and_see(
 
 
 def _plan(
-    instance: Instance, objective: PlanObjective, availability: FloatArray, limits: SolveLimits | None,
+    instance: Instance, objective: PlanObjective, terms: PlanningTerms, limits: SolveLimits | None,
     incumbent: Plan | None, known: Knowledge | None, method: Method, cuts: Cuts,
 ) -> Plan:
     limits = limits or SolveLimits()
@@ -245,13 +250,14 @@ def _plan(
             raise BadInput(f"instance {instance.name}: the plan to start from is infeasible: {reasons[0]}")
         known.orders[_orders(instance, incumbent, known)] = None
     own, unit = in_own_units(instance)
-    if instance.failure == "per_leg":
-        solution = solve(own, Goal(weights=_incentives(own), survival=availability), known, clock, limits.gap)
-        value = rewards(_incentives(instance), availability, solution.orders)
+    if terms.survival is not None:
+        goal = Goal(weights=_incentives(own) * terms.share[:, None], survival=terms.survival)
+        solution = solve(own, goal, known, clock, limits.gap)
+        value = rewards(_incentives(instance) * terms.share[:, None], terms.survival, solution.orders)
     else:
-        solution = _greatest(own, availability, known, clock, limits.gap, method, cuts)
-        value = _sum(_incentives(instance) * availability[:, None], solution.orders)
-        unit *= float(availability.max(initial=0.0))
+        solution = _greatest(own, terms.share, known, clock, limits.gap, method, cuts)
+        value = _sum(_incentives(instance) * terms.share[:, None], solution.orders)
+        unit *= float(terms.share.max(initial=0.0))
     return _finish(instance, objective, solution.orders, known, value=value,
                    bound=value + unit * (solution.bound - solution.value), status=solution.status,
                    solutions=[solution], runtime_s=clock.used_s())

@@ -16,7 +16,7 @@ from sva_bench.geometry.buckets import open_heading, view_checker
 from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.mission.failures import JointState, marginals
+from sva_bench.mission.failures import JointState, marginals, without_joint
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
 from sva_bench.world.maps.movingai import read_movingai_map
@@ -73,8 +73,12 @@ def world_of(
     sites = _sites(document, file, obstacles, widest)
     plan, execute = (
         (file.failure, file.failure) if isinstance(file.failure, str) else (file.failure.plan, file.failure.execute))
+    scenarios = _scenarios(document, file)
+    if (other := without_joint([plan, execute])) and (correlated := [s.name for s in scenarios if s.joint is not None]):
+        raise document.error(("scenarios", correlated[0], "joint"), f"under {other} robots fail independently; give "
+                             "their availabilities, or choose another failure process")
     return World(
-        name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=_scenarios(document, file),
+        name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=scenarios,
         plan_failure=plan, execute_failure=execute, margin=file.margin,
         noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd), map_source=source,
     )
