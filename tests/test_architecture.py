@@ -18,6 +18,11 @@ ROOMS = (
     "mission", "world", "solver", "travel", "execution", "analysis", "recording", "storage", "report", "study",
     "generate", "batch", "paper", "cli", "__init__", "__main__",
 )
+# The same within the solver, whose rooms are many.
+SOLVER = (
+    "looking", "program", "highs", "outcomes", "risk", "goal", "units", "preprocess", "routes", "knowledge", "problem",
+    "flow", "columns", "methods", "solve", "two_stage",
+)
 ONLY_IN = {
     "pybullet": "execution/engines/bullet.py", "pybullet_data": "execution/engines/bullet.py",
     "pybullet_utils": "execution/engines/bullet.py", "ompl": "travel/roadmap.py", "highspy": "solver/highs.py",
@@ -61,6 +66,29 @@ def test_imports_point_one_way(module: str) -> None:
 
 def test_every_room_is_there() -> None:
     assert set(ROOMS) == {room_of(module) for module in MODULES}
+
+
+def part_of(module: str) -> str:
+    """``solver/flow/cuts.py`` is in the solver's part ``flow``."""
+    return module.split("/")[1].removesuffix(".py")
+
+
+SOLVER_MODULES = [module for module in MODULES if room_of(module) == "solver" and module != "solver/__init__.py"]
+
+
+@pytest.mark.parametrize("module", SOLVER_MODULES)
+def test_imports_within_the_solver_point_one_way(module: str) -> None:
+    part = part_of(module)
+    assert part in SOLVER, f"say in SOLVER what {part} may import"
+    allowed = SOLVER[: SOLVER.index(part) + 1]
+    for line, name in imports_of(PACKAGE / module):
+        if name.startswith("sva_bench.solver."):
+            assert name.split(".")[2] in allowed, (
+                f"sva_bench/{module}:{line} imports {name}; {part} may know {', '.join(allowed[:-1]) or 'nothing'}")
+
+
+def test_every_part_of_the_solver_is_there() -> None:
+    assert set(SOLVER) == {part_of(module) for module in SOLVER_MODULES}
 
 
 def test_solver_and_execution_never_see_each_other() -> None:

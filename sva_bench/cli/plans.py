@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from sva_bench.choices import Cuts, Method, Objective, RiskKind
+from sva_bench.choices import METHODS, Cuts, Method, Objective, RiskKind
 from sva_bench.cli.options import AsJson, Gap, MarginOption, PlannerOption, TimeLimit, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
 from sva_bench.errors import BadInput, ExitCode, Interrupted
@@ -49,8 +49,8 @@ def plan(
                                                 show_default=False)] = None,
     objective: Annotated[Objective, typer.Option(help="Plan for failures, or take every robot as "
                                                             "available.")] = "stochastic",
-    method: Annotated[Method, typer.Option(help="Solution method: auto chooses; expected is the collapsed model; dep, "
-                                                "relaxed and lshaped are the paper's.")] = "auto",
+    method: Annotated[Method, typer.Option(help="Solution method. " + "; ".join(
+        f"{name}: {text}" for name, text in METHODS.items()) + ".")] = "auto",
     cuts: Annotated[Cuts | None, typer.Option(help="Optimality cuts of lshaped.", show_default="single")] = None,
     risk: Annotated[RiskKind | None, typer.Option(help="Plan for the worst outcomes: their mean, or the shortfall "
                                                   "below a target.", show_default="none")] = None,

@@ -220,9 +220,8 @@ def drives_ahead(
     for case in cases:
         for number, robot in enumerate(world.robots):
             route = case.plan.route(robot.name)
-            if not route or not process_of(world.execute_failure).can_leave(_reliability(robot, case)):
-                continue
-            for rollout in range(min(settings.rollouts, settings.trials)):
+            can_leave = route and process_of(world.execute_failure).can_leave(_reliability(robot, case))
+            for rollout in range(min(settings.rollouts, settings.trials) if can_leave else 0):
                 key = (robot.name, route, rollout, 0)
                 if key not in tasks:
                     tasks[key] = _task(world, costs, settings, number, key, traced=False)
@@ -250,9 +249,9 @@ def _orders(world: World, robot: Robot, route: Route) -> Assignment:
 def _failures(world: World, case: Case, orders: Sequence[Assignment], settings: Settings) -> IntArray:
     pois = np.array([sum(o.is_poi(site) for site in o.route) for o in orders])
     fails = process_of(world.execute_failure).draw(FailureDraw(
-        seed=settings.seed, vehicles=tuple(robot.name for robot in world.robots),
-        reliability=tuple(_reliability(robot, case) for robot in world.robots), trials=settings.trials,
-        first=settings.first, pois=int(pois.max(initial=0)), joint=case.scenario.joint)).before_poi
+        seed=settings.seed, vehicles=tuple(robot.name for robot in world.robots), trials=settings.trials,
+        first=settings.first, pois=int(pois.max(initial=0)), joint=case.scenario.joint,
+        reliability=tuple(_reliability(robot, case) for robot in world.robots))).before_poi
     return np.where(fails > pois, NEVER, fails)  # draws for a longer route of another robot mean nothing to this one
 
 

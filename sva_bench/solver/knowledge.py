@@ -13,8 +13,7 @@ from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.choices import Status
 from sva_bench.interrupts import hear_ctrl_c
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.flow.cuts import Cut
-from sva_bench.solver.program import Goal
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.routes.fronts import Tables, tables_of
 from sva_bench.solver.routes.heuristic import Orders
 from sva_bench.solver.routes.heuristic import value_of as rewards
@@ -23,6 +22,7 @@ from sva_bench.solver.units import common_unit
 
 Routes = tuple[tuple[int, ...], ...]
 """Sites of each vehicle's route, from base to base; empty for one that stays home."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SolveLimits:
@@ -65,6 +65,21 @@ class Clock:
         """Whether no time is left; Ctrl-C is heard here at the latest."""
         hear_ctrl_c()
         return time.monotonic() >= self.deadline
+
+
+@dataclass(frozen=True, kw_only=True, order=True)
+class Cut:
+    """A connectivity cut of one vehicle: what it drives out of the sites S is no less than what it drives into i.
+
+    Attributes:
+        vehicle: Number of the vehicle.
+        inside: The sites of S, without the base, in order.
+        poi: The POI i in S.
+    """
+
+    vehicle: int
+    inside: tuple[int, ...]
+    poi: int
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -16,7 +16,8 @@ from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 
 _log = logging.getLogger(__name__)
 
-
+SLACK_S = TOLERANCE_S / 2
+"""Half the feasibility tolerance: a route that is on its limit but for rounding stays feasible."""
 _ROUNDING_S = 1e-9  # of sums of legs
 
 

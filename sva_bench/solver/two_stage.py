@@ -11,22 +11,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.choices import Cuts, PlanObjective, Status
+from sva_bench.choices import Cuts, Method, PlanObjective, Status
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import MODEL, PlanningTerms, Reliability, process_of
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver.flow.recourse import refuse_free_legs, refuse_seldom_available
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of, value_of
+from sva_bench.solver.methods import keeps_second_stage, serves_discounts
 from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
-from sva_bench.solver.program import Goal
 from sva_bench.solver.risk import Risk, RiskMeasure
 from sva_bench.solver.routes.heuristic import Orders
 from sva_bench.solver.routes.heuristic import value_of as rewards
 from sva_bench.solver.routes.refuelling import quickest
-from sva_bench.solver.solve import TWO_STAGE, Method, solve
+from sva_bench.solver.solve import solve
 from sva_bench.solver.units import in_own_units, in_unit
 
 __all__ = [
@@ -89,7 +90,7 @@ def plan_stochastic(
         BadInput: If the incumbent is infeasible, or the method doesn't serve the instance.
     """
     process = process_of(instance.failure)
-    if not process.collapses and method != "auto":
+    if not process.collapses and not serves_discounts(method):
         raise BadInput(f"instance {instance.name}: {method} plans under {MODEL}, the instance fails {process.how}; "
                        f"take the method auto, or set its failure to {MODEL}")
     terms = process.terms([Reliability(availability=v.availability, mission_limit_s=v.mission_limit_s)
@@ -177,7 +178,7 @@ def plan_deterministic(
     nominal_orders, stochastic_orders = (_orders(instance, plan, known) for plan in (nominal, stochastic))
     known.orders.update(dict.fromkeys((nominal_orders, stochastic_orders)))
     ties = _Ties(in_own_units(instance)[0], nominal_orders, known, clock, limits.gap,
-                 "auto" if method in TWO_STAGE else method)
+                 "auto" if keeps_second_stage(method) else method)
     most, least, soonest = ties.solutions(nominal.status == "interrupted")
     best = soonest or most
     orders = best.orders if best else nominal_orders
@@ -252,7 +253,7 @@ def _plan(
     own, unit = in_own_units(instance)
     if terms.survival is not None:
         goal = Goal(weights=_incentives(own) * terms.share[:, None], survival=terms.survival)
-        solution = solve(own, goal, known, clock, limits.gap)
+        solution = solve(own, goal, known, clock, limits.gap, method)
         value = rewards(_incentives(instance) * terms.share[:, None], terms.survival, solution.orders)
     else:
         solution = _greatest(own, terms.share, known, clock, limits.gap, method, cuts)
@@ -271,7 +272,7 @@ def _greatest(
     scale = float(availability.max(initial=0.0))
     shares = availability / scale if scale > 0 else availability
     goal = Goal(weights=_incentives(instance) * shares[:, None])
-    if method in TWO_STAGE:
+    if keeps_second_stage(method):
         certain = bool((availability == 1).all())
         sets = {frozenset(v.name for v in instance.vehicles): 1.0} if certain else possible(instance)
         refuse_free_legs(instance)

@@ -13,9 +13,8 @@ from benchmarks.solver.paper import QUICK, main, reproduce, write_report
 from benchmarks.solver.picture import draw_gaps
 from benchmarks.solver.printed import FIGURE_3, TABLE_2, TABLE_3, Box
 from benchmarks.solver.report import checks, cuts_table, gaps_table, markdown, methods_table, runtime_table
-from sva_bench.choices import Status
+from sva_bench.choices import Method, Status
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import plan_stochastic
 
 PAPER = Path(__file__).parents[2] / "../shared/paper.tex"

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sva_bench.choices import Cuts, InstanceFamily
+from sva_bench.choices import Cuts, InstanceFamily, Method
 from sva_bench.generate.instances import random_instance as paper_instance
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.solver import solve as solving
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
     plan_averse,

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sva_bench.choices import InstanceFamily
+from sva_bench.choices import InstanceFamily, Method
 from sva_bench.generate.instances import random_instance
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.certify import certify
@@ -34,7 +34,6 @@ from sva_bench.solver.preprocess import scope_of
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes import fronts as routes
 from sva_bench.solver.routes import heuristic
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import plan_averse, plan_deterministic, plan_stochastic
 
 SOON_S = 0.2  # from the outside: compiled code keeps this process from doing anything

@@ -19,6 +19,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import Method
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState
@@ -34,7 +35,6 @@ from sva_bench.solver.knowledge import SolveLimits
 from sva_bench.solver.preprocess import is_metric, scope_of
 from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.routes.refuelling import quickest, road_of
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
     plan_deterministic,

@@ -24,9 +24,9 @@ from sva_bench.solver.columns.master import Class, Column, Master, Prices, Side,
 from sva_bench.solver.columns.pricing import Priced
 from sva_bench.solver.columns.pricing import price as best_routes
 from sva_bench.solver.columns.subset_row import Counter, SubsetRow, separate, tolls_of
+from sva_bench.solver.goal import Goal, sizes_of
 from sva_bench.solver.highs import Relaxed
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, sizes_of
 
 _log = logging.getLogger(__name__)
 

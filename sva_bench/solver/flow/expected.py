@@ -8,10 +8,12 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.flow.cuts import Cut, cut_rows
-from sva_bench.solver.knowledge import drive
+from sva_bench.solver.flow.cuts import cut_rows
+from sva_bench.solver.flow.formulation import columns_of, formulate
+from sva_bench.solver.goal import Goal
+from sva_bench.solver.knowledge import Cut, drive
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, LinearModel, Rows, columns_of, formulate
+from sva_bench.solver.program import LinearModel, Rows
 from sva_bench.solver.routes.heuristic import Orders
 from sva_bench.solver.routes.refuelling import Road
 

@@ -23,11 +23,13 @@ from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.cuts import violated_by_integers
 from sva_bench.solver.flow.expected import DirectedModel
 from sva_bench.solver.flow.recourse import legs_out_of_pois, together
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.highs import Relaxation, maximise
-from sva_bench.solver.knowledge import Clock, Knowledge, Progress, adopt, without_idle_stops
+from sva_bench.solver.knowledge import Knowledge, adopt, without_idle_stops
 from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, LinearModel, RowBuilder, Rows
+from sva_bench.solver.problem import Problem
+from sva_bench.solver.program import LinearModel, RowBuilder, Rows
 from sva_bench.solver.routes.heuristic import Orders
 from sva_bench.solver.units import LARGEST
 
@@ -37,12 +39,11 @@ _log = logging.getLogger(__name__)
 _TOLERANCE = 1e-9  # relative; a cut that is broken by less adds nothing
 
 
-def prove_by_duals(
-    instance: Instance, scopes: Sequence[Scope], goal: Goal, recourse: Outcomes, kind: Cuts, known: Knowledge,
-    clock: Clock, gap: float, progress: Progress,
-) -> None:
-    """Prove the plan of ``progress``, or a better one, within the gap, by the L-shaped method."""
-    master = _Master(instance, scopes, goal, known, recourse, kind)
+def prove_by_duals(problem: Problem) -> None:
+    """Prove the plan of ``problem.progress``, or a better one, within the gap, by the L-shaped method."""
+    instance, goal, known, progress = problem.instance, problem.goal, problem.known, problem.progress
+    clock, gap = problem.clock, problem.gap
+    master = _Master(instance, problem.scopes, goal, known, problem.second_stage, problem.cuts)
     pois = frozenset(instance.pois)
     subtours = list(known.cuts)
     iteration = 0

@@ -16,9 +16,10 @@ from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.errors import BadInput
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.expected import DirectedModel
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, LinearModel, RowBuilder, Rows
+from sva_bench.solver.program import LinearModel, RowBuilder, Rows
 from sva_bench.solver.routes.heuristic import Orders
 from sva_bench.solver.routes.refuelling import Road
 

@@ -16,8 +16,7 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.looking import look, stop_mark
-from sva_bench.solver.preprocess import shortest_paths
-from sva_bench.solver.program import SLACK_S
+from sva_bench.solver.preprocess import SLACK_S, shortest_paths
 
 FRONT = 12
 """Most pairs of a front. Real ones have two to four; a longer one loses its slowest pairs, and a search some routes."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.solver.preprocess import shortest_paths
-from sva_bench.solver.program import SLACK_S
+from sva_bench.solver.preprocess import SLACK_S, shortest_paths
 
 
 class _Hop(NamedTuple):
