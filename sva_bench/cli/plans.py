@@ -70,6 +70,7 @@ def plan(
     """Make one plan, proved optimal unless a limit stops it."""
     with holding_back_ctrl_c():
         from sva_bench.cli.loading import instance_of_world
+        from sva_bench.files.documents import YAML_SUFFIXES
         from sva_bench.files.pretty import pretty_json
         from sva_bench.mission.instance_file import read_instance
         from sva_bench.mission.plan_file import plan_as_dict
@@ -87,7 +88,7 @@ def plan(
     if cuts is not None and method != "lshaped":
         raise BadInput("--cuts are those of --method lshaped")
     with progress_bars() as progress:
-        if source.suffix.lower() in (".yaml", ".yml"):
+        if source.suffix.lower() in YAML_SUFFIXES:
             instance = instance_of_world(source, scenario, "prmstar", None, progress)
         elif scenario is not None:
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")

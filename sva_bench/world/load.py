@@ -19,8 +19,6 @@ from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, marginals, without_joint
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.maps.movingai import read_movingai_map
-from sva_bench.world.maps.ros import read_ros_map
 from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World
 from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
 from sva_bench.world.schema import (
@@ -87,18 +85,13 @@ def world_of(
 def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSource | None]:
     if section.shapes is not None:
         return obstacles_of(section.shapes), None
-    kind = "movingai" if section.ros is None else "ros"
-    entry: dict[str, str | float]
+    found = section.source()
+    assert found is not None, "the schema lets nothing else in"
+    kind, source = found
     try:
-        if section.ros is not None:
-            entry = {"file": section.ros.file, "unknown": section.ros.unknown}
-            cells, files = read_ros_map(root, section.ros.file, section.ros.unknown)
-        else:
-            assert section.movingai is not None, "the schema lets nothing else in"
-            entry = {"file": section.movingai.file, "cell_m": section.movingai.cell_m}
-            cells, files = read_movingai_map(root, section.movingai.file, section.movingai.cell_m)
+        cells, files = source.read(root)
     except BadFile as error:
-        if error.path == entry["file"]:  # said of a name, not of a file: the world's to mend
+        if error.path == source.file:  # said of a name, not of a file: the world's to mend
             raise document.error(("map", kind, "file"), f"{error.path}: {error.problem}") from None
         raise
     try:
@@ -107,7 +100,7 @@ def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSo
         raise document.error(("map", kind, "file"), f"its occupied cells take more than the {MAX_BOXES} boxes that "
                              "physics holds; clean the map of speckles, or cut it") from None
     obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes, cylinders=np.empty((0, 3)), cells=cells)
-    return obstacles, MapSource(section={kind: entry}, files=files)
+    return obstacles, MapSource(section={kind: source.model_dump()}, files=files)
 
 
 def obstacles_of(shapes: Shapes) -> Obstacles:

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from sva_bench.errors import BadFile
+from sva_bench.files.fields import Positive
 from sva_bench.geometry.cells import Cells
 from sva_bench.world.maps.files import WIDEST_M, MapFile, content_of, locate, normal
 from sva_bench.world.maps.images import MAX_CELLS
+from sva_bench.world.maps.section import MapSection
 
 _FREE_TERRAIN, _SOLID_TERRAIN = b".GS", b"@OTW"
+
+
+class MovingAiMap(MapSection):
+    """An octile map of the MovingAI benchmarks."""
+
+    cell_m: Annotated[Positive, Field(ge=1e-3, le=100)] = 1.0
+
+    def read(self, root: Path, *, anywhere: bool = False) -> tuple[Cells, tuple[MapFile, ...]]:  # noqa: ARG002
+        return read_movingai_map(root, self.file, self.cell_m)
 
 
 def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tuple[MapFile, ...]]:
