@@ -7,6 +7,7 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
@@ -50,7 +51,7 @@ MOST_SUBSETS = 16
 """Subsets of uncertain vehicles up to which the value of perfect information is worked out unasked."""
 _FLOOR = 1e-8  # relative; keeps a known optimum feasible when its value becomes a constraint
 _ROUNDING = 1e-12  # relative; of sums of incentives, and of availabilities that are the same
-_STATUSES: tuple[Status, ...] = ("optimal", "feasible", "time_limit", "interrupted")  # best first
+_STATUSES: tuple[Status, ...] = get_args(Status)  # best first
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -8,7 +8,7 @@ Edges are checked exactly, without a resolution. The other planners search pair 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,6 +45,31 @@ _EFFORTS = (1, 4, 16)  # by which a planner's samples and steps for one pair gro
 _START_SLACK_M = 1e-9  # a start on the very boundary is free
 _WINDOW = 40  # vertices of a path that are cut off at a time: more than its arcs have between two tangents
 
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairPlanner:
+    """A planner that searches pair by pair.
+
+    Attributes:
+        search: Its class in OMPL.
+        calls: How often its termination condition is asked before it gives up a pair, at least effort.
+        samples: States that it samples beforehand, at least effort; 0 = as it goes.
+    """
+
+    search: Callable[[Any], Any]
+    calls: int
+    samples: int = 0
+
+
+PAIR_PLANNERS: Mapping[PathPlanner, PairPlanner] = {
+    "rrtconnect": PairPlanner(search=og.RRTConnect, calls=20_000),
+    "fmt": PairPlanner(search=og.FMT, calls=20_000, samples=1000),
+    "bfmt": PairPlanner(search=og.BFMT, calls=20_000, samples=1000),
+    "informedrrtstar": PairPlanner(search=og.InformedRRTstar, calls=1500),
+}
+"""The planners but for ``prmstar``, whose one roadmap serves all pairs."""
+
 ou.setLogLevel(ou.LogLevel.LOG_NONE)  # it warns that seeding is late; it is not, and the result is the same bit for bit
 
 
@@ -64,7 +89,7 @@ def plan_paths(
         ``paths[i][j]``: vertices [m], shape (k, 2); ``None`` if there is no way, or i = j.
     """
     ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
-    if planner != "prmstar":
+    if planner in PAIR_PLANNERS:
         return _pair_by_pair(obstacles, points, clearance_m, planner)
     if len(points) < 2:
         return [[None] for _ in points]
@@ -337,17 +362,14 @@ def _query(
 ) -> FloatArray | None:
     problem = ob.ProblemDefinition(si)
     problem.setStartAndGoalStates(_state(si, start), _state(si, goal))
-    if planner == "informedrrtstar":
-        search, calls = og.InformedRRTstar(si), 1500 * effort
-    elif planner == "rrtconnect":
-        search, calls = og.RRTConnect(si), 20_000 * effort
-    else:
-        search, calls = og.FMT(si) if planner == "fmt" else og.BFMT(si), 20_000 * effort
-        search.setNumSamples(1000 * effort)
+    kind = PAIR_PLANNERS[planner]
+    search = kind.search(si)
+    if kind.samples:
+        search.setNumSamples(kind.samples * effort)
     search.setProblemDefinition(problem)
     search.setup()
     with deferring_ctrl_c():
-        search.solve(_after(calls))
+        search.solve(_after(kind.calls * effort))
     if not problem.hasExactSolution():  # solve() is true for an approximate one too, which ends short
         return None
     path = problem.getSolutionPath()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -59,3 +61,9 @@ def test_auto_chooses_one_of_them(instance: Instance) -> None:
 def test_auto_proves_measures_of_risk_by_a_method_that_serves_them() -> None:
     method = plan_averse(OPEN_FIELD, RiskMeasure(kind="cvar", weight=0.5)).method
     assert METHODS[method].risk  # type: ignore[index]
+
+
+def test_the_documentation_names_every_method() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
+    for method in get_args(Method):
+        assert f"`{method}`" in text

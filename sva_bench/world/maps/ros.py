@@ -13,6 +13,7 @@ import math
 import re
 from difflib import get_close_matches
 from pathlib import Path, PurePosixPath
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ _log = logging.getLogger(__name__)
 
 _USUAL_UNKNOWN, _MANY = 205, 1e-3  # the level that map_saver writes for unknown; share of cells that is no accident
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
-_MODES: tuple[MapMode, ...] = ("trinary", "scale", "raw")
+_MODES: tuple[MapMode, ...] = get_args(MapMode)
 _YES, _NO = ("true", "yes", "on", "1"), ("false", "no", "off", "0")  # YAML 1.1 has all of them, and ROS reads it
 
 
