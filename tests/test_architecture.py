@@ -20,7 +20,7 @@ ROOMS = (
 )
 # The same within the solver, whose rooms are many.
 SOLVER = (
-    "looking", "program", "highs", "outcomes", "risk", "goal", "units", "preprocess", "routes", "knowledge", "problem",
+    "polling", "program", "highs", "outcomes", "risk", "goal", "units", "preprocess", "routes", "knowledge", "problem",
     "flow", "columns", "methods", "solve", "two_stage",
 )
 ONLY_IN = {

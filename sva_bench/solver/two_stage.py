@@ -25,7 +25,7 @@ from sva_bench.solver.methods import keeps_second_stage, serves_discounts
 from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
 from sva_bench.solver.risk import Risk, RiskMeasure
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.heuristic import value_of as rewards
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.solve import solve
@@ -304,7 +304,7 @@ class _Ties:
     one and the same tie in all scenarios.
     """
 
-    def __init__(self, instance: Instance, nominal: Orders, known: Knowledge, clock: Clock, gap: float,
+    def __init__(self, instance: Instance, nominal: VisitOrders, known: Knowledge, clock: Clock, gap: float,
                  method: Method) -> None:
         self._instance, self._known, self._clock, self._gap = instance, known, clock, gap
         self._method: Method = method
@@ -339,7 +339,7 @@ class _Ties:
 
 
 def _finish(
-    instance: Instance, objective: PlanObjective, orders: Orders, known: Knowledge, *, value: float, bound: float,
+    instance: Instance, objective: PlanObjective, orders: VisitOrders, known: Knowledge, *, value: float, bound: float,
     status: Status, solutions: Sequence[Solution], runtime_s: float,
 ) -> Plan:
     routes, fuel = {}, {}
@@ -371,7 +371,7 @@ def _certified(instance: Instance, plan: Plan) -> Plan:
     return plan
 
 
-def _orders(instance: Instance, plan: Plan, known: Knowledge) -> Orders:
+def _orders(instance: Instance, plan: Plan, known: Knowledge) -> VisitOrders:
     """The POIs of a feasible plan's routes."""
     pois = set(instance.pois)
     orders = tuple(tuple(j for j in map(instance.sites.index, plan.route(v.name)) if j in pois)
@@ -390,11 +390,11 @@ def _availability(instance: Instance) -> FloatArray:
     return np.array([v.availability for v in instance.vehicles], dtype=np.float64)
 
 
-def _sum(weights: FloatArray, orders: Orders) -> float:
+def _sum(weights: FloatArray, orders: VisitOrders) -> float:
     return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
 
 
-def _expected(instance: Instance, orders: Orders) -> float:
+def _expected(instance: Instance, orders: VisitOrders) -> float:
     return _sum(_incentives(instance) * _availability(instance)[:, None], orders)
 
 

@@ -146,7 +146,7 @@ def test_the_methods_of_the_paper_find_them_on_many_instances(seed: int, method:
 
 @pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("seed", range(20))
-def test_plans_for_failures_along_the_way_are_those_that_enumeration_finds(seed: int) -> None:
+def test_plans_for_failures_along_the_route_are_those_that_enumeration_finds(seed: int) -> None:
     check_per_leg(seed)
 
 
@@ -168,7 +168,7 @@ def test_the_method_alone_finds_the_plans_that_enumeration_finds_on_many_instanc
 @pytest.mark.long
 @pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("seed", range(600, 1000))
-def test_plans_for_failures_along_the_way_are_those_that_enumeration_finds_on_many_instances(seed: int) -> None:
+def test_plans_for_failures_along_the_route_are_those_that_enumeration_finds_on_many_instances(seed: int) -> None:
     check_per_leg(seed)
 
 

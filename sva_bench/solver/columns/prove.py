@@ -8,7 +8,7 @@ from sva_bench.solver.columns.branch_and_price import BranchAndPrice
 from sva_bench.solver.columns.column_generation import ColumnGeneration
 from sva_bench.solver.knowledge import adopt, drive
 from sva_bench.solver.problem import Problem
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import VisitOrders
 
 _log = logging.getLogger(__name__)
 
@@ -23,7 +23,7 @@ def prove_by_columns(problem: Problem) -> None:
         """Bounds up to here hold nothing better: too close, or below the next value that a plan can have."""
         return problem.progress.value + problem.progress.slack(_WITHIN * problem.gap)
 
-    def offer(orders: Orders) -> None:
+    def offer(orders: VisitOrders) -> None:
         adopt(problem.progress, problem.goal, problem.known, orders)
 
     generation = ColumnGeneration(instance=problem.instance, goal=problem.goal, scopes=problem.scopes,

@@ -1,6 +1,6 @@
 """Branch and cut: cuts at the root, branch and bound, again with every cut that its solution breaks.
 
-HiGHS takes no constraints while it branches, so each integer solution that hangs together badly costs another run.
+HiGHS takes no constraints while it branches, so each integer solution that isn't connected costs another run.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sva_bench.solver.highs import Outcome, Relaxation, maximise
 from sva_bench.solver.knowledge import Cut, adopt, without_idle_stops
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.program import LinearModel, Rows
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.units import LARGEST
 
@@ -45,9 +45,9 @@ class FlowModel(Protocol):
         """How often a vehicle drives each leg in a point of the model, shape (n, n)."""
 
     def order(self, values: FloatArray, vehicle: int) -> tuple[int, ...]:
-        """POIs of a vehicle's route in an integer point, as far as it hangs together with the base."""
+        """POIs of a vehicle's route in an integer point, as far as it is connected with the base."""
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point of the model; ``None`` where it uses a leg that the model leaves out."""
 
 
@@ -144,7 +144,7 @@ def _branch(flow: FlowModel, problem: Problem, model: LinearModel, size: float, 
 
 
 def _integers(flow: FlowModel, problem: Problem, outcome: Outcome) -> list[Cut]:
-    """Take up an integer solution, as far as it hangs together with the base; the cuts that it breaks."""
+    """Take up an integer solution, as far as it is connected with the base; the cuts that it breaks."""
     if outcome.values is None:
         return []
     instance, goal, known = problem.instance, problem.goal, problem.known

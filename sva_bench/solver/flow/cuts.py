@@ -43,7 +43,7 @@ def cut_rows(cuts: Iterable[Cut], legs: Legs, n: int) -> Rows:
 
 
 def violated_by_integers(visits: FloatArray, vehicle: int, base: int, pois: frozenset[int]) -> list[Cut]:
-    """Cuts for the parts of an integer solution that hang together but not with the base.
+    """Cuts for the components of an integer solution that aren't connected with the base.
 
     Args:
         visits: ``y`` of the vehicle, shape (n, n).

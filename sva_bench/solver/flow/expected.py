@@ -14,7 +14,7 @@ from sva_bench.solver.goal import Goal
 from sva_bench.solver.knowledge import Cut, drive
 from sva_bench.solver.preprocess import Scope
 from sva_bench.solver.program import LinearModel, Rows
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.refuelling import Road
 
 
@@ -40,7 +40,7 @@ class DirectedModel:
         walk = euler_walk(np.rint(self.visits(values, vehicle)), self._instance.base)
         return tuple(j for j in walk if j in self._pois)
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point."""
         routes = [drive(road, order) for road, order in zip(self._roads, orders, strict=True)]
         return columns_of(self._instance, self.legs, self._scopes, routes)

@@ -26,7 +26,7 @@ from sva_bench.solver.program import LinearModel, RowBuilder
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Legs:
-    """The columns ``y``: vehicle, origin and destination of each, and where its columns of fuel and time stand.
+    """The columns ``y``: vehicle, origin and destination of each, and which columns hold its fuel and time.
 
     Attributes:
         vehicle: Shape (legs,).

@@ -30,7 +30,7 @@ from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.program import LinearModel, RowBuilder, Rows
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.units import LARGEST
 
 _log = logging.getLogger(__name__)
@@ -119,7 +119,7 @@ class _Master(DirectedModel):
             build.add([first + eta, *used], [1.0, *(-lost[used])], 0.0, np.inf)
         return build.rows()
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point, with the least cost of the second stage that the cuts allow."""
         first = super().point(orders)
         if first is None:
@@ -145,25 +145,25 @@ class _Master(DirectedModel):
         """What each leg loses in an outcome, by the duals of its recourse program."""
         lost = self._lost[outcome]
         if self._kind == "pareto":
-            price = np.zeros(len(lost))
+            dual = np.zeros(len(lost))
             for costs, used in self._groups:
                 if lost[used[0]]:
-                    price[used] = -float(np.max(self._earned[used] / costs)) * costs
-            rest = np.where(self._onward, np.maximum(-self._earned - price, 0.0), 0.0)
-            return self._by_origin(-(lost * price + rest), lost * self._earned)
+                    dual[used] = -float(np.max(self._earned[used] / costs)) * costs
+            rest = np.where(self._onward, np.maximum(-self._earned - dual, 0.0), 0.0)
+            return self._by_origin(-(lost * dual + rest), lost * self._earned)
         program = self._duals[outcome]
         rows = np.concatenate([[lost[used[0]] * float(costs @ driven[used]) for costs, used in self._groups],
                                np.where(self._onward, driven, lost * driven)])
         lower = np.concatenate([rows[:len(self._groups)], np.where(self._onward, -np.inf, lost * driven)])
-        program.set_sides(lower, rows)
+        program.set_row_bounds(lower, rows)
         solved = program.solve(np.inf)
         if solved.values is None:
             raise RuntimeError(f"the recourse program of outcome {outcome} is {solved.status}")
-        price = np.zeros(len(lost))
+        dual = np.zeros(len(lost))
         for number, (costs, used) in enumerate(self._groups):
-            price[used] = solved.duals[number] * costs
+            dual[used] = solved.duals[number] * costs
         rest = solved.duals[len(self._groups):]
-        return self._by_origin(-(lost * price + rest), -lost * rest)
+        return self._by_origin(-(lost * dual + rest), -lost * rest)
 
     def _by_origin(self, onward: FloatArray, refuelled: FloatArray) -> FloatArray:
         """One figure for legs out of POIs, another for legs out of refuels."""
