@@ -63,8 +63,8 @@ def read_instance(path: Path) -> Instance:
     _refuse_too_large(path, document.data)
     file = validate(document, _InstanceFile, KIND)
     sites = tuple(file.sites)
-    _refuse_twice(document, ("sites",), sites)
-    _refuse_twice(document, ("stations",), file.stations)
+    _refuse_duplicates(document, ("sites",), sites)
+    _refuse_duplicates(document, ("stations",), file.stations)
     for loc, name in ((("base",), file.base), *((("stations", k), name) for k, name in enumerate(file.stations))):
         if name not in sites:
             raise document.error(loc, f"{name!r} is not among the sites; {nearest(name, list(sites))}")
@@ -73,7 +73,7 @@ def read_instance(path: Path) -> Instance:
     if file.stop_s is not None and len(file.stop_s) != len(sites):
         raise document.error(("stop_s",), f"expected {len(sites)} entries, one for each site, found {len(file.stop_s)}")
     common = None if file.fuel_s is None else _matrix(document, ("fuel_s",), file.fuel_s, len(sites))
-    _refuse_twice(document, ("vehicles",), [v.name for v in file.vehicles])
+    _refuse_duplicates(document, ("vehicles",), [v.name for v in file.vehicles])
     joint = _joint(document, file)
     if joint is not None and (other := without_joint([file.failure])):
         raise document.error(("joint_availability",), f"under {other} vehicles fail independently; leave it out, or "
@@ -174,11 +174,11 @@ def _joint(document: Document, file: _InstanceFile) -> tuple[JointState, ...] | 
         JointState(probability=s.probability, available=frozenset(s.available)) for s in file.joint_availability)
 
 
-def _refuse_twice(document: Document, loc: tuple[str | int, ...], names: Sequence[str]) -> None:
+def _refuse_duplicates(document: Document, loc: tuple[str | int, ...], names: Sequence[str]) -> None:
     seen: set[str] = set()
     for k, name in enumerate(names):
         if name in seen:
-            raise document.error((*loc, k), f"{name!r} stands twice; names must differ")
+            raise document.error((*loc, k), f"{name!r} is a duplicate; names must differ")
         seen.add(name)
 
 

@@ -23,7 +23,7 @@ _MOST_PAIRS = 50_000_000  # of points spread evenly, that lie near enough to eac
 _MOST_WORK = 20_000_000  # solids and buckets that segments are held against: about half a second
 _AT_A_TIME = 5_000_000  # of them, before Ctrl-C is listened to
 _EDGE = 100  # what a tangent that is found costs, in this unit: as an edge of the roadmap, later
-_SEEN = 8  # points that are looked at, or squares, for the price of one solid
+_SEEN = 8  # points or squares that take as long to examine as one solid
 _FEW = 2000  # points whose tangents are looked for at once, whatever their length
 _LINES = 1 << 18  # that are remembered
 _RING = 1.4  # else those up to some length, then those up to so much more, and so on
@@ -280,8 +280,8 @@ def taut(checker: FloatArray, vertices: FloatArray, chain: IntArray, window: int
     for j in range(1, n):
         for i in range(max(j - window, 0), j):
             ax, ay, bx, by = vertices[chain[i], 0], vertices[chain[i], 1], vertices[chain[j], 0], vertices[chain[j], 1]
-            way = length[i] + math.hypot(bx - ax, by - ay)
-            if way < length[j]:
+            reach = length[i] + math.hypot(bx - ax, by - ay)
+            if reach < length[j]:
                 free = i == j - 1
                 if not free:
                     line = 2 * (chain[i] * len(vertices) + chain[j])
@@ -290,7 +290,7 @@ def taut(checker: FloatArray, vertices: FloatArray, chain: IntArray, window: int
                         known[slot] = line + keeps_clear(checker, ax, ay, bx, by)
                     free = known[slot] == line + 1
                 if free:
-                    length[j], before[j] = way, i
+                    length[j], before[j] = reach, i
     kept = [n - 1]
     while kept[-1] > 0:
         kept.append(before[kept[-1]])

@@ -40,7 +40,7 @@ def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tupl
     """
     path = locate(root, name)
     content = content_of(path)
-    # An editor's byte-order mark is no part of the text, and no more lines are taken apart than cells may be.
+    # An editor's byte-order mark is no part of the text, and no more lines are split than there may be rows.
     lines = content.removeprefix(b"\xef\xbb\xbf").split(b"\n", MAX_CELLS + 4)
     lines = [line.removesuffix(b"\r") for line in lines]
     while lines and not lines[-1].strip():
@@ -51,7 +51,7 @@ def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tupl
     for number in (1, 2):
         words = lines[number].split() if number < len(lines) else []
         if len(words) != 2 or words[0] not in (b"height", b"width") or not words[1].isdigit() or len(words[1]) > 9:
-            raise BadFile(path, number + 1, "", "expected 'height' and 'width' with a whole number each")
+            raise BadFile(path, number + 1, "", "expected 'height' and 'width' with an integer each")
         size[words[0].decode()] = int(words[1])
     if len(size) != 2:
         raise BadFile(path, 3, "", "expected 'height' and 'width', each once")
