@@ -87,6 +87,14 @@ def test_imports_within_the_solver_point_one_way(module: str) -> None:
                 f"sva_bench/{module}:{line} imports {name}; {part} may know {', '.join(allowed[:-1]) or 'nothing'}")
 
 
+@pytest.mark.parametrize("module", SOLVER_MODULES)
+def test_the_solver_learns_of_failures_in_numbers(module: str) -> None:
+    # ``two_stage`` asks the process for them; nothing below it knows that there are processes.
+    if part_of(module) != "two_stage":
+        for line, name in imports_of(PACKAGE / module):
+            assert not name.startswith("sva_bench.mission.failures"), f"sva_bench/{module}:{line} imports {name}"
+
+
 def test_every_part_of_the_solver_is_there() -> None:
     assert set(SOLVER) == {part_of(module) for module in SOLVER_MODULES}
 
@@ -118,3 +126,16 @@ def test_the_file_that_a_heavy_library_belongs_in_does_import_it(library: str) -
 def test_no_module_wants_splitting(module: str) -> None:
     lines = len((PACKAGE / module).read_text(encoding="utf-8").splitlines())
     assert lines <= MOST_LINES, f"sva_bench/{module} has {lines} lines: it wants to be two"
+
+
+LONGEST = 60
+REASONED = ("solver", "mission", "travel", "world", "geometry", "robot")
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if room_of(module) in REASONED])
+def test_a_function_that_fits_no_screen_says_why(module: str) -> None:
+    for node in ast.walk(ast.parse((PACKAGE / module).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef) and (node.end_lineno or 0) - node.lineno >= LONGEST:
+            assert "compiled" in (ast.get_docstring(node) or ""), (
+                f"sva_bench/{module}:{node.lineno}: {node.name} has more than {LONGEST} lines: name its middle, or "
+                "give the reason in its docstring")

@@ -170,6 +170,6 @@ def test_ctrl_c_ends_the_search_for_chains_of_very_many_stations(monkeypatch: py
         name="stations", sites=tuple(f"s{k}" for k in range(602)), base=0, stations=tuple(range(1, 601)),
         stop_s=np.zeros(602), vehicles=(replace(
             made, fuel_capacity_s=150.0, mission_limit_s=1000.0, fuel_s=fuel, incentives=np.eye(602)[601]),))
-    at_call(monkeypatch, routes, "_ways")
+    at_call(monkeypatch, routes, "_station_chains")
     with pytest.raises(KeyboardInterrupt):
         routes.tables_of(instance)

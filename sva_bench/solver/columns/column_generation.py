@@ -183,25 +183,13 @@ class ColumnGeneration:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
             duals = master.duals(solved)
             if quick:
-                added = 0
-                for number, unit in enumerate(state.units):
-                    priced = self.price(unit, duals, max(float(duals.unit[number]), 0.0) + self.tolerance,
-                                        exact=False)
-                    added += self.add(master, number, unit, priced)
+                added = sum(self.add(master, number, unit, self.price(
+                    unit, duals, max(float(duals.unit[number]), 0.0) + self.tolerance, exact=False))
+                    for number, unit in enumerate(state.units))
                 if added:
                     continue
             at = duals if centre is None or smooth == 0.0 else duals.between(centre, smooth)
-            most, added, complete = master.most(at), 0, True
-            for number, unit in enumerate(state.units):
-                # A little below the best, for routes there can be of use at the program's own duals.
-                width = min(best, known) - solved.objective
-                threshold = max(most[number] - (width if math.isfinite(width) else 0.0), 0.0)
-                priced = self.price(unit, at, threshold + self.tolerance, exact=True)
-                complete &= priced.complete
-                most[number] = max(priced.best, most[number])
-                routes = [self._column(unit.kind, route) for route in priced.routes]
-                added += master.add(number, [c for c in routes if self._reduced(c, duals)
-                                             > max(duals.unit[number], 0.0) + self.tolerance])
+            most, added, complete = self._price_exactly(master, state, at, duals, min(best, known) - solved.objective)
             if not complete:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
             bound = master.bound(at, most)
@@ -219,6 +207,32 @@ class ColumnGeneration:
                 quick = False
             else:
                 smooth, quick = _SMOOTHING, True
+
+    def _price_exactly(
+        self, master: Master, state: BranchState, at: Duals, duals: Duals, width: float,
+    ) -> tuple[FloatArray, int, bool]:
+        """Add the columns that exact pricing finds.
+
+        Args:
+            master: The program.
+            state: Its decisions.
+            at: Duals to price at.
+            duals: The program's own, at which columns must improve it.
+            width: How far below the best routes are looked for: they can be of use at the program's own duals.
+
+        Returns:
+            Greatest reduced value of each unit's routes, shape (units,); number of columns added; whether it is proved.
+        """
+        most, added, complete = master.most(at), 0, True
+        for number, unit in enumerate(state.units):
+            threshold = max(most[number] - (width if math.isfinite(width) else 0.0), 0.0)
+            priced = self.price(unit, at, threshold + self.tolerance, exact=True)
+            complete &= priced.complete
+            most[number] = max(priced.best, most[number])
+            routes = [self._column(unit.kind, route) for route in priced.routes]
+            added += master.add(number, [c for c in routes if self._reduced(c, duals)
+                                         > max(duals.unit[number], 0.0) + self.tolerance])
+        return most, added, complete
 
     def _reward(self, unit: Unit, duals: Duals) -> FloatArray:
         """Reward of each site for a unit, shape (n,); ``-inf`` = not to be visited."""

@@ -65,6 +65,8 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
          step, threshold, exact, forwards, most, touch, recall, once, cut_dual, stop, left_s):
     """All labels from one end up to half the limit that aren't dominated.
 
+    Long because compiled: its arrays grow, and each part would need nearly all of them.
+
     Returns:
         Site, time, fuel, value, second value, memory, cuts ahead, parent, and labels by site, each site's by
         decreasing value: first a table of where a site's begin. Then whether there were too many, or no time was left

@@ -16,6 +16,8 @@ def partial_routes(legs, time, fuel, bit, words, gain, charge, base, capacity, l
                    touch, recall, once, cut_dual, stop, left_s):
     """Partial routes from the base that none over the same POIs to the same site dominates in time and fuel.
 
+    Long because compiled: one loop over arrays that it fills, of which each part would need nearly all.
+
     Returns:
         Last site and parent of each; the ends of the best routes, one for each set of POIs; whether there were
         too many, or no time was left for more.

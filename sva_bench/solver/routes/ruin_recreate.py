@@ -36,6 +36,8 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
            pool_size, pool_table, keys, ordered, stop):
     """So many rounds; works on ``current``, ``best`` and ``pool`` in place; the size of the pool.
 
+    Long because compiled: a dozen scratch arrays are made once, and each part would need nearly all of them.
+
     Args:
         rng: Random numbers.
         count: Rounds.
@@ -188,7 +190,11 @@ def _ruin(rng, orders, lengths, near, removed):
 def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel, time, quickest, first, last, hops,
               capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score, place, least,
               reward, total, scratch):
-    """Insert POIs, those of most reward for the least detour first, until none fits."""
+    """Insert POIs, those of most reward for the least detour first, until none fits.
+
+    Long because compiled: what is known of a detour is kept from one insertion to the next, in arrays that each part
+    would need.
+    """
     vehicles, n = weights.shape
     visited[:] = False
     score[:] = 0.0
