@@ -87,7 +87,8 @@ class Failures:
 class PlanningTerms:
     """What failures make of incentives, in numbers: all that a solver learns of a process.
 
-    The k-th POI of vehicle m's route earns ``share[m] * survival[m]**k`` times its incentive.
+    The k-th POI of vehicle m's route earns ``share[m] * survival[m]**k`` times its incentive. A process that discounts
+    by driving time needs a field of its own here (a rate a second), in ``solver/goal.py`` and in pricing.
 
     Attributes:
         share: Share of every incentive that a vehicle earns, whatever its route, shape (M,).
