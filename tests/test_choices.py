@@ -93,8 +93,8 @@ def test_each_mode_of_ros_maps_is_read(mode: MapMode, unknown: Unknown, tmp_path
     path.write_text(path.read_text() + f"mode: {mode}\n")
     if mode == "raw":  # levels of 0 to 100 are occupancies: 0 is free, 205 and 254 are unknown
         expected = [[unknown == "occupied"] * 3, [False, *[unknown == "occupied"] * 2]]
-    elif mode == "scale":
-        pytest.skip("grey levels between the thresholds count by their share: test_maps.py")
+    elif mode == "scale":  # 205 is just above free_thresh: an occupancy of 0, once rounded
+        expected = [[False] * 3, [True, False, False]]
     else:
         expected = [[False] * 3, [True, False, unknown == "occupied"]]
     cells, _ = read_ros_map(tmp_path, "map.yaml", unknown)
