@@ -5,6 +5,7 @@ Nothing is imported here, so that ``--help`` need not load the modules that the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal, get_args
 
 # Inputs
@@ -22,7 +23,17 @@ Objective = Literal["stochastic", "deterministic"]
 PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess"]
 """What a plan was made for; the last two are the stochastic objective with a risk."""
 RiskKind = Literal["cvar", "excess"]
-Method = Literal["auto", "expected", "dep", "relaxed", "lshaped"]
+Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
+METHODS: Mapping[Method, str] = {
+    "auto": "chooses by the instance",
+    "expected": "the collapsed model by branch and cut, a column for each leg",
+    "dep": "the paper's deterministic equivalent",
+    "relaxed": "the same with the recourse relaxed",
+    "lshaped": "the paper's L-shaped method",
+    "undirected": "the collapsed model with a column for each edge, for symmetric costs without refuelling",
+    "branch-and-price": "routes as columns",
+}
+"""How a plan is proved, in a few words each."""
 Cuts = Literal["single", "multi", "pareto"]
 Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 """Of a plan, best first."""
@@ -32,6 +43,3 @@ Fidelity = Literal["kinematic", "rollout", "physics"]
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
 EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]
-
-# The paper
-PaperPart = Literal["rewards", "simulation", "runtimes"]

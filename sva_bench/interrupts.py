@@ -17,7 +17,7 @@ Libraries may swallow what is raised in a callback, or answer it with an error o
 until somebody has heard it; never while it is on its way, where that would cut short what is cleared away. The command
 line runs each command in such a block (``as_ctrl_c``).
 
-Compiled code that takes long looks at ``flag`` (``solver/looking.py``) and ends early, with a result of no use: the end
+Compiled code that takes long looks at ``flag`` (``solver/polling.py``) and ends early, with a result of no use: the end
 of the block around it raises before anybody uses it.
 """
 

@@ -20,6 +20,11 @@ ROOMS = (
     "mission", "world", "solver", "travel", "execution", "analysis", "recording", "storage", "report", "study",
     "generate", "batch", "paper", "cli", "__init__", "__main__",
 )
+# The same within the solver, whose rooms are many.
+SOLVER = (
+    "polling", "program", "highs", "outcomes", "risk", "goal", "units", "preprocess", "routes", "knowledge", "problem",
+    "flow", "columns", "methods", "solve", "two_stage",
+)
 ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet": ("execution/engines/bullet.py",), "pybullet_data": ("execution/engines/bullet.py",),
     "pybullet_utils": ("execution/engines/bullet.py",), "ompl": ("travel/roadmap.py",),
@@ -66,6 +71,37 @@ def test_every_room_is_there() -> None:
     assert set(ROOMS) == {room_of(module) for module in MODULES}
 
 
+def part_of(module: str) -> str:
+    """``solver/flow/cuts.py`` is in the solver's part ``flow``."""
+    return module.split("/")[1].removesuffix(".py")
+
+
+SOLVER_MODULES = [module for module in MODULES if room_of(module) == "solver" and module != "solver/__init__.py"]
+
+
+@pytest.mark.parametrize("module", SOLVER_MODULES)
+def test_imports_within_the_solver_point_one_way(module: str) -> None:
+    part = part_of(module)
+    assert part in SOLVER, f"say in SOLVER what {part} may import"
+    allowed = SOLVER[: SOLVER.index(part) + 1]
+    for line, name in imports_of(PACKAGE / module):
+        if name.startswith("sva_bench.solver."):
+            assert name.split(".")[2] in allowed, (
+                f"sva_bench/{module}:{line} imports {name}; {part} may know {', '.join(allowed[:-1]) or 'nothing'}")
+
+
+@pytest.mark.parametrize("module", SOLVER_MODULES)
+def test_the_solver_learns_of_failures_in_numbers(module: str) -> None:
+    # ``two_stage`` asks the process for them; nothing below it knows that there are processes.
+    if part_of(module) != "two_stage":
+        for line, name in imports_of(PACKAGE / module):
+            assert not name.startswith("sva_bench.mission.failures"), f"sva_bench/{module}:{line} imports {name}"
+
+
+def test_every_part_of_the_solver_is_there() -> None:
+    assert set(SOLVER) == {part_of(module) for module in SOLVER_MODULES}
+
+
 def test_solver_and_execution_never_see_each_other() -> None:
     # The solver comes first, so it can't; execution could.
     for module in MODULES:
@@ -102,3 +138,16 @@ def test_a_check_loads_neither_physics_nor_solvers_nor_statistics() -> None:
             f"print(sorted({heavy!r} & set(sys.modules)))")
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
+
+
+LONGEST = 60
+REASONED = ("solver", "mission", "travel", "world", "geometry", "robot")
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if room_of(module) in REASONED])
+def test_a_function_that_fits_no_screen_says_why(module: str) -> None:
+    for node in ast.walk(ast.parse((PACKAGE / module).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef) and (node.end_lineno or 0) - node.lineno >= LONGEST:
+            assert "compiled" in (ast.get_docstring(node) or ""), (
+                f"sva_bench/{module}:{node.lineno}: {node.name} has more than {LONGEST} lines: name its middle, or "
+                "give the reason in its docstring")

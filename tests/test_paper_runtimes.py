@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.choices import Status
+from sva_bench.choices import Method, Status
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.paper.gaps_picture import draw_gaps
 from sva_bench.paper.printed import FIGURE_3, TABLE_2, TABLE_3, Box
@@ -25,7 +25,6 @@ from sva_bench.paper.runtimes import (
     write_report,
 )
 from sva_bench.paper.solves import METHODS, Row, Study, read_rows, run
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import plan_stochastic
 
 PAPER = Path(__file__).parents[1] / "../shared/paper.tex"

@@ -40,7 +40,7 @@ NEVER_ONE = {  # said of what is more than a bound, or two at least
     "rows outcomes", "size bytes", "len(sets) sets", "len(items) entries", "longest entries", "len(routes) routes",
     "len(route) stops", "most files", "head.num_rows rows", "largest bytes", "pois POIs", "rows cells",
     "robots robots", "least POIs", "slowest.pois POIs", "listed(study.pois) POIs",
-    "method plans",  # a verb
+    "method plans", "other robots", "other vehicles",  # a verb; names of failure processes
 }
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from sva_bench.analysis.unseen import UNHAPPY
-from sva_bench.choices import ENDS, Fidelity, PathPlanner
+from sva_bench.choices import ENDS, Fidelity, Objective, PathPlanner
 from sva_bench.files.fields import Name, Number, Section, WholeNumber
 from sva_bench.storage.results_schema import MOST_ROLLOUTS, MOST_TRIALS, Facts, Seed, Words
 
@@ -94,7 +94,7 @@ class PlanEntry(Section):
 
 class TallyEntry(Section):
     difference: FigureEntry
-    plans: dict[Literal["stochastic", "deterministic"], PlanEntry]
+    plans: dict[Objective, PlanEntry]
 
 
 class NoteFile(Section):

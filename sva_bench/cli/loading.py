@@ -11,7 +11,7 @@ from pathlib import Path
 from sva_bench.choices import FailureProcess, PathPlanner
 from sva_bench.cli.terminal import messages
 from sva_bench.errors import BadInput
-from sva_bench.files.documents import read_yaml
+from sva_bench.files.documents import YAML_SUFFIXES, read_yaml
 from sva_bench.files.mistaken import what_it_is
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -74,6 +74,8 @@ def refuse_no_map(path: Path) -> None:
     Raises:
         BadFile: If it is one, and which command takes it.
     """
+    if path.suffix.lower() not in YAML_SUFFIXES:
+        return
     document = read_yaml(path)
     if isinstance(document.data, dict) and "format" in document.data and (known := what_it_is(document.data)):
         raise document.error((), f"expected a map, and {known}")

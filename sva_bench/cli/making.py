@@ -117,23 +117,19 @@ def make_world_from_map(
     with holding_back_ctrl_c():
         from sva_bench.cli.loading import refuse_no_map
         from sva_bench.generate.worlds import world_from_map
+        from sva_bench.world.maps.formats import format_of, settings_for
 
     set_up_logging(verbose)
-    octile = source.suffix.lower() == ".map"
-    if octile and unknown is not None:
-        raise BadInput("--unknown belongs to ROS maps; a MovingAI map has no unknown cells")
-    if not octile and cell_m is not None:
-        raise BadInput("--cell-m belongs to MovingAI maps; a ROS map says its resolution")
+    settings = settings_for(format_of(source), {"cell_m": cell_m, "unknown": unknown})
     if base is not None and not all(map(math.isfinite, base)):
         raise BadInput("--base: expected two finite numbers")
     check_output(output, source)
     refuse_edited(output, force=force)
-    if source.suffix.lower() in (".yaml", ".yml"):
-        refuse_no_map(source)
+    refuse_no_map(source)
     with progress_bars() as progress:
         text, files = world_from_map(
             source, output, base=base, pois=pois, stations=stations, robots=robots, seed=seed, spacing_m=min_spacing,
-            cell_m=1.0 if cell_m is None else cell_m, unknown=unknown or "occupied", progress=progress)
+            settings=settings, progress=progress)
     if not force:
         refuse_others(output, {file.name: file.content for file in files})
     with holding_back_ctrl_c():  # a map and the world on it belong together

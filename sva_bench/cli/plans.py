@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from sva_bench.choices import Cuts, Method, Objective, RiskKind
+from sva_bench.choices import METHODS, Cuts, Method, Objective, RiskKind
 from sva_bench.cli.options import AsJson, Gap, MarginOption, PlannerOption, TimeLimit, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
 from sva_bench.errors import BadInput, ExitCode, Interrupted
@@ -49,8 +49,8 @@ def plan(
                                                 show_default=False)] = None,
     objective: Annotated[Objective, typer.Option(help="Plan for failures, or take every robot as "
                                                             "available.")] = "stochastic",
-    method: Annotated[Method, typer.Option(help="Solution method: auto chooses; expected is the collapsed model; dep, "
-                                                "relaxed and lshaped are the paper's.")] = "auto",
+    method: Annotated[Method, typer.Option(help="Solution method. " + "; ".join(
+        f"{name}: {text}" for name, text in METHODS.items()) + ".")] = "auto",
     cuts: Annotated[Cuts | None, typer.Option(help="Optimality cuts of lshaped.", show_default="single")] = None,
     risk: Annotated[RiskKind | None, typer.Option(help="Plan for the worst outcomes: their mean, or the shortfall "
                                                   "below a target.", show_default="none")] = None,
@@ -70,6 +70,7 @@ def plan(
     """Make one plan, proved optimal unless a limit stops it."""
     with holding_back_ctrl_c():
         from sva_bench.cli.loading import instance_of_world
+        from sva_bench.files.documents import YAML_SUFFIXES
         from sva_bench.files.pretty import pretty_json
         from sva_bench.mission.instance_file import read_instance
         from sva_bench.mission.plan_file import plan_as_dict
@@ -87,13 +88,14 @@ def plan(
     if cuts is not None and method != "lshaped":
         raise BadInput("--cuts are those of --method lshaped")
     with progress_bars() as progress:
-        if source.suffix.lower() in (".yaml", ".yml"):
+        if source.suffix.lower() in YAML_SUFFIXES:
             instance = instance_of_world(source, scenario, "prmstar", None, progress)
         elif scenario is not None:
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
         else:
             instance = read_instance(source)
         with holding_back_ctrl_c():  # after reading: what is wrong is said at once
+            from sva_bench.mission.failures import MODEL
             from sva_bench.solver.risk import RiskMeasure
             from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
 
@@ -107,7 +109,7 @@ def plan(
             elif objective == "stochastic":
                 made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
             else:
-                stochastic = plan_stochastic(replace(instance, failure="mission"), limits, method=method,
+                stochastic = plan_stochastic(replace(instance, failure=MODEL), limits, method=method,
                                              cuts=cuts_used)
                 made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
             write_result(output, pretty_json(plan_as_dict(made)))

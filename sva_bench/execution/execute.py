@@ -15,7 +15,7 @@ from sva_bench.execution.engines.bullet import Simulator, downsampled
 from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, settle, trace_of
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.mission.failures import NEVER, draw_failures
+from sva_bench.mission.failures import NEVER, FailureDraw, Reliability, process_of
 from sva_bench.mission.plan import Plan, Route
 from sva_bench.robot.follower import Stretch
 from sva_bench.robot.model import RobotModel
@@ -220,9 +220,8 @@ def drives_ahead(
     for case in cases:
         for number, robot in enumerate(world.robots):
             route = case.plan.route(robot.name)
-            if not route or (world.execute_failure == "mission" and case.scenario.availability[robot.name] == 0):
-                continue
-            for rollout in range(min(settings.rollouts, settings.trials)):
+            can_leave = route and process_of(world.execute_failure).can_leave(_reliability(robot, case))
+            for rollout in range(min(settings.rollouts, settings.trials) if can_leave else 0):
                 key = (robot.name, route, rollout, 0)
                 if key not in tasks:
                     tasks[key] = _task(world, costs, settings, number, key, traced=False)
@@ -249,10 +248,15 @@ def _orders(world: World, robot: Robot, route: Route) -> Assignment:
 
 def _failures(world: World, case: Case, orders: Sequence[Assignment], settings: Settings) -> IntArray:
     pois = np.array([sum(o.is_poi(site) for site in o.route) for o in orders])
-    fails = draw_failures(
-        settings.seed, [robot.name for robot in world.robots], case.scenario.availability, world.execute_failure,
-        trials=settings.trials, first=settings.first, pois=int(pois.max(initial=0)), joint=case.scenario.joint)
+    fails = process_of(world.execute_failure).draw(FailureDraw(
+        seed=settings.seed, vehicles=tuple(robot.name for robot in world.robots), trials=settings.trials,
+        first=settings.first, pois=int(pois.max(initial=0)), joint=case.scenario.joint,
+        reliability=tuple(_reliability(robot, case) for robot in world.robots))).before_poi
     return np.where(fails > pois, NEVER, fails)  # draws for a longer route of another robot mean nothing to this one
+
+
+def _reliability(robot: Robot, case: Case) -> Reliability:
+    return Reliability(availability=case.scenario.availability[robot.name], mission_limit_s=robot.mission_limit_s)
 
 
 def _tasks(

@@ -26,6 +26,7 @@ from sva_bench.files.mistaken import what_it_is, what_the_bytes_are
 from sva_bench.files.printable import counted
 from sva_bench.files.yaml_text import MAX_DEPTH, Node, compose, line_in, plain_data, written_in
 
+YAML_SUFFIXES = (".yaml", ".yml")
 MAX_YAML_BYTES = 4_000_000  # a world of thousands of obstacles stays below 1 MB
 MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 100 MB
 
@@ -139,7 +140,7 @@ def read_json(path: Path, most: int = MAX_JSON_BYTES) -> Document:
     try:
         data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
     except json.JSONDecodeError as error:
-        if path.suffix.lower() in (".yaml", ".yml", ".map"):
+        if path.suffix.lower() in (*YAML_SUFFIXES, ".map"):
             known = what_it_is(parse_yaml(text, path).data)
             raise BadFile(path, None, "", "expected JSON, found YAML" + ("" if known is None else f"; {known}")
                           ) from None
@@ -186,7 +187,7 @@ def check_kind(document: Document, kind: str) -> None:
     """Refuse a document that is not a mapping of the declared kind."""
     line = f'"format": "{kind}"' if document.is_json else f"'format: {kind}'"
     if not isinstance(document.data, dict):
-        raise document.error((), f"expected a mapping that starts with {line}")
+        raise document.error((), what_it_is(document.data) or f"expected a mapping that starts with {line}")
     found, known = document.data.get("format"), what_it_is(document.data)
     if found is None:
         raise document.error((), known or f"the key 'format' is missing; add {line}")

@@ -19,6 +19,8 @@ _FROM_MAP = "`sva-bench world from-map MAP -o WORLD.yaml` makes a world of it"
 
 def what_it_is(data: Any) -> str | None:
     """What a document's data are, and which command takes such a thing; ``None`` if nobody knows."""
+    if isinstance(data, str):  # a text that YAML takes for one word over many lines
+        return what_the_text_is(data)
     if not isinstance(data, Mapping):
         return None
     form = data.get("format")

@@ -23,7 +23,7 @@ from sva_bench.mission.plan import unless_interrupted
 from sva_bench.robot.model import USUAL_MODEL
 from sva_bench.seeds import Stream, rng_for
 from sva_bench.solver.routes.fronts import tables_of
-from sva_bench.solver.routes.heuristic import Orders, search
+from sva_bench.solver.routes.heuristic import VisitOrders, search
 from sva_bench.solver.routes.refuelling import quickest, road_of
 from sva_bench.solver.two_stage import SolveLimits, plan_nominal
 from sva_bench.world.model import Site
@@ -225,14 +225,14 @@ def _weights(instance: Instance) -> FloatArray:
     return np.array([vehicle.incentives for vehicle in instance.vehicles])
 
 
-def _good_orders(instance: Instance, weights: FloatArray, stop: Callable[[float], bool]) -> Orders:
+def _good_orders(instance: Instance, weights: FloatArray, stop: Callable[[float], bool]) -> VisitOrders:
     """A good plan; any one whose worth is enough to stop."""
     robots = len(weights)
     return search(tables_of(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), starts=1,
                   stop=stop).orders
 
 
-def _worth(weights: FloatArray, orders: Orders) -> float:
+def _worth(weights: FloatArray, orders: VisitOrders) -> float:
     return float(sum(weights[m, j] for m, order in enumerate(orders) for j in order))
 
 

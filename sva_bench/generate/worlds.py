@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from sva_bench.choices import Unknown, WorldFamily
+from sva_bench.choices import WorldFamily
 from sva_bench.errors import BadInput
 from sva_bench.files.documents import Loc, parse_yaml
 from sva_bench.files.fields import NAME
@@ -21,12 +21,12 @@ from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.mission.failures import MODEL
 from sva_bench.robot.model import BUILT_IN, USUAL_MODEL
 from sva_bench.seeds import key_of
 from sva_bench.world.load import world_of
 from sva_bench.world.maps.files import MapFile
-from sva_bench.world.maps.movingai import read_movingai_map
-from sva_bench.world.maps.ros import read_ros_map
+from sva_bench.world.maps.formats import format_of
 from sva_bench.world.model import MapSource
 from sva_bench.world.places import NoRoom, Point, enclosed_beside, field_of, find_places
 from sva_bench.world.schema import KIND
@@ -85,18 +85,17 @@ def random_world(
 
 
 def world_from_map(
-    source: Path, target: Path, *, base: Point | None, pois: int, stations: int, robots: int, cell_m: float,
-    unknown: Unknown, spacing_m: float | None, seed: int, progress: Progress,
+    source: Path, target: Path, *, base: Point | None, pois: int, stations: int, robots: int,
+    settings: Mapping[str, object], spacing_m: float | None, seed: int, progress: Progress,
 ) -> tuple[str, tuple[MapFile, ...]]:
     """The text of a world file for a map, and the copies of the map's files that belong beside it.
 
     Args:
-        source: A map's YAML file (ROS), or an octile map (MovingAI).
+        source: A map's file, of one of the formats in ``world/maps/formats.py``.
         target: Where the world file will be; the world is named after it.
         base: Where the base is; ``None`` = near the middle of the largest enclosed region.
         pois, stations, robots: How many of each.
-        cell_m: Side of a cell of an octile map.
-        unknown: What unknown cells of a ROS map count as.
+        settings: How its format is to read it, where not by default.
         spacing_m: Least distance between POIs; ``None`` = as wide as it easily goes.
         seed: Seed of POIs and mission.
         progress: Told how far it is.
@@ -106,18 +105,14 @@ def world_from_map(
         BadInput: If sites or mission don't fit.
     """
     name = target.stem
-    if source.suffix.lower() not in (".yaml", ".yml", ".map"):
-        raise BadInput(f"{source}: a map is the YAML file of a ROS map, or a MovingAI map whose name ends in .map")
+    form = format_of(source)
     if not re.fullmatch(NAME, name):
         raise BadInput(f"{target}: the world is named after its file, and {name!r} is no valid name; use up to 64 "
                        "letters, digits, '_', '.', '-', the first a letter or digit")
-    section: dict[str, Any]
-    if source.suffix.lower() == ".map":
-        cells, read = read_movingai_map(source.parent, source.name, cell_m)
-        section = {"movingai": {"file": f"{name}-map/{read[0].name}", "cell_m": _plain(cell_m)}}
-    else:
-        cells, read = read_ros_map(source.parent, source.name, unknown, anywhere=True)
-        section = {"ros": {"file": f"{name}-map/{read[0].name}"} | ({"unknown": unknown} if unknown == "free" else {})}
+    entry = form.section.model_validate({**settings, "file": source.name})
+    cells, read = entry.read(source.parent, anywhere=True)
+    told = {key: _plain(value) if isinstance(value, float) else value for key, value in entry.written().items()}
+    section: dict[str, Any] = {form.key: {**told, "file": f"{name}-map/{read[0].name}"}}
     try:
         obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes_of(cells), cylinders=np.empty((0, 3)), cells=cells)
     except TooRagged:
@@ -142,8 +137,8 @@ def world_from_map(
         _log.warning("%s: the sites are in a region that reaches the map's rim, maybe outside of all walls; the "
                      "largest that walls enclose has %.3g m2: --base %g %g", source, area, x, y)
     asked = "" if base is None else f" --base {base[0]:g} {base[1]:g}"
-    asked += "" if "ros" in section else f" --cell-m {cell_m:g}"
-    asked += " --unknown free" if unknown == "free" else ""
+    asked += "".join(f" --{key.replace('_', '-')} {value if isinstance(value, str) else f'{value:g}'}"
+                     for key, value in told.items() if key != "file")
     asked += "" if spacing_m is None else f" --min-spacing {spacing_m:g}"
     remarks: dict[Loc, str] = {
         (): f"A mission on a map: sva-bench world from-map {source.name}\n"
@@ -201,7 +196,7 @@ def with_mission(
                                key=(*bare.obstacles.key(), *places))
     progress("choosing a mission", 1, 1)
     text = pretty_yaml(
-        {**head, **proposal.sections(), "failure": "mission", "margin": bare.margin,
+        {**head, **proposal.sections(), "failure": MODEL, "margin": bare.margin,
          "noise": {"wheel_gain_sd": WHEEL_GAIN_SD}},
         {**remarks, **proposal.remarks(), **dict.fromkeys(_SPACED, "\n")})
     world_of(parse_yaml(text, path), ground=ground)  # what is written can be read

@@ -27,8 +27,8 @@ class Cells:
         occupied: Shape (rows, columns); row 0 is the lowest, column 0 the leftmost in the grid's own frame.
         cell_m: Side of a cell.
         origin: x, y [m] of the grid's lower left corner, and the yaw [rad] of its own frame; shape (3,).
-        unknown: Which of the occupied cells only count as such, since nothing is known of them; for looking at.
-            ``None`` where the map tells no difference.
+        unknown: Which of the occupied cells only count as such, since nothing is known of them; for display.
+            ``None`` where the map makes no difference.
     """
 
     occupied: BoolArray
@@ -155,7 +155,7 @@ def _merged_runs(occupied: BoolArray, most: int) -> IntArray:
 class DistanceField:
     """How far it is from places all over a grid to the nearest occupied cell, or to the grid's rim.
 
-    The places are the corners, the middles of the sides and the centres of all cells: a lattice of half cells. From
+    The places are the corners, the midpoints of the sides and the centres of all cells: a lattice of half cells. From
     there the nearest point of a square cell is one of the lattice too, so the distances are exact; and between two
     neighbours on the lattice nothing is nearer than at the nearer of the two.
 
@@ -240,7 +240,7 @@ def _squared_distances(occupied: BoolArray) -> NDArray[np.float32]:
 def connected_region(field: DistanceField, point: FloatArray, radius_m: float) -> BoolArray:
     """Places of the lattice that a robot surely reaches from a point, as ``DistanceField.distance_m``; shape (2,) in.
 
-    A way through passages less than a cell wider than the robot may be missed; none is found that is not there.
+    A path through passages less than a cell wider than the robot may be overlooked; none is found that doesn't exist.
     """
     row, column = field.index_of(np.asarray(point, dtype=np.float64)[None])[0].tolist()
     # float32 rounds by 1e-7 of the distance; so much closer than the radius is not close.

@@ -47,7 +47,7 @@ def segment_box(
     Args:
         ax, ay, bx, by: Ends of the segment [m].
         cx, cy, hx, hy, c, s: Centre, half length, half width [m], cosine and sine of the yaw.
-        far: Distance beyond which nobody asks.
+        far: Distance beyond which none is needed.
     """
     # Circles about both say quickly that most boxes are far away.
     mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay)

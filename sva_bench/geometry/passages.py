@@ -49,7 +49,7 @@ def _lattice(obstacles: Obstacles, points: FloatArray) -> tuple[FloatArray, IntA
         step = max(_FINEST_M, math.sqrt(float(np.prod(size)) / _PLACES))
         x, y = (low[axis] + np.arange(math.floor(size[axis] / step) + 1) * step for axis in (0, 1))
         places = np.stack(np.meshgrid(x, y), axis=-1)
-        # Half way to a neighbour it may be nearer by half a step.
+        # Halfway to a neighbour it may be nearer by half a step.
         distance = clearances(obstacles, places.reshape(-1, 2)).reshape(places.shape[:2]) - step / 2
         steps = (points - low)[:, ::-1] / step
     corner = np.floor(steps).astype(np.int64)

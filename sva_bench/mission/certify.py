@@ -9,7 +9,7 @@ import itertools
 from dataclasses import dataclass, replace
 from typing import Any
 
-from sva_bench.mission.failures import route_value
+from sva_bench.mission.failures import Reliability, RouteProfile, process_of
 from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 from sva_bench.mission.plan import Plan, Route
 
@@ -57,11 +57,12 @@ def certify(instance: Instance, plan: Plan) -> Certificate:
     visited: dict[str, str] = {}
     fuel, duration = {}, {}
     expected = nominal = 0.0
+    process = process_of(instance.failure)
     for vehicle in instance.vehicles:
         route = plan.route(vehicle.name)
         fuel[vehicle.name], duration[vehicle.name] = _drive(instance, vehicle, route, reasons)
-        earned = []
-        for name in route:
+        earned, arrival, driven = [], [], _driving_times(instance, vehicle, route)
+        for number, name in enumerate(route):
             site = instance.sites.index(name)
             if site == instance.base or site in instance.stations:
                 continue
@@ -72,7 +73,10 @@ def certify(instance: Instance, plan: Plan) -> Certificate:
                 reasons += [twice] if twice not in reasons else []
             visited[name] = vehicle.name
             earned.append(float(vehicle.incentives[site]))
-        expected += route_value(earned, vehicle.availability, instance.failure)
+            arrival.append(driven[number])
+        expected += process.route_value(
+            RouteProfile(incentives=tuple(earned), arrival_s=tuple(arrival), home_s=driven[-1] if driven else 0.0),
+            Reliability(availability=vehicle.availability, mission_limit_s=vehicle.mission_limit_s))
         nominal += sum(earned)
     if reasons:
         return Certificate(feasible=False, expected=None, nominal=None, fuel_s=fuel, duration_s=duration,
@@ -115,6 +119,13 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
     return fuel, duration
 
 
+def _driving_times(instance: Instance, vehicle: Vehicle, route: Route) -> list[float]:
+    """Driving time until each stop of a route [s]; stops themselves take none of it."""
+    sites = [instance.sites.index(name) for name in route]
+    legs = (float(vehicle.fuel_s[i, j]) for i, j in itertools.pairwise(sites))
+    return list(itertools.accumulate(legs, initial=0.0)) if route else []
+
+
 def _wrong_claims(plan: Plan, expected: float, nominal: float, fuel: dict[str, float]) -> list[str]:
     claims = []
     worth = nominal if plan.objective == "deterministic" else expected
@@ -124,7 +135,6 @@ def _wrong_claims(plan: Plan, expected: float, nominal: float, fuel: dict[str, f
     claims += [f"{name}: the plan claims {claimed:.3f} s of fuel; it burns {fuel[name]:.3f} s"
                for name, claimed in plan.fuel_s.items() if name in fuel and abs(claimed - fuel[name]) > TOLERANCE_S]
     return claims
-
 
 
 def expected_value(instance: Instance, plan: Plan) -> float:

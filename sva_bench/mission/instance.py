@@ -22,7 +22,7 @@ class Vehicle:
         mission_limit_s: Longest mission, driving and stops [s]; ``inf`` = no limit.
         availability: Probability that it is available, or that it survives each leg (``per_leg``).
         incentives: What it earns at each site, shape (n,); 0 at base and stations.
-        fuel_s: Fuel of the leg from site i to site j [s of driving], shape (n, n), zero diagonal; ``inf`` = no way.
+        fuel_s: Fuel of the leg from site i to site j [s of driving], shape (n, n), zero diagonal; ``inf`` = no leg.
     """
 
     name: str

@@ -17,7 +17,7 @@ from sva_bench.files.documents import Document, read_json, validate
 from sva_bench.files.fields import Bounded, Name, Probability, Section
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.printable import counted
-from sva_bench.mission.failures import JointState, marginals
+from sva_bench.mission.failures import JointState, marginals, without_joint
 from sva_bench.mission.instance import Instance, Vehicle
 
 KIND = "sva-bench/instance@1"
@@ -64,8 +64,8 @@ def read_instance(path: Path) -> Instance:
     _refuse_too_large(path, document.data)
     file = validate(document, _InstanceFile, KIND)
     sites = tuple(file.sites)
-    _refuse_twice(document, ("sites",), sites)
-    _refuse_twice(document, ("stations",), file.stations)
+    _refuse_duplicates(document, ("sites",), sites)
+    _refuse_duplicates(document, ("stations",), file.stations)
     for loc, name in ((("base",), file.base), *((("stations", k), name) for k, name in enumerate(file.stations))):
         if name not in sites:
             raise document.error(loc, f"{name!r} is not among the sites; {nearest(name, list(sites))}")
@@ -75,8 +75,11 @@ def read_instance(path: Path) -> Instance:
         raise document.error(("stop_s",), f"expected {counted(len(sites), 'entry', 'entries')}, one for each site, "
                              f"found {len(file.stop_s)}")
     common = None if file.fuel_s is None else _matrix(document, ("fuel_s",), file.fuel_s, len(sites))
-    _refuse_twice(document, ("vehicles",), [v.name for v in file.vehicles])
+    _refuse_duplicates(document, ("vehicles",), [v.name for v in file.vehicles])
     joint = _joint(document, file)
+    if joint is not None and (other := without_joint([file.failure])):
+        raise document.error(("joint_availability",), f"under {other} vehicles fail independently; leave it out, or "
+                             "choose another failure process")
     vehicles = tuple(_vehicle(document, k, v, file, common, joint) for k, v in enumerate(file.vehicles))
     return Instance(
         name=file.name, sites=sites, base=sites.index(file.base), stations=tuple(sites.index(r) for r in file.stations),
@@ -174,11 +177,11 @@ def _joint(document: Document, file: _InstanceFile) -> tuple[JointState, ...] | 
         JointState(probability=s.probability, available=frozenset(s.available)) for s in file.joint_availability)
 
 
-def _refuse_twice(document: Document, loc: tuple[str | int, ...], names: Sequence[str]) -> None:
+def _refuse_duplicates(document: Document, loc: tuple[str | int, ...], names: Sequence[str]) -> None:
     seen: set[str] = set()
     for k, name in enumerate(names):
         if name in seen:
-            raise document.error((*loc, k), f"{name!r} stands twice; names must differ")
+            raise document.error((*loc, k), f"{name!r} is a duplicate; names must differ")
         seen.add(name)
 
 

@@ -15,13 +15,12 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import get_args
 
-from sva_bench.choices import Status
+from sva_bench.choices import Method, Status
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.printable import counted
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import SolveLimits, plan_stochastic
 
 VEHICLES = 2

@@ -11,6 +11,7 @@ from urllib.parse import quote
 import numpy as np
 
 from sva_bench.analysis.reach import infeasible, lost_robots, nothing_reached
+from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
@@ -30,7 +31,6 @@ from sva_bench.report.wording import (
 from sva_bench.storage.stored_run import Content
 from sva_bench.world.model import World
 
-_ENDS = ("home", "failed", "out_of_fuel", "late", "stuck")
 _WORST_LEGS = 10
 
 Scenarios = Sequence[Mapping[str, Any]]
@@ -166,10 +166,10 @@ def _ends(scenarios: Scenarios) -> list[str]:
         for name, plan in s["plans"].items():
             for robot, shares in plan["end_shares"].items():
                 cells = [{"mean": 100 * shares[end]["share"], "ci95": shares[end]["ci95"] and
-                          [100 * x for x in shares[end]["ci95"]]} if end in shares else None for end in _ENDS]
+                          [100 * x for x in shares[end]["ci95"]]} if end in shares else None for end in ENDS]
                 rows.append([s["name"], name, robot, *("" if c is None else with_interval(c) for c in cells)])
     return [heading("How the robots ended"), table(
-        ["scenario", "plan", "robot", *(f"{end.replace('_', ' ')} [%]" for end in _ENDS)], rows, words=(0, 1, 2)),
+        ["scenario", "plan", "robot", *(f"{end.replace('_', ' ')} [%]" for end in ENDS)], rows, words=(0, 1, 2)),
         note("Failed: by draw. Out of fuel, late (home past its limit) and stuck: by what physics made of the plan. "
              "Where all trials ended alike, the interval says how often another end could still come up.")]
 

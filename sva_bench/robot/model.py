@@ -13,7 +13,7 @@ LOOKAHEAD_M = 0.25
 """How far ahead on its path a robot looks; shorter oscillates, longer cuts corners by more than the planning margin."""
 
 _STEERING = 0.3  # least turn acceleration x (time over the lookahead)^2 [rad]: with less it sways about its path
-_BRAKING_LOOKAHEADS = 2.0  # way in which a robot must come to rest, in lookaheads: a bend may come up only there
+_BRAKING_LOOKAHEADS = 2.0  # distance in which a robot must come to rest, in lookaheads: a bend may come up only there
 _GRAVITY_M_S2 = 9.81
 _GRIP = 0.5  # share of the wheels' grip that the accelerations may ask for: speeds change by jerks, twice as fast
 CASTERS_AT = 0.75

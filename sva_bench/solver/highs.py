@@ -15,11 +15,11 @@ from sva_bench.interrupts import deferring_ctrl_c, heard_ctrl_c, pressed
 from sva_bench.solver.program import LinearModel, Rows
 
 _LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
-_LOOK_S = 0.1  # between two looks whether Ctrl-C was pressed
+_POLL_S = 0.1  # between two polls for Ctrl-C
 
 SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
 INTEGRALITY = 1e-9
-"""How far from an integer a column may be, and a row from its side: legs last 20 s, and fuel must hold to 1e-6 s."""
+"""How far from an integer a column may be, and a row from its bounds: legs last 20 s, and fuel must hold to 1e-6 s."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -51,7 +51,7 @@ class Relaxed:
         objective: Its objective; ``-inf`` if there is none, ``inf`` if it was not reached.
         reduced: Reduced cost of each column; positive ones would gain, shape (columns,).
         activity: Value of each row, shape (rows,).
-        duals: Gain by each unit of a row's side, shape (rows,).
+        duals: Gain by each unit of a row's bound, shape (rows,).
     """
 
     status: SolveStatus
@@ -75,8 +75,8 @@ class Relaxation:
         _check(self._solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1],
                                     rows.column, rows.value), "addRows")
 
-    def set_sides(self, lower: FloatArray, upper: FloatArray) -> None:
-        """Change the sides of all rows."""
+    def set_row_bounds(self, lower: FloatArray, upper: FloatArray) -> None:
+        """Change the bounds of all rows."""
         count = len(lower)
         _check(self._solver.changeRowsBounds(count, np.arange(count, dtype=np.int32), lower, upper), "changeRowsBounds")
 
@@ -109,8 +109,8 @@ class Relaxation:
             activity=np.array(solution.row_value), duals=np.array(solution.row_dual))
 
 
-    def solve_whole(self, columns: IntArray, time_limit_s: float) -> Outcome:
-        """The optimum over whole values of some columns, proved but for rounding; the relaxation is lost."""
+    def solve_integer(self, columns: IntArray, time_limit_s: float) -> Outcome:
+        """The optimum over integer values of some columns, proved but for rounding; the relaxation is lost."""
         _set_whole(self._solver, columns)
         return _branch_and_bound(self._solver, gap=0.0, absolute_gap=1e-6, time_limit_s=time_limit_s, most_nodes=None,
                                  heuristics=0.05, whole=len(columns) > 0)
@@ -130,7 +130,7 @@ def maximise(
         time_limit_s: Wall-clock limit [s]; ``inf`` = none.
         start: A feasible point to begin with, shape (columns,).
         most_nodes: Branch-and-bound nodes after which it stops; ``None`` = no limit.
-        heuristics: Share of its time that HiGHS may look for better points.
+        heuristics: Share of its time that HiGHS may spend on finding better points.
     """
     solver = _open(model)
     if len(rows.lower):
@@ -231,7 +231,7 @@ def _run_interruptibly(solver: Any) -> bool:
     thread = Thread(target=run, daemon=True)
     thread.start()
     interrupted = False
-    while not over.wait(_LOOK_S):
+    while not over.wait(_POLL_S):
         if pressed():
             heard_ctrl_c()
             interrupted = True

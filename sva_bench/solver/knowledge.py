@@ -13,16 +13,16 @@ from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.choices import Status
 from sva_bench.interrupts import hear_ctrl_c
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.flow.cuts import Cut
-from sva_bench.solver.program import Goal
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.routes.fronts import Tables, tables_of
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.heuristic import value_of as rewards
 from sva_bench.solver.routes.refuelling import Road, quickest, road_of
 from sva_bench.solver.units import common_unit
 
 Routes = tuple[tuple[int, ...], ...]
 """Sites of each vehicle's route, from base to base; empty for one that stays home."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SolveLimits:
@@ -67,6 +67,21 @@ class Clock:
         return time.monotonic() >= self.deadline
 
 
+@dataclass(frozen=True, kw_only=True, order=True)
+class Cut:
+    """A connectivity cut of one vehicle: what it drives out of the sites S is no less than what it drives into i.
+
+    Attributes:
+        vehicle: Number of the vehicle.
+        inside: The sites of S, without the base, in order.
+        poi: The POI i in S.
+    """
+
+    vehicle: int
+    inside: tuple[int, ...]
+    poi: int
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
     """What a solve came to.
@@ -86,7 +101,7 @@ class Solution:
     """
 
     routes: Routes
-    orders: Orders
+    orders: VisitOrders
     value: float
     bound: float
     status: Status
@@ -115,7 +130,7 @@ class Knowledge:
     roads: tuple[Road, ...]
     tables: Tables
     cuts: dict[Cut, None] = field(default_factory=dict)
-    orders: dict[Orders, None] = field(default_factory=dict)
+    orders: dict[VisitOrders, None] = field(default_factory=dict)
     solutions: dict[tuple[object, ...], Solution] = field(default_factory=dict)
 
     def check(self, instance: Instance) -> None:
@@ -146,7 +161,7 @@ def knowledge_of(instance: Instance) -> Knowledge:
 class Progress:
     """The state of a solve, kept where Ctrl-C can't lose it."""
 
-    orders: Orders
+    orders: VisitOrders
     value: float
     bound: float
     status: Status = "feasible"
@@ -176,10 +191,10 @@ class Progress:
                    self.rounding / 2)
 
 
-def best_known(goal: Goal, known: Knowledge) -> Orders | None:
+def best_known(goal: Goal, known: Knowledge) -> VisitOrders | None:
     """The best of the known plans under a goal, without stops that earn nothing; ``None`` if none keeps the floors."""
     rewarded = goal.rewarded()
-    nobody: Orders = tuple(() for _ in known.roads)
+    nobody: VisitOrders = tuple(() for _ in known.roads)
     candidates = [
         tuple(without_idle_stops(road, order, rewarded[m])
               for m, (road, order) in enumerate(zip(known.roads, orders, strict=True)))
@@ -189,7 +204,7 @@ def best_known(goal: Goal, known: Knowledge) -> Orders | None:
 
 
 def without_idle_stops(road: Road, order: tuple[int, ...], rewarded: BoolArray) -> tuple[int, ...]:
-    """The order without POIs that count for nothing, but for those that the rest can't be driven without."""
+    """The order without POIs without reward, but for those that the rest can't be driven without."""
     if not any(rewarded[j] for j in order):
         return ()
     for poi in order:
@@ -199,18 +214,18 @@ def without_idle_stops(road: Road, order: tuple[int, ...], rewarded: BoolArray) 
     return order
 
 
-def _keeps_floors(goal: Goal, orders: Orders) -> bool:
+def _keeps_floors(goal: Goal, orders: VisitOrders) -> bool:
     return goal.risk is not None or all(_sum(weights, orders) >= floor for weights, floor in goal.floors)
 
 
-def adopt(progress: Progress, goal: Goal, known: Knowledge, orders: Orders) -> None:
+def adopt(progress: Progress, goal: Goal, known: Knowledge, orders: VisitOrders) -> None:
     """Make a plan the incumbent if it is better."""
     value = value_of(goal, known.roads, orders)
     if value > progress.value and _keeps_floors(goal, orders):
         progress.orders, progress.value = orders, value
 
 
-def value_of(goal: Goal, roads: Sequence[Road], orders: Orders) -> float:
+def value_of(goal: Goal, roads: Sequence[Road], orders: VisitOrders) -> float:
     """Value of a feasible plan under a goal."""
     value = rewards(goal.weights, goal.chances(), orders)
     if goal.risk is not None:
@@ -226,7 +241,7 @@ def value_of(goal: Goal, roads: Sequence[Road], orders: Orders) -> float:
     return value
 
 
-def _sum(weights: FloatArray, orders: Orders) -> float:
+def _sum(weights: FloatArray, orders: VisitOrders) -> float:
     return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
 
 

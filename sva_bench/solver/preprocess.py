@@ -16,7 +16,8 @@ from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 
 _log = logging.getLogger(__name__)
 
-
+SLACK_S = TOLERANCE_S / 2
+"""Half the feasibility tolerance: a route that is on its limit but for rounding stays feasible."""
 _ROUNDING_S = 1e-9  # of sums of legs
 
 
@@ -30,7 +31,7 @@ class Scope:
         time_s: Driving time of a leg and the stop at its end [s], shape (n, n).
         since_refuel_s: Least fuel burnt since the last refuel on arrival at a site [s], ``s_i``, shape (n,).
         to_refuel_s: Least fuel from a site to the next refuel or the base [s], ``t_i``, shape (n,).
-        since_start_s: Least time of a way to a site, the stop there included [s], shape (n,).
+        since_start_s: Least time of a path to a site, the stop there included [s], shape (n,).
         to_end_s: Least time from a site to the end [s], shape (n,).
         capacity_s: Fuel capacity [s]; ``inf`` where fuel can't bind.
         limit_s: Mission limit [s]; ``inf`` = none.

@@ -100,8 +100,8 @@ class Risk:
         return self.measure.weight * share[:, None] * earned
 
     def floors(self) -> tuple[tuple[FloatArray, float], ...]:
-        """Weights and right side of each outcome's row."""
-        return tuple((there[:, None] * self.outcomes.incentives, self.side) for there in self.outcomes.available)
+        """Weights and right-hand side of each outcome's row."""
+        return tuple((there[:, None] * self.outcomes.incentives, self.rhs) for there in self.outcomes.available)
 
     def of(self, sums: FloatArray) -> float:
         """Value of the measure, without its weight, for sums of incentives by vehicle, shape (M,)."""
@@ -117,8 +117,8 @@ class Risk:
         return float(share @ paid[order]) / tail
 
     @property
-    def side(self) -> float:
-        """Right side of an outcome's row: ``sum_m alpha_m Pi_m + u >= target``, or ``... + u - eta >= 0``."""
+    def rhs(self) -> float:
+        """Right-hand side of an outcome's row: ``sum_m alpha_m Pi_m + u >= target``, or ``... + u - eta >= 0``."""
         return self.measure.target if self.measure.kind == "excess" else 0.0
 
     def costs(self) -> tuple[FloatArray, FloatArray]:

@@ -7,25 +7,28 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.choices import Cuts, PlanObjective, Status
+from sva_bench.choices import Cuts, Method, PlanObjective, Status
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
+from sva_bench.mission.failures import MODEL, PlanningTerms, Reliability, process_of
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver.flow.recourse import refuse_free_legs, refuse_seldom_available
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of, value_of
+from sva_bench.solver.methods import keeps_second_stage, serves_discounts
 from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
-from sva_bench.solver.program import Goal
 from sva_bench.solver.risk import Risk, RiskMeasure
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.heuristic import value_of as rewards
 from sva_bench.solver.routes.refuelling import quickest
-from sva_bench.solver.solve import TWO_STAGE, Method, solve
+from sva_bench.solver.solve import solve
 from sva_bench.solver.units import in_own_units, in_unit
 
 __all__ = [
@@ -48,7 +51,7 @@ MOST_SUBSETS = 16
 """Subsets of uncertain vehicles up to which the value of perfect information is worked out unasked."""
 _FLOOR = 1e-8  # relative; keeps a known optimum feasible when its value becomes a constraint
 _ROUNDING = 1e-12  # relative; of sums of incentives, and of availabilities that are the same
-_STATUSES: tuple[Status, ...] = ("optimal", "feasible", "time_limit", "interrupted")  # best first
+_STATUSES: tuple[Status, ...] = get_args(Status)  # best first
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,10 +90,13 @@ def plan_stochastic(
     Raises:
         BadInput: If the incumbent is infeasible, or the method doesn't serve the instance.
     """
-    if instance.failure == "per_leg" and method != "auto":
-        raise BadInput(f"instance {instance.name}: {method} plans under mission, the instance fails per leg; take the "
-                       "method auto, or set its failure to mission")
-    return _plan(instance, "stochastic", _availability(instance), limits, incumbent, known, method, cuts)
+    process = process_of(instance.failure)
+    if not process.collapses and not serves_discounts(method):
+        raise BadInput(f"instance {instance.name}: {method} plans under {MODEL}, the instance fails {process.how}; "
+                       f"take the method auto, or set its failure to {MODEL}")
+    terms = process.terms([Reliability(availability=v.availability, mission_limit_s=v.mission_limit_s)
+                           for v in instance.vehicles])
+    return _plan(instance, "stochastic", terms, limits, incumbent, known, method, cuts)
 
 
 def plan_averse(
@@ -101,9 +107,10 @@ def plan_averse(
     Raises:
         BadInput: If the instance fails per leg, or too many outcomes are possible.
     """
-    if instance.failure == "per_leg":
-        raise BadInput(f"instance {instance.name}: measures of risk are over the outcomes of mission, the instance "
-                       "fails per leg; set its failure to mission")
+    process = process_of(instance.failure)
+    if not process.collapses:
+        raise BadInput(f"instance {instance.name}: measures of risk are over the outcomes of {MODEL}, the instance "
+                       f"fails {process.how}; set its failure to {MODEL}")
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
     known.check(instance)
@@ -136,8 +143,8 @@ def plan_nominal(
 
     It depends on no availability, so all scenarios can share it.
     """
-    return _plan(replace(instance, failure="mission"), "deterministic", np.ones(len(instance.vehicles)), limits,
-                 incumbent, known, method, cuts)
+    terms = PlanningTerms(share=np.ones(len(instance.vehicles)))
+    return _plan(replace(instance, failure=MODEL), "deterministic", terms, limits, incumbent, known, method, cuts)
 
 
 def plan_deterministic(
@@ -158,7 +165,7 @@ def plan_deterministic(
     Source:
         ``docs/model.md``, section "Ties".
     """
-    instance = replace(instance, failure="mission")
+    instance = replace(instance, failure=MODEL)
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
     known.check(instance)
@@ -172,7 +179,7 @@ def plan_deterministic(
     nominal_orders, stochastic_orders = (_orders(instance, plan, known) for plan in (nominal, stochastic))
     known.orders.update(dict.fromkeys((nominal_orders, stochastic_orders)))
     ties = _Ties(in_own_units(instance)[0], nominal_orders, known, clock, limits.gap,
-                 "auto" if method in TWO_STAGE else method)
+                 "auto" if keeps_second_stage(method) else method)
     most, least, soonest = ties.solutions(nominal.status == "interrupted")
     best = soonest or most
     orders = best.orders if best else nominal_orders
@@ -231,7 +238,7 @@ def wait_and_see(
 
 
 def _plan(
-    instance: Instance, objective: PlanObjective, availability: FloatArray, limits: SolveLimits | None,
+    instance: Instance, objective: PlanObjective, terms: PlanningTerms, limits: SolveLimits | None,
     incumbent: Plan | None, known: Knowledge | None, method: Method, cuts: Cuts,
 ) -> Plan:
     limits = limits or SolveLimits()
@@ -245,13 +252,14 @@ def _plan(
             raise BadInput(f"instance {instance.name}: the plan to start from is infeasible: {reasons[0]}")
         known.orders[_orders(instance, incumbent, known)] = None
     own, unit = in_own_units(instance)
-    if instance.failure == "per_leg":
-        solution = solve(own, Goal(weights=_incentives(own), survival=availability), known, clock, limits.gap)
-        value = rewards(_incentives(instance), availability, solution.orders)
+    if terms.survival is not None:
+        goal = Goal(weights=_incentives(own) * terms.share[:, None], survival=terms.survival)
+        solution = solve(own, goal, known, clock, limits.gap, method)
+        value = rewards(_incentives(instance) * terms.share[:, None], terms.survival, solution.orders)
     else:
-        solution = _greatest(own, availability, known, clock, limits.gap, method, cuts)
-        value = _sum(_incentives(instance) * availability[:, None], solution.orders)
-        unit *= float(availability.max(initial=0.0))
+        solution = _greatest(own, terms.share, known, clock, limits.gap, method, cuts)
+        value = _sum(_incentives(instance) * terms.share[:, None], solution.orders)
+        unit *= float(terms.share.max(initial=0.0))
     return _finish(instance, objective, solution.orders, known, value=value,
                    bound=value + unit * (solution.bound - solution.value), status=solution.status,
                    solutions=[solution], runtime_s=clock.used_s())
@@ -265,7 +273,7 @@ def _greatest(
     scale = float(availability.max(initial=0.0))
     shares = availability / scale if scale > 0 else availability
     goal = Goal(weights=_incentives(instance) * shares[:, None])
-    if method in TWO_STAGE:
+    if keeps_second_stage(method):
         certain = bool((availability == 1).all())
         sets = {frozenset(v.name for v in instance.vehicles): 1.0} if certain else possible(instance)
         refuse_free_legs(instance)
@@ -296,7 +304,7 @@ class _Ties:
     one and the same tie in all scenarios.
     """
 
-    def __init__(self, instance: Instance, nominal: Orders, known: Knowledge, clock: Clock, gap: float,
+    def __init__(self, instance: Instance, nominal: VisitOrders, known: Knowledge, clock: Clock, gap: float,
                  method: Method) -> None:
         self._instance, self._known, self._clock, self._gap = instance, known, clock, gap
         self._method: Method = method
@@ -331,7 +339,7 @@ class _Ties:
 
 
 def _finish(
-    instance: Instance, objective: PlanObjective, orders: Orders, known: Knowledge, *, value: float, bound: float,
+    instance: Instance, objective: PlanObjective, orders: VisitOrders, known: Knowledge, *, value: float, bound: float,
     status: Status, solutions: Sequence[Solution], runtime_s: float,
 ) -> Plan:
     routes, fuel = {}, {}
@@ -363,7 +371,7 @@ def _certified(instance: Instance, plan: Plan) -> Plan:
     return plan
 
 
-def _orders(instance: Instance, plan: Plan, known: Knowledge) -> Orders:
+def _orders(instance: Instance, plan: Plan, known: Knowledge) -> VisitOrders:
     """The POIs of a feasible plan's routes."""
     pois = set(instance.pois)
     orders = tuple(tuple(j for j in map(instance.sites.index, plan.route(v.name)) if j in pois)
@@ -382,11 +390,11 @@ def _availability(instance: Instance) -> FloatArray:
     return np.array([v.availability for v in instance.vehicles], dtype=np.float64)
 
 
-def _sum(weights: FloatArray, orders: Orders) -> float:
+def _sum(weights: FloatArray, orders: VisitOrders) -> float:
     return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
 
 
-def _expected(instance: Instance, orders: Orders) -> float:
+def _expected(instance: Instance, orders: VisitOrders) -> float:
     return _sum(_incentives(instance) * _availability(instance)[:, None], orders)
 
 

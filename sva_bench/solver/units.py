@@ -24,7 +24,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.program import Goal
+from sva_bench.solver.goal import Goal
 
 LARGEST = 128.0
 """Least power of two above the largest incentive."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from sva_bench.choices import End, FailureProcess, Fidelity, Status
+from sva_bench.choices import End, FailureProcess, Fidelity, Objective, Status
 from sva_bench.files.fields import Name, Probability, Section, WholeNumber
 from sva_bench.files.printable import is_name
 from sva_bench.seeds import MOST_SEED
@@ -282,7 +282,7 @@ class ScenarioFacts(Section):
 
     name: Name
     availability: Annotated[dict[Name, Probability], Field(min_length=1)]
-    plans: dict[Literal["stochastic", "deterministic"], Promise]
+    plans: dict[Objective, Promise]
     modelled_range: Interval | None
     same_plan: bool = False
     vss_mean_value: Figure | None

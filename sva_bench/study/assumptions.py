@@ -12,12 +12,11 @@ from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import FailureProcess
 from sva_bench.execution.execute import Case, Drives, Settings, execute
 from sva_bench.mission.certify import expected_value
+from sva_bench.mission.failures import PROCESSES
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
-
-PROCESSES: tuple[FailureProcess, ...] = ("mission", "per_leg")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,7 +38,7 @@ def cross_table(
     world: World, costs: Mapping[str, FuelCosts], plans: Mapping[str, PlansByProcess], settings: Settings,
     executor: Executor | None, drives: Drives,
 ) -> dict[str, list[dict[str, Any]]]:
-    """Every plan executed under both failure processes, the same trials for all; rows by scenario.
+    """Every plan executed under every failure process, the same trials for all; rows by scenario.
 
     The loss of a plan is what the plan for the failures executed collects beyond it, trial by trial.
     """

@@ -10,6 +10,7 @@ import numpy as np
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Executed
+from sva_bench.mission.failures import MODEL
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.solver.outcomes import possible
@@ -59,7 +60,7 @@ def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, 
                        f"for each; beyond {MOST_SUBSETS} it has to be told so with --evpi")
     plans = {}
     for available in sets:
-        sure = replace(instance, joint=None, failure="mission", vehicles=tuple(
+        sure = replace(instance, joint=None, failure=MODEL, vehicles=tuple(
             replace(v, availability=1.0 if v.name in available else 0.0) for v in instance.vehicles))
         plans[available] = unless_interrupted(plan_stochastic(sure, limits, known=known))
     return InformedPlans(plans=plans, expected=sum(sets[s] * (plan.value or 0.0) for s, plan in plans.items()),

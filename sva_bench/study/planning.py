@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify, expected_value
+from sva_bench.mission.failures import MODEL, PROCESSES
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.solver.two_stage import (
@@ -44,10 +46,10 @@ class Planned:
         worst: The deterministic plan that ties and has that greatest VSS; ``None`` where no tie makes a difference.
         ws: Expected value of knowing beforehand who is available, under ``mission``; ``None`` if it wasn't worked out.
         evpi: What that is worth beyond the stochastic plan.
-        value_of_process: Greatest value under failures along the route less that of the plan for ``mission``; ``None``
-            where such failures are neither planned for nor executed.
+        value_of_process: Greatest value under another failure process, the one executed if it is another, less that of
+            the plan for ``mission``; ``None`` where no other is planned for or executed.
         informed: What somebody would plan who knew beforehand who is available, on request.
-        by_process: The plans for both failure processes, where they are known.
+        by_process: The plans for each failure process, where they are known.
     """
 
     instance: Instance
@@ -83,7 +85,7 @@ def plan_scenarios(
     planned: dict[str, Planned] = {}
     for number, scenario in enumerate(world.scenarios):
         progress("solving", number, len(world.scenarios))
-        instance = replace(instance_of(world, costs, scenario), failure="mission")
+        instance = replace(instance_of(world, costs, scenario), failure=MODEL)
         if known is None or nominal is None:
             known = knowledge_of(instance)
             nominal = unless_interrupted(plan_nominal(instance, options.limits, known=known))
@@ -93,14 +95,15 @@ def plan_scenarios(
         rp = expected_value(instance, pair.stochastic)
         foresight = wait_and_see(instance, options.limits, known, force=options.evpi)
         process = by_process = None
-        if options.assumptions or "per_leg" in (world.plan_failure, world.execute_failure):
-            along = replace(instance, failure="per_leg")
-            best = unless_interrupted(plan_stochastic(along, options.limits, pair.stochastic, known))
+        others = _other_processes(world, options)
+        if others:
+            best = {name: unless_interrupted(plan_stochastic(
+                replace(instance, failure=name), options.limits, pair.stochastic, known)) for name in others}
             by_process = PlansByProcess(instance=instance, deterministic=pair.plan,
-                                        stochastic={"mission": pair.stochastic, "per_leg": best})
-            process = max(expected_value(along, best) - expected_value(along, pair.stochastic), 0.0)
-            if world.plan_failure == "per_leg":
-                pair = replace(pair, stochastic=best)
+                                        stochastic={MODEL: pair.stochastic, **best})
+            truth = replace(instance, failure=others[0])
+            process = max(expected_value(truth, best[others[0]]) - expected_value(truth, pair.stochastic), 0.0)
+            pair = replace(pair, stochastic=by_process.stochastic[world.plan_failure])
         planned[scenario.name] = Planned(
             instance=instance, stochastic=pair.stochastic, deterministic=pair.plan,
             vss_range=(rp - pair.most, rp - pair.least), worst=pair.worst,
@@ -110,6 +113,12 @@ def plan_scenarios(
             by_process=by_process)
         progress("solving", number + 1, len(world.scenarios))
     return planned
+
+
+def _other_processes(world: World, options: Options) -> list[FailureProcess]:
+    """Failure processes beside the model's that plans are made for, the one that is executed first."""
+    asked = [world.execute_failure, world.plan_failure, *(PROCESSES if options.assumptions else ())]
+    return [name for name in dict.fromkeys(asked) if name != MODEL]
 
 
 def check_plans(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from sva_bench.analysis.summary import Judged, ScenarioResult, scenario_summary
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.mission.certify import expected_value
+from sva_bench.mission.failures import MODEL
 from sva_bench.study.informed import INFORMED
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
@@ -22,7 +23,7 @@ WORST = "deterministic, worst of its ties"
 
 def model_is_executed(world: World) -> bool:
     """Whether failures are planned for and executed as in the two-stage model."""
-    return world.plan_failure == world.execute_failure == "mission"
+    return world.plan_failure == world.execute_failure == MODEL
 
 
 def summarise(

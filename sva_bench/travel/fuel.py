@@ -56,7 +56,7 @@ class FuelCosts:
 
     @property
     def changed_pct(self) -> float:
-        """Share of pairs whose direct leg was dearer than a chain [%]."""
+        """Share of pairs whose direct leg cost more than a chain [%]."""
         changed = int((self.repaired_ms < self.times.time_ms).sum())
         return 100.0 * changed / self.pairs if self.pairs else 0.0
 
@@ -72,7 +72,7 @@ def repair_metric(time_ms: IntArray) -> tuple[IntArray, IntArray]:
 
     A sampling planner's paths are good, not optimal, so a detour by way of k can beat the direct leg. This is the
     shortest-path closure: the largest matrix nowhere above ``time_ms`` that obeys the triangle inequality.
-    In whole milliseconds it holds exactly; rounded floats would still violate it by an ulp.
+    In integer milliseconds it holds exactly; rounded floats would still violate it by an ulp.
 
     Args:
         time_ms: Time from site i to site j [ms], positive off the diagonal, shape (n, n). Need not be symmetric.
@@ -91,7 +91,7 @@ def repair_metric(time_ms: IntArray) -> tuple[IntArray, IntArray]:
         raise ValueError("expected a square matrix of positive times")
     if n == 1:
         return np.zeros((1, 1), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)
-    # Doubles hold whole milliseconds exactly up to 285 000 years.
+    # Doubles hold integer milliseconds exactly up to 285 000 years.
     repaired = np.rint(floyd_warshall(time_ms.astype(np.float64))).astype(np.int64)
     via = np.tile(np.arange(n), (n, 1))
     for i, j in np.argwhere(repaired < time_ms):

@@ -1,7 +1,7 @@
 """Ways on the lattice of a map's half cells: what a roadmap is joined by where crowds of corners leave it in parts.
 
-The saddles of the distance to a map's corners and walls lie on that lattice, so hardly a passage is missed, however
-many corners there are; the ways are not the shortest, but are free.
+The saddles of the distance to a map's corners and walls lie on that lattice, so hardly a passage is left out, however
+many corners there are; the paths are not the shortest, but are free.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ _SURELY = 1 + 1e-6  # times the clearance, in single precision, is the clearance
 _AT_A_TIME = 1_000_000  # places that are looked at before Ctrl-C is listened to
 
 
-def lattice_ways(
+def lattice_paths(
     cells: Cells, checker: FloatArray, clearance_m: float, points: FloatArray, goals: Sequence[int],
 ) -> list[FloatArray | None]:
-    """A free way from the first point to each of some others, pulled straight where it goes easily.
+    """A free path from the first point to each of some others, pulled straight where it goes easily.
 
     Args:
         cells: The map.
@@ -35,7 +35,7 @@ def lattice_ways(
         goals: Indices of those to go to.
 
     Returns:
-        For each goal the way's vertices [m], shape (k, 2); ``None`` where none is found.
+        For each goal the path's vertices [m], shape (k, 2); ``None`` where none is found.
     """
     field = distance_field(cells)
     roomy = field.distance_m >= clearance_m * _SURELY
@@ -62,15 +62,15 @@ def lattice_ways(
     state = np.array([0, 1])  # places of the queue that are done, and all of them
     while state[0] < state[1]:
         _go_on(parts, links, came, queue, state, _AT_A_TIME)
-    ways: list[FloatArray | None] = []
+    paths: list[FloatArray | None] = []
     for goal, end in zip(goals, ends, strict=True):
         if end is None or came[end] < 0:
-            ways.append(None)
+            paths.append(None)
             continue
         index = np.column_stack(np.divmod(_chain(came, end)[::-1], parts.shape[1]))
-        way = np.concatenate([points[:1], field.places(index), points[goal:goal + 1]])
-        ways.append(_pulled(checker, np.ascontiguousarray(way)))
-    return ways
+        path = np.concatenate([points[:1], field.places(index), points[goal:goal + 1]])
+        paths.append(_pulled(checker, np.ascontiguousarray(path)))
+    return paths
 
 
 def _place_by(field: DistanceField, checker: FloatArray, roomy: NDArray[np.bool_], point: FloatArray) -> int | None:
@@ -177,24 +177,24 @@ def _chain(came: NDArray[np.int32], end: int) -> IntArray:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _pulled(checker: FloatArray, way: FloatArray) -> FloatArray:
-    """A way with fewer vertices: from each a line about as far along as it is free."""
+def _pulled(checker: FloatArray, path: FloatArray) -> FloatArray:
+    """A path with fewer vertices: from each a line about as far along as it is free."""
     kept = [0]
-    while kept[-1] < len(way) - 1:
+    while kept[-1] < len(path) - 1:
         here = kept[-1]
         good, step = here + 1, 2  # one step is free: the lattice says so
-        while here + step < len(way) and keeps_clear(
-                checker, way[here, 0], way[here, 1], way[here + step, 0], way[here + step, 1]):
+        while here + step < len(path) and keeps_clear(
+                checker, path[here, 0], path[here, 1], path[here + step, 0], path[here + step, 1]):
             good, step = here + step, 2 * step
-        bad = min(here + step, len(way))
+        bad = min(here + step, len(path))
         while bad - good > 1:
             middle = (good + bad) // 2
-            if keeps_clear(checker, way[here, 0], way[here, 1], way[middle, 0], way[middle, 1]):
+            if keeps_clear(checker, path[here, 0], path[here, 1], path[middle, 0], path[middle, 1]):
                 good = middle
             else:
                 bad = middle
         kept.append(good)
-    pulled: FloatArray = way[np.array(kept)]
+    pulled: FloatArray = path[np.array(kept)]
     return pulled
 
 

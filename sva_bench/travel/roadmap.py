@@ -8,7 +8,7 @@ Edges are checked exactly, without a resolution. The other planners search pair 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from sva_bench.geometry.buckets import clearance_checker, keeps_clear, keeps_cle
 from sva_bench.geometry.cells import Cells, distance_field
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c, pressed
-from sva_bench.travel.lattice import lattice_ways, open_parts
+from sva_bench.travel.lattice import lattice_paths, open_parts
 from sva_bench.travel.samples import arc_points, roadmap_samples
 from sva_bench.travel.tangents import nothing_known, tangents, tangents_of_own, taut
 
@@ -36,7 +36,7 @@ _GROWTH = ((1000, 6), (3000, 12), (6000, 24))
 The tangents between arcs make paths short, the milestones make sure of odd places: more of them shorten no path.
 """
 _CROWD = 10_000
-"""Points on arcs from which on the roadmap does not grow, but is joined by ways on the lattice of the map's cells.
+"""Points on arcs from which on the roadmap does not grow, but is joined by paths on the lattice of the map's cells.
 
 More points and milestones take seconds each time there, and join hardly more: the lattice finds every passage.
 """
@@ -44,6 +44,31 @@ _CELL_M, _CELLS = 0.02, 200_000  # finest cell, and most cells, of the grid that
 _EFFORTS = (1, 4, 16)  # by which a planner's samples and steps for one pair grow, until they join it or to the last
 _START_SLACK_M = 1e-9  # a start on the very boundary is free
 _WINDOW = 40  # vertices of a path that are cut off at a time: more than its arcs have between two tangents
+
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairPlanner:
+    """A planner that searches pair by pair.
+
+    Attributes:
+        search: Its class in OMPL.
+        calls: How often its termination condition is asked before it gives up a pair, at least effort.
+        samples: States that it samples beforehand, at least effort; 0 = as it goes.
+    """
+
+    search: Callable[[Any], Any]
+    calls: int
+    samples: int = 0
+
+
+PAIR_PLANNERS: Mapping[PathPlanner, PairPlanner] = {
+    "rrtconnect": PairPlanner(search=og.RRTConnect, calls=20_000),
+    "fmt": PairPlanner(search=og.FMT, calls=20_000, samples=1000),
+    "bfmt": PairPlanner(search=og.BFMT, calls=20_000, samples=1000),
+    "informedrrtstar": PairPlanner(search=og.InformedRRTstar, calls=1500),
+}
+"""The planners but for ``prmstar``, whose one roadmap serves all pairs."""
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)  # it warns that seeding is late; it is not, and the result is the same bit for bit
 
@@ -61,10 +86,10 @@ def plan_paths(
         seed: Seed of OMPL's random numbers.
 
     Returns:
-        ``paths[i][j]``: vertices [m], shape (k, 2); ``None`` if there is no way, or i = j.
+        ``paths[i][j]``: vertices [m], shape (k, 2); ``None`` if there is no path, or i = j.
     """
     ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
-    if planner != "prmstar":
+    if planner in PAIR_PLANNERS:
         return _pair_by_pair(obstacles, points, clearance_m, planner)
     if len(points) < 2:
         return [[None] for _ in points]
@@ -128,7 +153,7 @@ class _SampleQueue(ob.ValidStateSampler):  # type: ignore[misc]
         return self.sample(state)
 
 
-def surely_apart(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> BoolArray:
+def surely_disconnected(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> BoolArray:
     """Which points no path can join, however fine the roadmap, shape (n, n).
 
     By a lattice: each point of a path is near a place of it, which can't be much nearer to an obstacle than the path.
@@ -146,8 +171,8 @@ def surely_apart(obstacles: Obstacles, points: FloatArray, clearance_m: float) -
         at = np.clip(((points - low) / cell).astype(np.int64), 0, counts - 1)
         parts, _ = label(open_places, structure=np.ones((3, 3)))
         mine = parts[at[:, 0], at[:, 1]].astype(np.int64)
-    apart: BoolArray = mine[:, None] != mine[None, :]
-    return apart
+    disconnected: BoolArray = mine[:, None] != mine[None, :]
+    return disconnected
 
 
 def _space(obstacles: Obstacles, clearance_m: float) -> tuple[Any, Callable[[float, float, float, float], bool]]:
@@ -178,7 +203,7 @@ def _state(si: Any, point: Sequence[float] | FloatArray) -> Any:
 
 def _grown(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roadmap:
     """A roadmap that connects all points, or to the limit of its growth."""
-    apart: BoolArray | None = None
+    disconnected: BoolArray | None = None
     for milestones, per_corner in _GROWTH:
         roadmap = _roadmap(obstacles, points, clearance_m, milestones, per_corner)
         _, part = connected_components(roadmap.graph, directed=False)
@@ -188,9 +213,9 @@ def _grown(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roa
             break
         if obstacles.cells is not None and len(roadmap.arcs) > _CROWD:
             return _joined(roadmap, obstacles.cells, points, clearance_m, np.flatnonzero(missing[0]))
-        if apart is None:
-            apart = surely_apart(obstacles, points, clearance_m)
-        if apart[missing].all():
+        if disconnected is None:
+            disconnected = surely_disconnected(obstacles, points, clearance_m)
+        if disconnected[missing].all():
             break  # a denser roadmap would connect no more
     return roadmap
 
@@ -198,15 +223,16 @@ def _grown(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roa
 def _joined(
     roadmap: _Roadmap, cells: Cells, points: FloatArray, clearance_m: float, goals: IntArray
 ) -> _Roadmap:
-    """The same with ways on the lattice from the first point to some others, and lines from them to what they see."""
-    ways = [way for way in lattice_ways(cells, roadmap.checker, clearance_m, points, goals.tolist()) if way is not None]
-    if not ways:
+    """The same with paths on the lattice from the first point to some others, and lines from them to what they see."""
+    found = lattice_paths(cells, roadmap.checker, clearance_m, points, goals.tolist())
+    paths = [path for path in found if path is not None]
+    if not paths:
         return roadmap
-    along = np.concatenate(ways)
-    last = np.cumsum([len(way) for way in ways]) - 1
+    along = np.concatenate(paths)
+    last = np.cumsum([len(path) for path in paths]) - 1
     first = np.delete(np.arange(len(along)), last)  # of each edge
     vertices, graph = _with_edges(roadmap.vertices, roadmap.graph, along, np.column_stack([first, first + 1]))
-    inner = np.unique(np.concatenate([way[1:-1] for way in ways]), axis=0)
+    inner = np.unique(np.concatenate([path[1:-1] for path in paths]), axis=0)
     ends = np.concatenate([_alone(inner), roadmap.arcs])
     vertices, graph = _with_edges(vertices, graph, ends[:, :2], tangents_of_own(roadmap.checker, ends))
     return replace(roadmap, vertices=vertices, graph=graph)
@@ -285,7 +311,7 @@ def _with_edges(
     heads, tails = known[pairs].T
     old = graph.tocoo()
     rows, columns = np.concatenate([old.row, heads]), np.concatenate([old.col, tails])
-    # Each edge once: a sparse matrix adds up what stands twice.
+    # Each edge once: a sparse matrix adds up duplicates.
     low, high = np.minimum(rows, columns).astype(np.int64), np.maximum(rows, columns).astype(np.int64)
     numbers = np.sort(low * len(vertices) + high)
     low, high = np.divmod(numbers[np.diff(numbers, prepend=-1) > 0], len(vertices))
@@ -321,7 +347,7 @@ def _pair_by_pair(
     n = len(points)
     paths: list[list[FloatArray | None]] = [[None] * n for _ in range(n)]
     simplifier = og.PathSimplifier(si)
-    apart: BoolArray | None = None
+    disconnected: BoolArray | None = None
     for i in range(n):
         for j in range(n):
             if i == j:
@@ -330,9 +356,9 @@ def _pair_by_pair(
                 paths[i][j] = _query(si, simplifier, planner, effort, points[i], points[j])
                 if paths[i][j] is not None:
                     break
-                if apart is None:
-                    apart = surely_apart(obstacles, points, clearance_m)
-                if apart[i, j]:
+                if disconnected is None:
+                    disconnected = surely_disconnected(obstacles, points, clearance_m)
+                if disconnected[i, j]:
                     break
     return paths
 
@@ -342,17 +368,14 @@ def _query(
 ) -> FloatArray | None:
     problem = ob.ProblemDefinition(si)
     problem.setStartAndGoalStates(_state(si, start), _state(si, goal))
-    if planner == "informedrrtstar":
-        search, calls = og.InformedRRTstar(si), 1500 * effort
-    elif planner == "rrtconnect":
-        search, calls = og.RRTConnect(si), 20_000 * effort
-    else:
-        search, calls = og.FMT(si) if planner == "fmt" else og.BFMT(si), 20_000 * effort
-        search.setNumSamples(1000 * effort)
+    kind = PAIR_PLANNERS[planner]
+    search = kind.search(si)
+    if kind.samples:
+        search.setNumSamples(kind.samples * effort)
     search.setProblemDefinition(problem)
     search.setup()
     with deferring_ctrl_c():
-        search.solve(_after(calls))
+        search.solve(_after(kind.calls * effort))
     if not problem.hasExactSolution():  # solve() is true for an approximate one too, which ends short
         return None
     path = problem.getSolutionPath()

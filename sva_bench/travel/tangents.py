@@ -24,7 +24,7 @@ _MOST_PAIRS = 50_000_000  # of points spread evenly, that lie near enough to eac
 _MOST_WORK = 20_000_000  # solids and buckets that segments are held against: about half a second
 _AT_A_TIME = 5_000_000  # of them, before Ctrl-C is listened to
 _EDGE = 100  # what a tangent that is found costs, in this unit: as an edge of the roadmap, later
-_SEEN = 8  # points that are looked at, or squares, for the price of one solid
+_SEEN = 8  # points or squares that take as long to examine as one solid
 _FEW = 2000  # points whose tangents are looked for at once, whatever their length
 _LINES = 1 << 20  # that are remembered
 _RING = 1.4  # else those up to some length, then those up to so much more, and so on
@@ -176,7 +176,8 @@ def _tangents_of_arcs(
 ) -> tuple[IntArray, int, int]:
     """Free lines that touch the arcs at both ends.
 
-    Those from a point lie in two narrow cones; only the squares that a cone runs through are looked at.
+    Those from a point lie in two narrow cones; only the squares that a cone runs through are searched. One loop, for
+    compiled code that is called once a point would pass a dozen arrays each time.
 
     Args:
         checker, near, far, most: As above.
@@ -298,11 +299,11 @@ def taut(
         for step in range(count - 1, -1, -1):
             there = back[step]
             ax, ay, bx, by = vertices[there, 0], vertices[there, 1], vertices[here, 0], vertices[here, 1]
-            way = length[there] + math.hypot(bx - ax, by - ay)
-            if way < length[here]:
+            reach = length[there] + math.hypot(bx - ax, by - ay)
+            if reach < length[here]:
                 number = there * len(vertices) + here
                 if step == 0 or _is_free(checker, known, number, ax, ay, bx, by):
-                    length[here], via[here] = way, there
+                    length[here], via[here] = reach, there
     kept = [goal]
     while kept[-1] != start:
         kept.append(via[kept[-1]])

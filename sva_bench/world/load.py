@@ -16,11 +16,9 @@ from sva_bench.geometry.buckets import open_heading, view_checker
 from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.mission.failures import JointState, marginals
+from sva_bench.mission.failures import JointState, marginals, without_joint
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.maps.movingai import read_movingai_map
-from sva_bench.world.maps.ros import read_ros_map
 from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World
 from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
 from sva_bench.world.schema import (
@@ -73,8 +71,12 @@ def world_of(
     sites = _sites(document, file, obstacles, widest)
     plan, execute = (
         (file.failure, file.failure) if isinstance(file.failure, str) else (file.failure.plan, file.failure.execute))
+    scenarios = _scenarios(document, file)
+    if (other := without_joint([plan, execute])) and (correlated := [s.name for s in scenarios if s.joint is not None]):
+        raise document.error(("scenarios", correlated[0], "joint"), f"under {other} robots fail independently; give "
+                             "their availabilities, or choose another failure process")
     return World(
-        name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=_scenarios(document, file),
+        name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=scenarios,
         plan_failure=plan, execute_failure=execute, margin=file.margin,
         noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd), map_source=source,
     )
@@ -83,18 +85,13 @@ def world_of(
 def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSource | None]:
     if section.shapes is not None:
         return obstacles_of(section.shapes), None
-    kind = "movingai" if section.ros is None else "ros"
-    entry: dict[str, str | float]
+    found = section.source()
+    assert found is not None, "the schema lets nothing else in"
+    kind, source = found
     try:
-        if section.ros is not None:
-            entry = {"file": section.ros.file, "unknown": section.ros.unknown}
-            cells, files = read_ros_map(root, section.ros.file, section.ros.unknown)
-        else:
-            assert section.movingai is not None, "the schema lets nothing else in"
-            entry = {"file": section.movingai.file, "cell_m": section.movingai.cell_m}
-            cells, files = read_movingai_map(root, section.movingai.file, section.movingai.cell_m)
+        cells, files = source.read(root)
     except BadFile as error:
-        if error.path == entry["file"]:  # said of a name, not of a file: the world's to mend
+        if error.path == source.file:  # said of a name, not of a file: the world's to mend
             raise document.error(("map", kind, "file"), f"{error.path}: {error.problem}") from None
         raise
     try:
@@ -103,7 +100,7 @@ def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSo
         raise document.error(("map", kind, "file"), f"its occupied cells take more than the {MAX_BOXES} boxes that "
                              "physics holds; clean the map of speckles, or cut it") from None
     obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes, cylinders=np.empty((0, 3)), cells=cells)
-    return obstacles, MapSource(section={kind: entry}, files=files)
+    return obstacles, MapSource(section={kind: source.model_dump()}, files=files)
 
 
 def obstacles_of(shapes: Shapes) -> Obstacles:

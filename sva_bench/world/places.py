@@ -37,7 +37,7 @@ APART_M = 0.5
 _SURE_M = 2e-3  # places are rounded to millimetres, and the roadmap goes about corners in polygons
 _FINEST_M, _PLACES = 0.05, 1_000_000  # finest lattice over shapes, and about how many places of it at most
 _ENCLOSED = 0.25  # share of the largest free region from which on an enclosed one is taken for the inside of a building
-_WORTH_SAYING = 0.05  # share of its region from which on a base outside is told of an enclosed one
+_WORTH_SAYING = 0.05  # share of its region from which on a base outside an enclosed one is pointed out
 _LOOSE, _TIGHTER, _CLOSEST_M = 0.8, 0.85, 0.25  # spacing tried first, in that of a square grid; then so much less
 _CHUNK = 4096  # places looked at together
 
@@ -77,7 +77,7 @@ def field_of(obstacles: Obstacles) -> DistanceField:
     shape = (2 * rows + 1, 2 * columns + 1)
     lattice = DistanceField(cells=frame, distance_m=np.zeros(shape, dtype=np.float32))
     index = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1).reshape(-1, 2)
-    # Half way to a neighbour it may be nearer by half a step.
+    # Halfway to a neighbour it may be nearer by half a step.
     distance = np.maximum(clearances(obstacles, lattice.places(index)) - step / 2, 0.0)
     return DistanceField(cells=frame, distance_m=distance.reshape(shape).astype(np.float32))
 
@@ -88,7 +88,7 @@ def find_places(
 ) -> tuple[Places, float]:
     """Places in the connected free region about the base that a robot reaches, keeping as far from obstacles as can be.
 
-    Stations are each the farthest from base and stations before it, by the way there; POIs are drawn. So more of
+    Stations are each the farthest from base and stations before it, by path length; POIs are drawn. So more of
     either leaves the first where they are.
 
     Args:
@@ -210,7 +210,7 @@ def _region_about(field: DistanceField, base: Point, needed_m: float) -> BoolArr
 def _spread(
     field: DistanceField, region: BoolArray, count: int, taken: Sequence[Point], spacing_m: float
 ) -> tuple[Point, ...]:
-    """Places that are each the farthest, by the way there, from what is taken and from those before it."""
+    """Places that are each the farthest, by path length, from what is taken and from those before it."""
     if count == 0:
         return ()
     step = field.cells.cell_m / 2

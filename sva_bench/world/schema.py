@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
 from sva_bench.choices import FailureProcess
 from sva_bench.files.fields import Bounded, Name, Number, Positive, Probability, Section, WholeNumber
 from sva_bench.seeds import MOST_SEED
+from sva_bench.world.maps.formats import FORMATS
+from sva_bench.world.maps.section import MapSection
 from sva_bench.world.places import APART_M
 
 KIND = "sva-bench/world@1"
@@ -57,42 +59,39 @@ class Shapes(Section):
         return bounds
 
 
-FileName = Annotated[str, Field(min_length=1, max_length=1000)]
+KINDS_OF_MAP = ("shapes", *FORMATS)
 
 
-class RosMap(Section):
-    """A map of map_server or Nav2: its YAML file."""
-
-    file: FileName
-    unknown: Literal["occupied", "free"] = "occupied"
-
-
-class MovingAiMap(Section):
-    """An octile map of the MovingAI benchmarks."""
-
-    file: FileName
-    cell_m: Annotated[Positive, Field(ge=1e-3, le=100)] = 1.0
-
-
-class Map(Section):
+class _MapWithoutFormats(Section):
     """Exactly one of these."""
 
     shapes: Shapes | None = None
-    ros: RosMap | None = None
-    movingai: MovingAiMap | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _is_of_one_kind(cls, data: object) -> object:
         if isinstance(data, dict):
-            kinds = [kind for kind in ("shapes", "ros", "movingai") if kind in data]
-            if len(kinds) != 1 and not set(data) - {"shapes", "ros", "movingai"}:
+            kinds = [kind for kind in KINDS_OF_MAP if kind in data]
+            if len(kinds) != 1 and not set(data) - set(KINDS_OF_MAP):
                 found = " and ".join(kinds) or "none"
-                raise ValueError(f"expected exactly one of shapes, ros and movingai, found {found}")
+                expected = f"{', '.join(KINDS_OF_MAP[:-1])} and {KINDS_OF_MAP[-1]}"
+                raise ValueError(f"expected exactly one of {expected}, found {found}")
             for kind in kinds:
                 if data[kind] is None:
                     raise ValueError(f"there is nothing below {kind!r}; say what the map is")
         return data
+
+    def source(self) -> tuple[str, MapSection] | None:
+        """Key and content of the format's section; ``None`` where the map is described by shapes."""
+        found = ((key, getattr(self, key)) for key in FORMATS)
+        return next(((key, section) for key, section in found if section is not None), None)
+
+
+if TYPE_CHECKING:
+    Map = _MapWithoutFormats
+else:  # with a key for each format
+    Map = create_model("Map", __base__=_MapWithoutFormats, __doc__=_MapWithoutFormats.__doc__,
+                       **{form.key: (form.section | None, None) for form in FORMATS.values()})
 
 
 _EMPTY_IS_NONE = BeforeValidator(lambda value: {} if value is None else value)  # a heading with nothing below

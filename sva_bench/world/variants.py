@@ -10,6 +10,7 @@ from typing import Any
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.documents import Document, Loc
+from sva_bench.mission.failures import without_joint
 from sva_bench.world.load import world_of
 from sva_bench.world.model import World
 
@@ -86,10 +87,15 @@ def adapted(
     if scenarios:
         world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
             scenarios, [s.name for s in world.scenarios])))
-    return replace(
+    world = replace(
         world, margin=world.margin if margin is None else margin,
         plan_failure=world.plan_failure if plan_failure is None else plan_failure,
         execute_failure=world.execute_failure if execute_failure is None else execute_failure)
+    correlated = [scenario.name for scenario in world.scenarios if scenario.joint is not None]
+    if correlated and (other := without_joint([world.plan_failure, world.execute_failure])):
+        raise BadInput(f"scenario {correlated[0]}: under {other} robots fail independently, and this scenario has a "
+                       "joint distribution; choose other scenarios, or another failure process")
+    return world
 
 
 def _known_scenarios(names: Sequence[str], known: list[str]) -> list[str]:

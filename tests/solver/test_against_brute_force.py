@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sva_bench.choices import Cuts, InstanceFamily
+from sva_bench.choices import Cuts, InstanceFamily, Method
 from sva_bench.generate.instances import random_instance as paper_instance
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.solver import solve as solving
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
     plan_averse,
@@ -147,7 +146,7 @@ def test_the_methods_of_the_paper_find_them_on_many_instances(seed: int, method:
 
 @pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("seed", range(20))
-def test_plans_for_failures_along_the_way_are_those_that_enumeration_finds(seed: int) -> None:
+def test_plans_for_failures_along_the_route_are_those_that_enumeration_finds(seed: int) -> None:
     check_per_leg(seed)
 
 
@@ -169,7 +168,7 @@ def test_the_method_alone_finds_the_plans_that_enumeration_finds_on_many_instanc
 @pytest.mark.long
 @pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("seed", range(600, 1000))
-def test_plans_for_failures_along_the_way_are_those_that_enumeration_finds_on_many_instances(seed: int) -> None:
+def test_plans_for_failures_along_the_route_are_those_that_enumeration_finds_on_many_instances(seed: int) -> None:
     check_per_leg(seed)
 
 

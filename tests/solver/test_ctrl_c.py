@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sva_bench.choices import InstanceFamily
+from sva_bench.choices import InstanceFamily, Method
 from sva_bench.generate.instances import random_instance
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.certify import certify
@@ -28,13 +28,12 @@ from sva_bench.solver.columns import column_generation
 from sva_bench.solver.columns.graph import graph_of, neighbours
 from sva_bench.solver.columns.listing import counts
 from sva_bench.solver.columns.pricing import Priced, price
-from sva_bench.solver.columns.subset_row import tolls_of
+from sva_bench.solver.columns.subset_row import cut_duals_of
 from sva_bench.solver.flow import branch_and_cut, lshaped
 from sva_bench.solver.preprocess import scope_of
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes import fronts as routes
 from sva_bench.solver.routes import heuristic
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import plan_averse, plan_deterministic, plan_stochastic
 
 SOON_S = 0.2  # from the outside: compiled code keeps this process from doing anything
@@ -124,8 +123,8 @@ def test_labels_stop_growing_when_ctrl_c_is_pressed_or_time_is_up() -> None:
 
     def labels(left_s: float) -> Priced:
         return price(graph, np.array(vehicle.incentives), np.zeros(n), 0.0, neighbours(graph, instance.pois),
-                     threshold=0.0, exact=True, most_routes=5, most_labels=10**9, tolls=tolls_of((), np.zeros(0), 0, n),
-                     left_s=left_s)
+                     threshold=0.0, exact=True, most_routes=5, most_labels=10**9,
+                     cut_duals=cut_duals_of((), np.zeros(0), 0, n), left_s=left_s)
 
     began = time.process_time()
     assert not labels(0.2).complete
@@ -161,7 +160,7 @@ def test_the_command_line_writes_the_plan_and_ends_with_130(tmp_path: Path) -> N
     assert sorted(path.name for path in tmp_path.iterdir()) == ["i.json", "p.json"]
 
 
-def test_ctrl_c_ends_the_search_for_ways_over_very_many_stations(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_ends_the_search_for_chains_of_very_many_stations(monkeypatch: pytest.MonkeyPatch) -> None:
     # 600 stations: each of 360 000 pairs of sites has as many ways.
     rng = np.random.default_rng(0)
     at = rng.uniform(0, 100, size=(602, 2))
@@ -171,6 +170,6 @@ def test_ctrl_c_ends_the_search_for_ways_over_very_many_stations(monkeypatch: py
         name="stations", sites=tuple(f"s{k}" for k in range(602)), base=0, stations=tuple(range(1, 601)),
         stop_s=np.zeros(602), vehicles=(replace(
             made, fuel_capacity_s=150.0, mission_limit_s=1000.0, fuel_s=fuel, incentives=np.eye(602)[601]),))
-    at_call(monkeypatch, routes, "_ways")
+    at_call(monkeypatch, routes, "_station_chains")
     with pytest.raises(KeyboardInterrupt):
         routes.tables_of(instance)

@@ -16,13 +16,13 @@ from sva_bench.solver.columns.enumeration import routes_above
 from sva_bench.solver.columns.graph import graph_of
 from sva_bench.solver.columns.master import Column
 from sva_bench.solver.columns.pricing import price
-from sva_bench.solver.columns.subset_row import Counter, SubsetRow, separate, tolls_of
+from sva_bench.solver.columns.subset_row import Counter, SubsetRow, cut_duals_of, separate
 from sva_bench.solver.preprocess import scope_of
 from sva_bench.solver.two_stage import plan_stochastic
 from tests.solver import oracle
 
 
-def ways(
+def partial_routes(
     instance: Instance, route: tuple[int, ...] = (), fuel: float = 0.0, time: float = 0.0,
 ) -> Iterator[tuple[int, ...]]:
     """All routes of the first vehicle from base to base."""
@@ -32,7 +32,7 @@ def ways(
         if j == instance.base:
             yield (*route, j)
         else:
-            yield from ways(instance, (*route, j), burnt if j in instance.pois else 0.0, later)
+            yield from partial_routes(instance, (*route, j), burnt if j in instance.pois else 0.0, later)
 
 
 def small(seed: int) -> Instance:
@@ -40,7 +40,7 @@ def small(seed: int) -> Instance:
     for again in range(100):
         instance = oracle.random_instance(seed + 1000 * again)
         if instance.vehicles and instance.vehicles[0].mission_limit_s < np.inf and len(instance.pois) >= 4 \
-                and 20 < sum(1 for _ in itertools.islice(ways(instance), 2000)) < 2000:
+                and 20 < sum(1 for _ in itertools.islice(partial_routes(instance), 2000)) < 2000:
             return instance
     raise AssertionError("no instance will do")
 
@@ -58,16 +58,16 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
         chosen = tuple(sorted(int(j) for j in rng.choice(pois, 2 if k == 4 else 3, replace=False)))
         memory = frozenset(chosen) | {int(j) for j in np.flatnonzero(rng.random(n) < 0.5)}
         cuts.append(SubsetRow(pois=chosen, kind=0 if k == 4 else None, memory=memory))
-    prices = rng.uniform(0, 6, len(cuts))
-    # Detours just to forget a visit aren't looked at: neither over a station that is of no use ...
-    routes = [route for route in ways(instance) if len(route) > 2
+    duals = rng.uniform(0, 6, len(cuts))
+    # Detours just to forget a visit aren't examined: neither over a station that is of no use ...
+    routes = [route for route in partial_routes(instance) if len(route) > 2
               and all(graph.legs[i, j] for i, j in itertools.pairwise(route))]
     if graph.metric:  # ... nor over a POI that costs more than it earns.
         routes = [route for route in routes if all(reward[j] > dual[j] for j in route if j in instance.pois)]
     counter, everything = Counter(cuts, n), np.full((n, 1), np.uint64(0xFFFFFFFFFFFFFFFF))
-    worth = {route: sum(reward[j] - dual[j] for j in route) - prices @ counter.of(0, route) for route in routes}
+    worth = {route: sum(reward[j] - dual[j] for j in route) - duals @ counter.of(0, route) for route in routes}
     found = price(graph, reward, dual, 0.0, everything, threshold=0.0, exact=True, most_routes=5, most_labels=10**6,
-                  tolls=tolls_of(cuts, prices, 0, n))
+                  cut_duals=cut_duals_of(cuts, duals, 0, n))
     assert found.complete
     assert found.best == pytest.approx(max([0.0, *worth.values()]), abs=1e-9)
     if found.routes:
@@ -75,17 +75,18 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_routes_listed_whole_hold_each_set_of_pois_that_is_worth_it(seed: int) -> None:
+def test_enumerated_routes_cover_each_set_of_pois_that_is_worth_enough(seed: int) -> None:
     instance, rng = small(seed), np.random.default_rng(seed)
     n, pois = len(instance.sites), np.array(instance.pois)
     graph = graph_of(instance, scope_of(instance, instance.vehicles[0], np.isin(np.arange(n), pois)), 1.0)
     reward, dual = np.zeros(n), np.zeros(n)
     reward[pois], dual[pois] = rng.uniform(1, 9, len(pois)), rng.uniform(0, 9, len(pois))
-    tolls = tolls_of((), np.zeros(0), 0, n)
-    worth = {frozenset(route) & set(pois.tolist()): sum(reward[j] - dual[j] for j in route) for route in ways(instance)}
+    cut_duals = cut_duals_of((), np.zeros(0), 0, n)
+    worth = {frozenset(route) & set(pois.tolist()): sum(reward[j] - dual[j] for j in route)
+             for route in partial_routes(instance)}
     best = max([0.0, *worth.values()])
     for loss in (1.0, 6.0, 100.0):
-        found = routes_above(graph, reward, dual, 0.0, tolls, best=best, loss=loss)
+        found = routes_above(graph, reward, dual, 0.0, cut_duals, best=best, loss=loss)
         assert found is not None
         sets = [frozenset(route) & set(pois.tolist()) for route in found]
         assert len(sets) == len(set(sets))
@@ -103,7 +104,7 @@ def test_a_cut_counts_a_route_that_takes_two_of_its_rows() -> None:
     assert counter.of(0, (0, 1, 4, 2, 0)).tolist() == [0, 0]  # forgotten at 4
 
 
-def test_half_of_each_pair_of_three_is_cut_off() -> None:
+def test_halves_of_three_routes_over_pairs_of_three_pois_are_cut_off() -> None:
     # Routes {1, 2}, {2, 3} and {1, 3}, half of each: 1.5 of them take two of the POIs, and only one may.
     routes = ((0, 1, 2, 0), (0, 2, 3, 0), (0, 1, 3, 0))
     used = [(0, Column(kind=0, route=route, visits=np.isin(np.arange(4), route[1:-1]).astype(float), value=1.0,
@@ -114,7 +115,7 @@ def test_half_of_each_pair_of_three_is_cut_off() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_cuts_and_listing_change_the_way_and_not_the_plan(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cuts_and_enumeration_leave_the_plan_as_it_is(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     instance = random_instance("C", pois=22, vehicles=5, availability=0.75, seed=seed)
     # Shorter routes: where each takes two or three POIs relaxations are most fractional.
     limit = 0.75 * instance.vehicles[0].mission_limit_s

@@ -12,16 +12,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sva_bench.choices import Cuts
+from sva_bench.choices import Cuts, Method
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver import solve as solving
+from sva_bench.solver.methods import METHODS
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
-from sva_bench.solver.solve import TWO_STAGE, Method
 from sva_bench.solver.two_stage import (
     SolveLimits,
     plan_averse,
@@ -255,7 +255,7 @@ def test_plans_are_the_best_however_seldom_anybody_is_available(most: float) -> 
 def test_the_second_stage_of_the_paper_is_refused_where_next_to_nobody_is_available() -> None:
     made = random_instance(10)
     instance = replace(made, vehicles=tuple(replace(v, availability=1e-8) for v in made.vehicles))
-    for method in TWO_STAGE:
+    for method in (name for name, method in METHODS.items() if method.second_stage):
         with pytest.raises(BadInput, match="use the method auto or expected"):
             plan_stochastic(instance, method=method)
 

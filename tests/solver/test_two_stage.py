@@ -19,6 +19,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import Method
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState
@@ -34,7 +35,6 @@ from sva_bench.solver.knowledge import SolveLimits
 from sva_bench.solver.preprocess import is_metric, scope_of
 from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.routes.refuelling import quickest, road_of
-from sva_bench.solver.solve import Method
 from sva_bench.solver.two_stage import (
     knowledge_of,
     plan_deterministic,
@@ -67,7 +67,7 @@ def value_and_bound(plan: Plan) -> tuple[float, float]:
 
 STATION_LEG_TWICE = np.array([[0, 5, 13, 18, 18], [18, 0, 8, 13, 13], [10, 10, 0, 5, 5], [7, 5, 13, 0, 18],
                               [5, 10, 18, 23, 0]], dtype=float)
-# Two POIs, 10 s from the base and 10 s apart; 30 s allow both to one robot, 20 s only one each.
+# Two POIs, 10 s from the base and 10 s from each other; 30 s allow both to one robot, 20 s only one each.
 TRIANGLE = np.array([[0, 10, 10], [10, 0, 10], [10, 10, 0]], dtype=float)
 
 
@@ -167,7 +167,7 @@ def test_a_poi_worth_nothing_is_visited_only_as_a_shortcut() -> None:
     assert plan.routes["a"] == ("base", "p2", "base")
 
 
-def test_legs_that_cost_nothing_close_no_loop_apart_from_the_base(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_legs_that_cost_nothing_close_no_subtour(monkeypatch: pytest.MonkeyPatch) -> None:
     # p1 and p2 lie in one spot, far from the base: a loop between them is free, but no robot gets there.
     monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
     fuel = np.array([[0, 20, 20, 1], [20, 0, 0, 20], [20, 0, 0, 20], [1, 20, 20, 0]], dtype=float)
@@ -177,7 +177,7 @@ def test_legs_that_cost_nothing_close_no_loop_apart_from_the_base(monkeypatch: p
         assert plan.value == (1.0 if capacity == 30 else 10.0)
 
 
-def test_a_poi_without_a_way_is_left_out_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
+def test_an_unreachable_poi_is_left_out_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     fuel = TRIANGLE.copy()
     fuel[:, 2] = [math.inf, math.inf, 0]
     with caplog.at_level(logging.WARNING):
@@ -191,10 +191,10 @@ def test_correlated_failures_count_for_foresight_but_not_for_the_plan() -> None:
     robots = [vehicle(TRIANGLE, [0, 10, 9], name=n, limit=20, availability=0.5) for n in ("a", "b")]
     joint = (JointState(probability=0.5, available=frozenset({"a"})),
              JointState(probability=0.5, available=frozenset({"b"})))
-    together, apart = instance_of("base p1 p2", (), *robots, joint=joint), instance_of("base p1 p2", (), *robots)
-    assert plan_stochastic(together).value == plan_stochastic(apart).value == 9.5
+    together, disjoint = instance_of("base p1 p2", (), *robots, joint=joint), instance_of("base p1 p2", (), *robots)
+    assert plan_stochastic(together).value == plan_stochastic(disjoint).value == 9.5
     assert wait_and_see(together) == pytest.approx(10.0)  # always exactly one robot, and it takes the better POI
-    assert wait_and_see(apart) == pytest.approx(0.25 * 19 + 0.5 * 10)
+    assert wait_and_see(disjoint) == pytest.approx(0.25 * 19 + 0.5 * 10)
 
 
 def test_foresight_over_many_outcomes_is_worked_out_only_when_asked() -> None:
@@ -205,7 +205,7 @@ def test_foresight_over_many_outcomes_is_worked_out_only_when_asked() -> None:
     assert wait_and_see(instance, force=True) == pytest.approx(17.0)
 
 
-def test_under_failures_along_the_way_what_earns_most_comes_first() -> None:
+def test_under_failures_along_the_route_what_earns_most_comes_first() -> None:
     # The first POI is reached with 1/2, the second with 1/4: 8/2 + 4/4 = 5, the other way round 4/2 + 8/4 = 4.
     instance = replace(instance_of("base p1 p2", (), vehicle(TRIANGLE, [0, 4, 8], availability=0.5)), failure="per_leg")
     plan = plan_stochastic(instance)
@@ -213,7 +213,7 @@ def test_under_failures_along_the_way_what_earns_most_comes_first() -> None:
     assert plan.value == pytest.approx(5.0)
 
 
-def test_the_collapsed_model_refuses_failures_along_the_way() -> None:
+def test_the_collapsed_model_refuses_failures_along_the_route() -> None:
     instance = replace(instance_of("base p1 p2", (), vehicle(TRIANGLE, [0, 5, 5])), failure="per_leg")
     with pytest.raises(BadInput, match="plans under mission"):
         plan_stochastic(instance, method="expected")
@@ -315,7 +315,7 @@ def test_refuelling_in_a_given_order_is_exact() -> None:
     assert quickest(road_of(short, short.vehicles[0]), (2, 3)) is None
 
 
-def test_an_euler_walk_drives_every_leg_that_joins_up_with_the_base() -> None:
+def test_an_euler_walk_drives_every_leg_that_is_connected_with_the_base() -> None:
     visits = np.zeros((6, 6))
     for i, j in itertools.pairwise([0, 1, 2, 3, 1, 2, 4, 0]):
         visits[i, j] += 1

@@ -14,7 +14,7 @@ from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.geometry.buckets import clearance_checker, keeps_clear
 from sva_bench.geometry.cells import Cells, cover
 from sva_bench.travel import tangents as tangents_module
-from sva_bench.travel.lattice import lattice_ways
+from sva_bench.travel.lattice import lattice_paths
 from sva_bench.travel.roadmap import plan_paths
 from sva_bench.travel.samples import arc_points
 from sva_bench.travel.tangents import tangents
@@ -95,8 +95,8 @@ def test_ways_on_the_lattice_keep_the_clearance_and_get_through_every_passage(ya
     obstacles = obstacles_of(cells)
     clearance = 0.249  # of half the gaps, a millimetre less
     points = places_on(cells, 8, 0, clearance)
-    ways = lattice_ways(cells, clearance_checker(obstacles, clearance), clearance, points, range(1, len(points)))
-    for k, way in enumerate(ways, start=1):
+    paths = lattice_paths(cells, clearance_checker(obstacles, clearance), clearance, points, range(1, len(points)))
+    for k, way in enumerate(paths, start=1):
         assert way is not None
         np.testing.assert_allclose(way[[0, -1]], points[[0, k]])
         assert path_clearance(obstacles, way) >= clearance - 1e-6
@@ -107,9 +107,9 @@ def test_no_way_leads_through_a_wall() -> None:
     occupied[:, 20] = True
     cells = cells_of(occupied, 0.1)
     points = np.array([[1.0, 1.0], [1.0, 3.0], [3.0, 1.0]])
-    ways = lattice_ways(cells, clearance_checker(obstacles_of(cells), 0.3), 0.3, points, [1, 2])
-    assert ways[0] is not None
-    assert ways[1] is None
+    paths = lattice_paths(cells, clearance_checker(obstacles_of(cells), 0.3), 0.3, points, [1, 2])
+    assert paths[0] is not None
+    assert paths[1] is None
 
 
 def test_a_crowd_of_corners_is_joined_by_the_lattice(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from sva_bench.errors import BadInput
 from sva_bench.generate.mazes import maze_walls
 from sva_bench.generate.rooms import room_walls
 from sva_bench.generate.terrain import APART_M, DENSITY, PASSAGE_M, SITE_ROOM_M, random_places, random_terrain
-from sva_bench.travel.roadmap import surely_apart
+from sva_bench.travel.roadmap import surely_disconnected
 from tests.oracles.distances import points_clearance, segment_clearance
 
 FAMILIES: tuple[WorldFamily, ...] = get_args(WorldFamily)
@@ -30,7 +30,7 @@ def test_all_free_places_hang_together_and_sites_have_room(family: WorldFamily, 
     # Anywhere that the widest built-in robot (0.22 m, paths 0.12 m off) has room, not the sites alone.
     anywhere = np.random.default_rng(seed).uniform(0, 15, (500, 2))
     free = anywhere[points_clearance(obstacles, anywhere) >= PASSAGE_M / 2]
-    assert not surely_apart(obstacles, np.concatenate([sites, free]), 0.34).any()
+    assert not surely_disconnected(obstacles, np.concatenate([sites, free]), 0.34).any()
 
 
 @pytest.mark.parametrize("family", ["rooms", "field", "aisles"])

@@ -31,7 +31,7 @@ def edit(path: Path, old: str, new: str) -> None:
 
 
 def made(folder: Path, target: Path, **asked: object) -> str:
-    options = {"base": None, "pois": 4, "stations": 1, "robots": 2, "cell_m": 1.0, "unknown": "occupied",
+    options = {"base": None, "pois": 4, "stations": 1, "robots": 2, "settings": {},
                "spacing_m": None, "seed": 0, "progress": lambda *_: None} | asked
     text, files = world_from_map(folder / "map.yaml", target, **options)  # type: ignore[arg-type]
     for file in files:

@@ -202,7 +202,7 @@ def test_an_octile_map_has_its_first_row_in_the_north(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "line", "complaint"), [
-    ("octile", "tile", 1, "expected 'type octile'"), ("height 2", "height two", 2, "a whole number each"),
+    ("octile", "tile", 1, "expected 'type octile'"), ("height 2", "height two", 2, "an integer each"),
     ("width 4", "height 4", 3, "each once"), ("height 2", "height 3", 6, "expected 3 rows"),
     (".GS@", ".GS", 5, "expected 4 cells, as 'width' says, found 3"),
     ("OTW.", "OTWx", 6, "column 4: 'x' is no terrain"),

@@ -1,4 +1,4 @@
-"""Columns for the master program, as they are needed: prices from the program, routes from labels, and the same again.
+"""Columns for the master program, as they are needed: duals from the program, routes from labels, and the same again.
 
 Source:
     Roberti, Mingozzi (2014), "Dynamic ng-path relaxation for the delivery man problem"; Pessoa et al. (2018),
@@ -20,19 +20,19 @@ from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.columns.enumeration import routes_above
 from sva_bench.solver.columns.graph import NG_MOST, Graph, allowed, graph_of, neighbours
-from sva_bench.solver.columns.master import Class, Column, Master, Prices, Side, Unit
+from sva_bench.solver.columns.master import BranchState, Column, Duals, Master, Unit, VehicleClass
 from sva_bench.solver.columns.pricing import Priced
 from sva_bench.solver.columns.pricing import price as best_routes
-from sva_bench.solver.columns.subset_row import Counter, SubsetRow, separate, tolls_of
+from sva_bench.solver.columns.subset_row import Counter, SubsetRow, cut_duals_of, separate
+from sva_bench.solver.goal import Goal, sizes_of
 from sva_bench.solver.highs import Relaxed
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, sizes_of
 
 _log = logging.getLogger(__name__)
 
 ROUTES_A_ROUND = 40  # columns of one unit and pricing
 MOST_LABELS = 4_000_000
-_SMOOTHING = 0.5  # share of the best prices so far
+_SMOOTHING = 0.5  # share of the best duals so far
 _EPSILON = 1e-7
 ENUMERATED = 0.03  # gap from which routes may be few enough to list them all
 RETRIED = 0.7  # of the last gap that left too many
@@ -47,14 +47,14 @@ class Generated:
     Attributes:
         relaxed: The last relaxation.
         bound: Upper bound on the node.
-        prices: The prices that give it, if any were tried.
+        duals: The duals that give it, if any were tried.
         most: With them the greatest reduced value of each unit's routes, shape (units,).
         complete: Whether no column is missing that counts.
     """
 
     relaxed: Relaxed
     bound: float
-    prices: Prices | None
+    duals: Duals | None
     most: FloatArray
     complete: bool
 
@@ -68,10 +68,10 @@ class ColumnGeneration:
         goal: What to maximise.
         scopes: What each vehicle may do.
         survival: Chance of each vehicle to get to its next POI, shape (M,).
-        cutoff: Bound at or below which a node holds nothing of interest.
+        cutoff: Bound at or below which a node holds no better plan.
         out: Whether to stop.
         left_s: Time left [s].
-        classes: Vehicles that are alike.
+        classes: The vehicle classes.
         graphs: What each class may drive.
         penalty: What it costs to miss a required visit, or a floor by its size, unless a node wants more.
         calls: Pricing runs and labels.
@@ -88,7 +88,7 @@ class ColumnGeneration:
     cutoff: Callable[[], float]
     out: Callable[[], bool]
     left_s: Callable[[], float]
-    classes: list[Class] = field(init=False, default_factory=list)
+    classes: list[VehicleClass] = field(init=False, default_factory=list)
     graphs: list[Graph] = field(init=False, default_factory=list)
     penalty: float = field(init=False)
     calls: dict[str, int] = field(default_factory=lambda: {"heuristic": 0, "exact": 0, "labels": 0})
@@ -101,15 +101,15 @@ class ColumnGeneration:
             len(self._floors), len(self.instance.vehicles), n)
         for m in range(len(self.instance.vehicles)):
             graph = graph_of(self.instance, self.scopes[m], float(self.survival[m]))
-            own = Class(vehicles=(m,), weights=self.goal.weights[m], floors=floors[:, m])
-            same = [k for k, other in enumerate(self.classes) if _alike(other, own, self.graphs[k], graph)]
+            own = VehicleClass(vehicles=(m,), weights=self.goal.weights[m], floors=floors[:, m])
+            same = [k for k, other in enumerate(self.classes) if _identical(other, own, self.graphs[k], graph)]
             if same:
                 known = self.classes[same[0]]
                 self.classes[same[0]] = replace(known, vehicles=(*known.vehicles, m))
             else:
                 self.classes.append(own)
                 self.graphs.append(graph)
-        # A stop that counts for nothing can be of use without the triangle inequality; the legs know.
+        # Without the triangle inequality a stop without reward can be of use; the legs tell.
         self.rows = tuple(j for j in self._pois if any(graph.legs[j].any() for graph in self.graphs))
         self.memory = [neighbours(graph, self._pois) for graph in self.graphs]
         self.pool: dict[tuple[int, tuple[int, ...]], Column] = {}
@@ -138,11 +138,11 @@ class ColumnGeneration:
             self._column(kind, route)
 
     def master(
-        self, side: Side, prices: Prices | None, entries: Sequence[Sequence[Column]] | None = None,
+        self, state: BranchState, duals: Duals | None, entries: Sequence[Sequence[Column]] | None = None,
         penalty: float | None = None,
     ) -> Master:
-        """The program at a node, with columns that are good at some prices, or with those given of each unit."""
-        master = Master(side=side, pois=self.rows, n=self._n, floors=self._floors, sizes=self._sizes,
+        """The program at a node, with columns that are good at given duals, or with given columns of each unit."""
+        master = Master(state=state, pois=self.rows, n=self._n, floors=self._floors, sizes=self._sizes,
                         cuts=len(self.cuts), counted=self._counted, penalty=penalty or self.penalty,
                         risk=self.goal.risk)
         if entries is not None:
@@ -150,28 +150,28 @@ class ColumnGeneration:
                 master.add(number, columns)
             return master
         columns = list(self.pool.values())
-        if len(columns) > _POOL and prices is not None:
-            gain = np.array([self._reduced(c, self._padded(prices)) for c in columns])
+        if len(columns) > _POOL and duals is not None:
+            gain = np.array([self._reduced(c, self._padded(duals)) for c in columns])
             columns = [columns[k] for k in np.sort(np.argsort(-gain, kind="stable")[:_POOL])]
-        for number, unit in enumerate(side.units):
+        for number, unit in enumerate(state.units):
             master.add(number, [c for c in columns if c.fits(unit)])
         return master
 
     def generate(
-        self, master: Master, side: Side, centre: Prices | None, *, known: float, slack: float,
+        self, master: Master, state: BranchState, centre: Duals | None, *, known: float, slack: float,
         tell: Callable[[float], None] | None = None,
     ) -> Generated:
         """Add columns until the relaxation is as good as solved.
 
         Args:
             master: The program.
-            side: Its decisions.
-            centre: Prices to begin near.
+            state: Its decisions.
+            centre: Duals to begin near.
             known: Upper bound on the node.
             slack: Share of the gap within which the relaxation may stay of its bound.
             tell: Takes every bound.
         """
-        best, limits = math.inf, np.zeros(len(side.units))
+        best, limits = math.inf, np.zeros(len(state.units))
         centre = None if centre is None else self._padded(centre)
         smooth = _SMOOTHING if centre is not None and slack > 0 else 0.0
         quick = True
@@ -180,30 +180,18 @@ class ColumnGeneration:
             if solved.values is None:
                 raise RuntimeError(f"the master program is {solved.status}")
             if self.out():
-                return Generated(relaxed=solved, bound=best, prices=centre, most=limits, complete=False)
-            prices = master.prices(solved)
+                return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
+            duals = master.duals(solved)
             if quick:
-                added = 0
-                for number, unit in enumerate(side.units):
-                    priced = self.price(unit, prices, max(float(prices.unit[number]), 0.0) + self.tolerance,
-                                        exact=False)
-                    added += self.add(master, number, unit, priced)
+                added = sum(self.add(master, number, unit, self.price(
+                    unit, duals, max(float(duals.unit[number]), 0.0) + self.tolerance, exact=False))
+                    for number, unit in enumerate(state.units))
                 if added:
                     continue
-            at = prices if centre is None or smooth == 0.0 else prices.between(centre, smooth)
-            most, added, complete = master.most(at), 0, True
-            for number, unit in enumerate(side.units):
-                # A little below the best, for routes there can be of use at the program's own prices.
-                width = min(best, known) - solved.objective
-                threshold = max(most[number] - (width if math.isfinite(width) else 0.0), 0.0)
-                priced = self.price(unit, at, threshold + self.tolerance, exact=True)
-                complete &= priced.complete
-                most[number] = max(priced.best, most[number])
-                routes = [self._column(unit.kind, route) for route in priced.routes]
-                added += master.add(number, [c for c in routes if self._reduced(c, prices)
-                                             > max(prices.unit[number], 0.0) + self.tolerance])
+            at = duals if centre is None or smooth == 0.0 else duals.between(centre, smooth)
+            most, added, complete = self._price_exactly(master, state, at, duals, min(best, known) - solved.objective)
             if not complete:
-                return Generated(relaxed=solved, bound=best, prices=centre, most=limits, complete=False)
+                return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
             bound = master.bound(at, most)
             if bound < best or centre is None:
                 best, centre, limits = min(bound, best), at, most
@@ -211,48 +199,75 @@ class ColumnGeneration:
                     tell(max(best, self.cutoff()))
             room = slack * (best - self.cutoff()) + 1e-9 * max(self._most, abs(best))
             if min(best, known) <= self.cutoff() or best <= solved.objective + room:
-                return Generated(relaxed=solved, bound=best, prices=centre, most=limits, complete=True)
+                return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
             if not added:
-                if at is prices:
-                    return Generated(relaxed=solved, bound=best, prices=centre, most=limits, complete=True)
+                if at is duals:
+                    return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
                 smooth = smooth / 2 if smooth > 0.1 else 0.0
                 quick = False
             else:
                 smooth, quick = _SMOOTHING, True
 
-    def _reward(self, unit: Unit, prices: Prices) -> FloatArray:
+    def _price_exactly(
+        self, master: Master, state: BranchState, at: Duals, duals: Duals, width: float,
+    ) -> tuple[FloatArray, int, bool]:
+        """Add the columns that exact pricing finds.
+
+        Args:
+            master: The program.
+            state: Its decisions.
+            at: Duals to price at.
+            duals: The program's own, at which columns must improve it.
+            width: How far below the best routes are looked for: they can be of use at the program's own duals.
+
+        Returns:
+            Greatest reduced value of each unit's routes, shape (units,); number of columns added; whether it is proved.
+        """
+        most, added, complete = master.most(at), 0, True
+        for number, unit in enumerate(state.units):
+            threshold = max(most[number] - (width if math.isfinite(width) else 0.0), 0.0)
+            priced = self.price(unit, at, threshold + self.tolerance, exact=True)
+            complete &= priced.complete
+            most[number] = max(priced.best, most[number])
+            routes = [self._column(unit.kind, route) for route in priced.routes]
+            added += master.add(number, [c for c in routes if self._reduced(c, duals)
+                                         > max(duals.unit[number], 0.0) + self.tolerance])
+        return most, added, complete
+
+    def _reward(self, unit: Unit, duals: Duals) -> FloatArray:
         """Reward of each site for a unit, shape (n,); ``-inf`` = not to be visited."""
         own = self.classes[unit.kind]
-        reward = own.weights - prices.floor @ own.floors if len(self._floors) else own.weights.copy()
+        reward = own.weights - duals.floor @ own.floors if len(self._floors) else own.weights.copy()
         reward = np.array(reward, dtype=np.float64)
         if unit.forbidden:
             reward[list(unit.forbidden)] = -np.inf
         return reward
 
-    def price(self, unit: Unit, prices: Prices, threshold: float, *, exact: bool) -> Priced:
+    def price(self, unit: Unit, duals: Duals, threshold: float, *, exact: bool) -> Priced:
         """Routes of a unit worth more than a threshold."""
-        graph, reward = self.graphs[unit.kind], self._reward(unit, prices)
+        graph, reward = self.graphs[unit.kind], self._reward(unit, duals)
         self.calls["exact" if exact else "heuristic"] += 1
-        tolls = tolls_of(self.cuts, prices.cut, unit.kind, self._n)
+        cut_duals = cut_duals_of(self.cuts, duals.cut, unit.kind, self._n)
         with deferring_ctrl_c():
             priced = best_routes(
-                graph, reward, prices.visit, self.goal.driving, self.memory[unit.kind], threshold=threshold,
-                exact=exact, most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS, tolls=tolls, left_s=self.left_s())
+                graph, reward, duals.visit, self.goal.driving, self.memory[unit.kind], threshold=threshold,
+                exact=exact, most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS, cut_duals=cut_duals,
+                left_s=self.left_s())
         self.calls["labels"] += priced.labels
         return priced
 
-    def enumerate(self, side: Side, made: Generated) -> list[list[Column]] | None:
+    def enumerate(self, state: BranchState, made: Generated) -> list[list[Column]] | None:
         """All columns of each unit that a plan above the cutoff can use; ``None`` if too many are possible."""
         room = made.bound - self.cutoff()
-        if made.prices is None or room > min(ENUMERATED * abs(self.cutoff()), RETRIED * self._too_many) \
+        if made.duals is None or room > min(ENUMERATED * abs(self.cutoff()), RETRIED * self._too_many) \
                 or not bool((self.survival == 1.0).all()):
             return None
         found: list[tuple[tuple[int, ...], ...]] = []
-        for number, unit in enumerate(side.units):
+        for number, unit in enumerate(state.units):
             with deferring_ctrl_c():
                 routes = routes_above(
-                    self.graphs[unit.kind], self._reward(unit, made.prices), made.prices.visit, self.goal.driving,
-                    tolls_of(self.cuts, made.prices.cut, unit.kind, self._n),
+                    self.graphs[unit.kind], self._reward(unit, made.duals), made.duals.visit, self.goal.driving,
+                    cut_duals_of(self.cuts, made.duals.cut, unit.kind, self._n),
                     best=float(made.most[number]), loss=room + self.tolerance, left_s=self.left_s())
             _log.debug("unit %d: %s routes within %.6g", number, routes and len(routes), room)
             if routes is None or len(routes) + sum(map(len, found)) > MOST_ENUMERATED:
@@ -260,7 +275,7 @@ class ColumnGeneration:
                 return None
             found.append(routes)
         return [[self._column(unit.kind, route) for route in routes]
-                for unit, routes in zip(side.units, found, strict=True)]
+                for unit, routes in zip(state.units, found, strict=True)]
 
     def add(self, master: Master, number: int, unit: Unit, priced: Priced) -> int:
         return master.add(number, [self._column(unit.kind, route) for route in priced.routes])
@@ -281,10 +296,10 @@ class ColumnGeneration:
             self.pool[key] = Column(kind=kind, route=route, visits=visits, value=float(value), floors=floors)
         return self.pool[key]
 
-    def _reduced(self, column: Column, prices: Prices) -> float:
-        """Value of a route less the prices of its visits."""
-        return column.value - float(prices.visit @ column.visits) - float(prices.floor @ column.floors) \
-            - (float(prices.cut @ self._counted(column)) if self.cuts else 0.0)
+    def _reduced(self, column: Column, duals: Duals) -> float:
+        """Reduced value of a route: its value less the duals of its visits."""
+        return column.value - float(duals.visit @ column.visits) - float(duals.floor @ column.floors) \
+            - (float(duals.cut @ self._counted(column)) if self.cuts else 0.0)
 
     def _counted(self, column: Column) -> FloatArray:
         """How often each cut counts a route, shape (cuts,)."""
@@ -302,13 +317,13 @@ class ColumnGeneration:
             self.cuts, self._counts, self._counter = cuts, {}, Counter(cuts, self._n)
         return changed
 
-    def _padded(self, prices: Prices) -> Prices:
-        """Prices from before the latest cuts."""
-        return replace(prices, cut=np.pad(prices.cut, (0, len(self.cuts) - len(prices.cut))))
+    def _padded(self, duals: Duals) -> Duals:
+        """Duals from before the latest cuts."""
+        return replace(duals, cut=np.pad(duals.cut, (0, len(self.cuts) - len(duals.cut))))
 
     @property
     def tolerance(self) -> float:
-        """What a route must be worth more than its price to count as new."""
+        """By how much a route's reduced value must exceed its unit's dual to count as new."""
         return _EPSILON * (self._most or 1.0)  # else seconds are all that counts
 
     def remember(self, used: Sequence[Column], *, ignore_most: bool) -> bool:
@@ -337,7 +352,7 @@ class ColumnGeneration:
 
 
 
-def _alike(one: Class, other: Class, graph: Graph, other_graph: Graph) -> bool:
+def _identical(one: VehicleClass, other: VehicleClass, graph: Graph, other_graph: Graph) -> bool:
     return np.array_equal(one.weights, other.weights) and np.array_equal(one.floors, other.floors) \
         and (graph.capacity_s, graph.limit_s, graph.survival) == \
         (other_graph.capacity_s, other_graph.limit_s, other_graph.survival) \

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.preprocess import Scope, is_metric
-from sva_bench.solver.program import SLACK_S
+from sva_bench.solver.preprocess import SLACK_S, Scope, is_metric
 
 NG_START, NG_MOST = 7, 14  # POIs that a site remembers at first, and at most
 _WITHIN = 0.9  # of the tolerance: sums in another order must not make a route infeasible

@@ -1,9 +1,9 @@
 """Labels from both ends of a route, in compiled code.
 
-A label is a way from the base to a site: time, fuel burnt since the last refuel, value, and the set of visited POIs
-that its site remembers (its ng-set). Labels grow up to half the mission limit from either end and are joined over the
-leg that crosses the middle. A label falls to another one at its site that is nowhere worse. What can't beat a
-threshold even with the completion bound is dropped, so a run that finds nothing proves that nothing is there.
+A label is a partial route from the base to a site: time, fuel burnt since the last refuel, value, and the visited POIs
+that its site remembers (its ng-set). Labels grow up to half the mission limit from either end and are joined over
+the leg that crosses the middle. A label is dominated by another one at its site that is nowhere worse. A label that
+can't exceed a threshold even with the completion bound is dropped, so a run without results proves that no route does.
 
 Under failure along the route a label also carries the chance to get so far; labels from the end carry what the rest
 is worth, if reached for sure, and what it costs.
@@ -18,25 +18,25 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sva_bench.solver.looking import OFTEN, look, now_s
+from sva_bench.solver.polling import POLL_EVERY, now_s, poll
 
 CHUNK = 32  # labels of a site that are tested for dominance together
-KEYS = 5  # POIs by which a site's labels are told apart: only those with a subset of a label's can beat it
+KEYS = 5  # POIs by which a site's labels are grouped: only those with a subset of a label's can dominate it
 BUCKETS = 256  # of time, by which labels are treated in order
 _EPSILON = 1e-9
 
 
 @njit(cache=True)
 def completion(legs, time, gain, charge, bit, base, step, steps, stop):
-    """Most value that a way from a site to the base can add in so many steps of time, shape (steps + 1, n).
+    """Upper bound on what a path from a site to the base can add within a number of time steps, shape (steps + 1, n).
 
-    Ways may repeat sites but not turn straight back to a POI, and need no fuel; legs take whole steps, rounded down.
+    Paths may repeat sites but not turn straight back to a POI, and fuel is ignored; a leg's steps are rounded down.
     """
     n = len(gain)
     best, second = np.full((steps + 1, n), -np.inf), np.full((steps + 1, n), -np.inf)
     by = np.full((steps + 1, n), -1, np.int64)
     for t in range(steps + 1):
-        if look(stop):
+        if poll(stop):
             break
         for i in range(n):
             if i == base:
@@ -62,13 +62,15 @@ def completion(legs, time, gain, charge, bit, base, step, steps, stop):
 
 @njit(cache=True)
 def grow(following, count, time, fuel, bit, memory, reward, dual, charge, survival, base, half, capacity, limit, bound,
-         step, threshold, exact, forwards, most, touch, recall, once, toll, stop, left_s):
-    """All labels from one end up to half the limit that no other one beats.
+         step, threshold, exact, forwards, most, touch, recall, once, cut_dual, stop, left_s):
+    """All labels from one end up to half the limit that aren't dominated.
+
+    Long because compiled: its arrays grow, and each part would need nearly all of them.
 
     Returns:
-        Site, time, fuel, value, second value, memory, tolls ahead, parent, and labels by site, each site's by
+        Site, time, fuel, value, second value, memory, cuts ahead, parent, and labels by site, each site's by
         decreasing value: first a table of where a site's begin. Then whether there were too many, or no time was left
-        for more. The second value is the chance to get so far forwards; backwards minus the price of the visits, which
+        for more. The second value is the chance to get so far forwards; backwards minus the duals of the visits, which
         is what the rest is worth if never reached.
     """
     n, words = memory.shape
@@ -77,14 +79,14 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     t, q = np.zeros(room), np.zeros(room)
     x, y = np.zeros(room), np.zeros(room)
     mask = np.zeros((room, words), np.uint64)
-    due = np.zeros(room, np.uint64)  # tolls that its next visit to one of their POIs costs
+    due = np.zeros(room, np.uint64)  # cuts whose dual its next visit to one of their POIs costs
     kept = np.zeros(room, np.bool_)
     site[0], y[0], due[0], size = base, 1.0 if forwards else 0.0, once, 1
-    tolled = len(toll) > 0
+    has_cuts = len(cut_dual) > 0
     width = half / BUCKETS
     head = np.full(BUCKETS + 1, -1, np.int64)
     head[0] = 0
-    # Labels that stand, in chunks by site and key, the latest chunk first.
+    # Labels that aren't dominated, in chunks by site and key, the latest chunk first.
     chunks = 256
     chunk_of, chunk_next, chunk_size = np.full((n, 1 << KEYS), -1, np.int64), np.full(chunks, -1, np.int64), \
         np.zeros(chunks, np.int64)
@@ -94,7 +96,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     c_mask, c_due = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
     c_least, c_most = np.zeros(chunks), np.zeros(chunks)
     used, overflow = 0, False
-    looked, end_s = 0, now_s() + left_s
+    polled, end_s = 0, now_s() + left_s
     bounded = len(bound) > 0
     new = np.zeros(words, np.uint64)
     for bucket in range(BUCKETS + 1):
@@ -112,12 +114,12 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
             head[bucket] = -1
             for position in np.argsort(when):
                 label = batch[position]
-                looked += 1
-                if looked % OFTEN == 0 and (look(stop) or now_s() > end_s):
+                polled += 1
+                if polled % POLL_EVERY == 0 and (poll(stop) or now_s() > end_s):
                     overflow = True
                     break
                 i = site[label]
-                # Does a standing label beat it?
+                # Does a label dominate it?
                 beaten = False
                 key = 0
                 if exact:
@@ -140,8 +142,8 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                                             if c_mask[chunk, k, w] & ~mask[label, w]:
                                                 beaten = False
                                                 break
-                                        if beaten and tolled:
-                                            more = charged(toll, c_due[chunk, k] & ~due[label])
+                                        if beaten and has_cuts:
+                                            more = sum_of(cut_dual, c_due[chunk, k] & ~due[label])
                                             beaten = c_x[chunk, k] - more >= x[label] - _EPSILON
                                     if beaten:
                                         break
@@ -201,8 +203,8 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                             second = y[label] - dual[j]
                             value = worth + second
                     ahead = due[label] & recall[j]
-                    if tolled and touch[j]:
-                        value -= charged(toll, ahead & touch[j])
+                    if has_cuts and touch[j]:
+                        value -= sum_of(cut_dual, ahead & touch[j])
                         ahead = (ahead ^ (touch[j] & ~once)) & ~(touch[j] & once)
                     if bounded and value + bound[int((limit - later) / step + 1e-9), j] <= threshold:
                         continue
@@ -249,7 +251,7 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
 
 @njit(cache=True)
 def _keys(bit, memory, time):
-    """The POIs by which each site's labels are told apart: the nearest that it remembers, shape (n, KEYS)."""
+    """The POIs by which each site's labels are grouped: the nearest that it remembers, shape (n, KEYS)."""
     n = len(bit)
     keys, taken = np.full((n, KEYS), -1, np.int64), np.zeros(n, np.bool_)
     for i in range(n):
@@ -271,12 +273,12 @@ def _keys(bit, memory, time):
 
 
 @njit(cache=True)
-def charged(toll, which):
-    """Sum of some tolls, given bit by bit."""
+def sum_of(cut_dual, which):
+    """Sum of the duals of a set of cuts, given as bits."""
     total, k = 0.0, 0
     while which:
         if which & np.uint64(1):
-            total += toll[k]
+            total += cut_dual[k]
         which >>= np.uint64(1)
         k += 1
     return total
@@ -297,7 +299,7 @@ def _taller(array, size):
 
 
 @njit(cache=True)
-def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, once, toll, stop,
+def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, once, cut_dual, stop,
          t, q, x, y, mask, due, of_site, t_b, q_b, x_b, y_b, mask_b, due_b, of_site_b):
     """For each label from the start the best rest of the route worth more than the threshold.
 
@@ -312,7 +314,7 @@ def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, disco
     found = 0
     for i in range(n):
         for k in range(begin[i], begin[i + 1]):
-            if k % OFTEN == 0 and look(stop):
+            if k % POLL_EVERY == 0 and poll(stop):
                 return value[:0], left[:0], right[:0]
             label = by_site[k]
             best, partner = threshold, -2
@@ -328,8 +330,8 @@ def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, disco
                 if most_fuel < 0 or most_time < 0:
                     continue
                 so_far = x[label] - charge * time[i, j]
-                # A toll for the first visit is no second one's: both ends may have paid it.
-                refund = charged(toll, once & ~due[label])
+                # Cuts that count the first visit: both ends may have paid the dual.
+                refund = sum_of(cut_dual, once & ~due[label])
                 for k_b in range(begin_b[j], begin_b[j + 1]):
                     other = by_site_b[k_b]
                     if so_far + x_b[other] + refund <= best:
@@ -337,19 +339,19 @@ def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, disco
                     if t_b[other] > most_time or q_b[other] > most_fuel:
                         continue
                     total = so_far + x_b[other]
-                    if len(toll) > 0:
-                        total += charged(toll, once & ~due[label] & ~due_b[other]) \
-                            - charged(toll, ~once & due[label] & due_b[other])
+                    if len(cut_dual) > 0:
+                        total += sum_of(cut_dual, once & ~due[label] & ~due_b[other]) \
+                            - sum_of(cut_dual, ~once & due[label] & due_b[other])
                     if discounted:
                         total = so_far + y[label] * (x_b[other] - y_b[other]) + y_b[other]
                     if total <= best:
                         continue
-                    apart = True
+                    disjoint = True
                     for w in range(words):
                         if mask[label, w] & mask_b[other, w]:
-                            apart = False
+                            disjoint = False
                             break
-                    if apart:
+                    if disjoint:
                         best, partner = total, other
             if partner > -2:
                 value[found], left[found], right[found] = best, label, partner

@@ -1,23 +1,25 @@
-"""Ways through a graph listed whole, and what cuts count of them, in compiled code."""
+"""Enumeration of partial routes, and how often cuts count a route, in compiled code."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from sva_bench.solver.columns.labelling import charged
-from sva_bench.solver.looking import OFTEN, look, now_s
+from sva_bench.solver.columns.labelling import sum_of
+from sva_bench.solver.polling import POLL_EVERY, now_s, poll
 
 _EPSILON = 1e-9
 
 
 @njit(cache=True)
-def ways(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, bound, step, threshold, most, touch,
-          recall, once, toll, stop, left_s):
-    """Ways from the base, of those over the same POIs to the same site none that is later and emptier than another.
+def partial_routes(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, bound, step, threshold, most,
+                   touch, recall, once, cut_dual, stop, left_s):
+    """Partial routes from the base that none over the same POIs to the same site dominates in time and fuel.
+
+    Long because compiled: one loop over arrays that it fills, of which each part would need nearly all.
 
     Returns:
-        Site and parent of each way's end; the ends of the best routes, one for each set of POIs; whether there were
+        Last site and parent of each; the ends of the best routes, one for each set of POIs; whether there were
         too many, or no time was left for more.
     """
     n = len(gain)
@@ -25,7 +27,7 @@ def ways(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, boun
     t, q, x = np.zeros(most), np.zeros(most), np.zeros(most)
     mask, due = np.zeros((most, words), np.uint64), np.zeros(most, np.uint64)
     dead = np.zeros(most, np.bool_)
-    # Ways by site and set, and routes by set, in tables of open addressing.
+    # Partial routes by site and set, and routes by set, in tables of open addressing.
     places = 1
     while places < 2 * most:
         places *= 2
@@ -35,7 +37,7 @@ def ways(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, boun
     new = np.zeros(words, np.uint64)
     label, end_s = 0, now_s() + left_s
     while label < size:
-        if label % OFTEN == 0 and (look(stop) or now_s() > end_s):
+        if label % POLL_EVERY == 0 and (poll(stop) or now_s() > end_s):
             return site[:size], parent[:size], np.zeros(0, np.int64), True
         i = site[label]
         if dead[label]:
@@ -68,7 +70,7 @@ def ways(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, boun
             value = x[label] + gain[j] - charge * time[i, j]
             ahead = due[label] & recall[j]
             if touch[j]:
-                value -= charged(toll, ahead & touch[j])
+                value -= sum_of(cut_dual, ahead & touch[j])
                 ahead = (ahead ^ (touch[j] & ~once)) & ~(touch[j] & once)
             if value + bound[int((limit - later) / step + 1e-9), j] <= threshold:
                 continue
@@ -82,7 +84,7 @@ def ways(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, boun
                         beaten = True
                         break
                     if later <= t[other] and burnt <= q[other] and value >= x[other]:
-                        dead[other] = True  # ways on from it stand: they are of use to none, and do no harm
+                        dead[other] = True  # partial routes that extend it stay: useless, but harmless
                 other = alike[other]
             if beaten:
                 continue

@@ -1,6 +1,6 @@
 """The master program of branch-and-price: routes as columns, visits and vehicles as rows.
 
-A *unit* is a vehicle, or several that are alike in everything, on one side of the decisions made so far.
+A *unit* is a vehicle, or several identical ones, with the same branching decisions.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Stops = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Class:
-    """Vehicles that are alike in everything.
+class VehicleClass:
+    """Identical vehicles: one vehicle class.
 
     Attributes:
         vehicles: Their numbers.
@@ -44,8 +44,8 @@ class Unit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Side:
-    """What has been decided on the way to a node of the search tree.
+class BranchState:
+    """The branching decisions that lead to a node of the search tree.
 
     Attributes:
         units: The vehicles.
@@ -80,7 +80,7 @@ class Column:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Prices:
+class Duals:
     """Duals of the master program.
 
     Attributes:
@@ -95,9 +95,9 @@ class Prices:
     floor: FloatArray
     cut: FloatArray
 
-    def between(self, other: Prices, share: float) -> Prices:
+    def between(self, other: Duals, share: float) -> Duals:
         """So much of the other, and the rest of this."""
-        return Prices(visit=(1 - share) * self.visit + share * other.visit,
+        return Duals(visit=(1 - share) * self.visit + share * other.visit,
                       unit=(1 - share) * self.unit + share * other.unit,
                       floor=(1 - share) * self.floor + share * other.floor,
                       cut=(1 - share) * self.cut + share * other.cut)
@@ -108,18 +108,18 @@ class Master:
     """The master program at a node, open for more columns.
 
     Attributes:
-        side: The decisions.
+        state: The decisions.
         pois: POIs with a row.
         floors: Least sum of each floor.
         sizes: Size of each floor's row, shape (floors,); all the same under a measure of risk.
         cuts: How many cuts there are; of the routes a cut counts, one is in use at most.
         counted: How often each cut counts a route, shape (cuts,).
-        penalty: What a unit of a required visit, or of a floor in units of its size, costs if it is missed.
+        penalty: What the violation of a required visit costs, or of a floor in units of its size.
         risk: The measure of risk whose outcomes the floors are.
         entries: Unit and column of each program column after the penalties and the measure's own.
     """
 
-    side: Side
+    state: BranchState
     pois: tuple[int, ...]
     n: int
     floors: FloatArray
@@ -132,10 +132,10 @@ class Master:
 
     def __post_init__(self) -> None:
         self._row = {j: k for k, j in enumerate(self.pois)}
-        first = len(self.pois) + len(self.side.units)
+        first = len(self.pois) + len(self.state.units)
         rows = first + len(self.floors)
-        # What is required may be missed, at a price; under a risk measure the floors have columns of their own instead.
-        missed = [self._row[j] for j in sorted(self.side.required)]
+        # Requirements may be violated at a penalty; under a risk measure the floors have columns of their own instead.
+        missed = [self._row[j] for j in sorted(self.state.required)]
         missed += [] if self.risk else list(range(first, rows))
         costs, entries = self.risk.costs() if self.risk else (np.zeros(0), np.zeros((len(self.floors), 0)))
         costs = costs * self.sizes.max(initial=0.0)  # in units of the rows, so that tolerances are relative
@@ -144,7 +144,7 @@ class Master:
         build = RowBuilder()
         for row in range(len(self.pois)):
             build.add([own[row]] if row in own else [], [1.0] * (row in own), 1.0 if row in own else -np.inf, 1.0)
-        for unit in self.side.units:
+        for unit in self.state.units:
             build.add([], [], -np.inf, float(unit.count))
         for k, floor in enumerate(self.floors):
             used = np.flatnonzero(entries[k])
@@ -165,7 +165,7 @@ class Master:
         new = [c for c in columns if (unit, c.route) not in self._present]
         if not new:
             return 0
-        units, floors = len(self.side.units), len(self.floors)
+        units, floors = len(self.state.units), len(self.floors)
         visits = np.array([c.visits for c in new])
         counted = np.array([self.counted(c) for c in new]).reshape(len(new), self.cuts)
         levels = np.array([c.floors for c in new]).reshape(len(new), floors)
@@ -179,49 +179,49 @@ class Master:
         self._blocks.append((np.full(len(new), unit), values, np.hstack([visits, levels, counted])))
         return len(new)
 
-    def most(self, prices: Prices) -> FloatArray:
-        """Greatest value of each unit's routes less the prices of what they take; 0 at least, shape (units,)."""
-        found = np.zeros(len(self.side.units))
+    def most(self, duals: Duals) -> FloatArray:
+        """Greatest value of each unit's routes less their rows' duals; 0 at least, shape (units,)."""
+        found = np.zeros(len(self.state.units))
         if self._blocks:
             self._blocks = [tuple(np.concatenate(part) for part in zip(*self._blocks, strict=True))]  # type: ignore[list-item]
             unit, value, taken = self._blocks[0]
-            np.maximum.at(found, unit, value - taken @ np.concatenate([prices.visit, prices.floor, prices.cut]))
+            np.maximum.at(found, unit, value - taken @ np.concatenate([duals.visit, duals.floor, duals.cut]))
         return found
 
     def solve(self, time_limit_s: float) -> Relaxed:
         """The relaxation over the columns so far."""
         return self._program.solve(time_limit_s)
 
-    def prices(self, solved: Relaxed) -> Prices:
+    def duals(self, solved: Relaxed) -> Duals:
         """Its duals."""
         visit = np.zeros(self.n)
         visit[list(self.pois)] = solved.duals[:len(self.pois)]
         unit, floor, cut = np.split(solved.duals[len(self.pois):],
-                                    np.cumsum([len(self.side.units), len(self.floors)]))
-        return Prices(visit=visit, unit=unit, floor=floor / self.sizes, cut=np.maximum(cut, 0.0))
+                                    np.cumsum([len(self.state.units), len(self.floors)]))
+        return Duals(visit=visit, unit=unit, floor=floor / self.sizes, cut=np.maximum(cut, 0.0))
 
-    def bound(self, prices: Prices, best: FloatArray) -> float:
-        """Upper bound on the program over all columns, from any prices of the right signs.
+    def bound(self, duals: Duals, best: FloatArray) -> float:
+        """Upper bound on the program over all columns, from any duals of the right signs.
 
         Args:
-            prices: The prices.
-            best: Upper bound on a route's value less its visits' prices, of each unit, shape (units,).
+            duals: The duals.
+            best: Upper bound on a route's value less its visits' duals, for each unit, shape (units,).
         """
-        counts = np.array([u.count for u in self.side.units], dtype=np.float64)
-        return float(prices.visit.sum() + prices.floor @ self.floors + prices.cut.sum()
+        counts = np.array([u.count for u in self.state.units], dtype=np.float64)
+        return float(duals.visit.sum() + duals.floor @ self.floors + duals.cut.sum()
                      + counts @ np.maximum(best, 0.0))
 
-    def solve_whole(self, time_limit_s: float) -> Outcome:
-        """The best choice of whole columns; the program is then of no more use."""
-        return self._program.solve_whole(np.arange(self.others, self.others + len(self.entries)), time_limit_s)
+    def solve_integer(self, time_limit_s: float) -> Outcome:
+        """The best integer choice of columns; the program is lost by it."""
+        return self._program.solve_integer(np.arange(self.others, self.others + len(self.entries)), time_limit_s)
 
     def share(self, values: FloatArray) -> list[tuple[int, Column, float]]:
         """The columns in use at a point: unit, column and share."""
         used = values[self.others:]
         return [(*self.entries[k], float(used[k])) for k in np.flatnonzero(used > 1e-7)]
 
-    def missed(self, values: FloatArray) -> float:
-        """How much is missed of what is required at a point."""
+    def violation(self, values: FloatArray) -> float:
+        """By how much a point violates the requirements."""
         return float(values[:self.penalties].sum())
 
 

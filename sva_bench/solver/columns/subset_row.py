@@ -58,27 +58,27 @@ class Counter:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Tolls:
-    """What cuts charge a vehicle's routes, bit by bit for compiled labels.
+class CutDuals:
+    """Duals of the cuts for the routes of a vehicle class, bit by bit for compiled labels.
 
     Attributes:
         touch: Cuts of which a site is a POI, shape (n,), uint64.
         recall: Cuts in whose memory a site is, shape (n,), uint64.
-        once: Cuts that charge the first visit, and no other; the others charge each second one.
-        price: What each charges, positive, shape (cuts,).
+        once: Cuts whose dual is due at the first visit alone; that of the others at each second one.
+        dual: Dual of each, positive, shape (cuts,).
     """
 
     touch: NDArray[np.uint64]
     recall: NDArray[np.uint64]
     once: np.uint64
-    price: FloatArray
+    dual: FloatArray
 
 
-def tolls_of(cuts: Sequence[SubsetRow], prices: FloatArray, kind: int, n: int) -> Tolls:
-    """What cuts charge the routes of a class at some prices, shape (cuts,)."""
+def cut_duals_of(cuts: Sequence[SubsetRow], duals: FloatArray, kind: int, n: int) -> CutDuals:
+    """The duals of the cuts, shape (cuts,), for the routes of a vehicle class."""
     touch, recall, once = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.uint64), 0
-    # Cuts without a bit charge nothing: prices are then not lower than they could be, and bounds stay bounds.
-    priced = [int(k) for k in np.argsort(-prices, kind="stable")[:_BITS] if prices[k] > 0.0]
+    # A cut without a bit counts as if its dual were 0: reduced values are then no lower, and bounds stay valid.
+    priced = [int(k) for k in np.argsort(-duals, kind="stable")[:_BITS] if duals[k] > 0.0]
     for number, k in enumerate(priced):
         bit = np.uint64(1) << np.uint64(number)
         touch[list(cuts[k].pois)] |= bit
@@ -87,7 +87,7 @@ def tolls_of(cuts: Sequence[SubsetRow], prices: FloatArray, kind: int, n: int) -
             recall |= bit
         else:
             recall[list(cuts[k].memory)] |= bit
-    return Tolls(touch=touch, recall=recall, once=np.uint64(once), price=np.array([prices[k] for k in priced]))
+    return CutDuals(touch=touch, recall=recall, once=np.uint64(once), dual=np.array([duals[k] for k in priced]))
 
 
 def separate(

@@ -1,6 +1,6 @@
 """Branch and cut: cuts at the root, branch and bound, again with every cut that its solution breaks.
 
-HiGHS takes no constraints while it branches, so each integer solution that hangs together badly costs another run.
+HiGHS takes no constraints while it branches, so each integer solution that isn't connected costs another run.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.flow.cuts import Cut, violated_by_fractions, violated_by_integers
+from sva_bench.solver.flow.cuts import violated_by_fractions, violated_by_integers
 from sva_bench.solver.highs import Outcome, Relaxation, maximise
-from sva_bench.solver.knowledge import Clock, Knowledge, Progress, adopt, without_idle_stops
-from sva_bench.solver.program import Goal, LinearModel, Rows
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.knowledge import Cut, adopt, without_idle_stops
+from sva_bench.solver.problem import Problem
+from sva_bench.solver.program import LinearModel, Rows
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.units import LARGEST
 
@@ -44,44 +45,48 @@ class FlowModel(Protocol):
         """How often a vehicle drives each leg in a point of the model, shape (n, n)."""
 
     def order(self, values: FloatArray, vehicle: int) -> tuple[int, ...]:
-        """POIs of a vehicle's route in an integer point, as far as it hangs together with the base."""
+        """POIs of a vehicle's route in an integer point, as far as it is connected with the base."""
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point of the model; ``None`` where it uses a leg that the model leaves out."""
 
 
-def prove_by_cuts(
-    flow: FlowModel, instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, progress: Progress,
-) -> None:
-    """Prove the plan of ``progress``, or a better one, within the gap."""
+def prove_by_cuts(flow: FlowModel, problem: Problem) -> None:
+    """Prove the plan of ``problem.progress``, or a better one, within the gap.
+
+    Args:
+        flow: A model of the problem.
+        problem: The problem.
+    """
+    progress, clock = problem.progress, problem.clock
     largest = float(np.abs(flow.model.objective).max(initial=0.0))
     # Multiples of one number become integers, if not too large: HiGHS then rounds its bounds.
     size = progress.grain if 0 < largest <= _INTEGERS * progress.grain else largest / LARGEST or 1.0
     model = replace(flow.model, objective=flow.model.objective / size)
     began = clock.used_s()
-    cuts, model = _root(flow, instance, known, clock, gap, progress, model, size)
+    cuts, model = _root(flow, problem, model, size)
     progress.seconds["root"] = clock.used_s() - began
     began = clock.used_s()
-    _branch(flow, instance, goal, known, clock, gap, progress, model, size, cuts)
+    _branch(flow, problem, model, size, cuts)
     progress.seconds["branch"] = clock.used_s() - began
 
 
 def _root(
-    flow: FlowModel, instance: Instance, known: Knowledge, clock: Clock, gap: float, progress: Progress,
-    model: LinearModel, size: float,
+    flow: FlowModel, problem: Problem, model: LinearModel, size: float,
 ) -> tuple[list[Cut], LinearModel]:
     """Tighten the relaxation by cuts; those that are tight in the end, and the model without what can't be better.
 
-    Lowers the bound of ``progress``.
+    Lowers the bound of ``problem.progress``.
     """
-    cuts = list(known.cuts)
+    progress, clock = problem.progress, problem.clock
+    cuts = list(problem.known.cuts)
     relaxation = Relaxation(model)
     relaxation.add(flow.rows(cuts))
     present, idle, last = set(cuts), 0, math.inf
     activity: FloatArray = np.zeros(0)
     upper = model.upper.copy()
     for _ in range(ROOT_ROUNDS):
-        if clock.out() or progress.closed(gap):
+        if clock.out() or progress.closed(problem.gap):
             break
         relaxed = relaxation.solve(clock.left_s())
         progress.rounds += 1
@@ -98,7 +103,7 @@ def _root(
         upper[model.integer & worse] = 0.0
         idle = idle + 1 if last - relaxed.objective < _STALL * max(abs(relaxed.objective), 1e-9) else 0
         last = relaxed.objective
-        new = [cut for cut in _separate(flow, instance, relaxed.values) if cut not in present]
+        new = [cut for cut in _separate(flow, problem.instance, relaxed.values) if cut not in present]
         if not new or idle >= _IDLE_ROUNDS:
             break
         relaxation.add(flow.rows(new))
@@ -106,18 +111,15 @@ def _root(
         present.update(new)
     slack = activity[len(model.rows.lower):]
     tight = [cut for cut, room in zip(cuts, slack, strict=False) if room < 1e-6]
-    known.cuts.update(dict.fromkeys(tight))
+    problem.known.cuts.update(dict.fromkeys(tight))
     _log.debug("root: bound %.6g, value %.6g, %d of %d cuts kept, %d of %d columns", progress.bound, progress.value,
                len(tight), len(cuts), int((upper > 0).sum()), len(upper))
     return tight, replace(model, upper=upper)
 
 
-def _branch(
-    flow: FlowModel, instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, progress: Progress,
-    model: LinearModel, size: float, cuts: list[Cut],
-) -> None:
+def _branch(flow: FlowModel, problem: Problem, model: LinearModel, size: float, cuts: list[Cut]) -> None:
     """Branch and bound, again with every cut that its solution breaks."""
-    pois = frozenset(instance.pois)
+    progress, clock, gap = problem.progress, problem.clock, problem.gap
     while not progress.closed(gap):
         if clock.out():
             progress.status = "time_limit"
@@ -129,25 +131,24 @@ def _branch(
         progress.rounds += 1
         progress.nodes += outcome.nodes
         progress.tighten(progress.value if outcome.status == "infeasible" else outcome.bound * size)
-        broken = _integers(flow, instance, goal, known, outcome, pois, progress)
+        broken = _integers(flow, problem, outcome)
         if outcome.status in ("time_limit", "interrupted"):
             progress.status = outcome.status
             return
         if not broken:
             return
-        new = [replace(cut, vehicle=m) for cut in broken for m in range(len(instance.vehicles))]
+        new = [replace(cut, vehicle=m) for cut in broken for m in range(len(problem.instance.vehicles))]
         cuts = list(dict.fromkeys([*cuts, *new]))
-        known.cuts.update(dict.fromkeys(new))
+        problem.known.cuts.update(dict.fromkeys(new))
         _log.debug("branch: bound %.6g, value %.6g, %d cuts broken", progress.bound, progress.value, len(broken))
 
 
-def _integers(
-    flow: FlowModel, instance: Instance, goal: Goal, known: Knowledge, outcome: Outcome, pois: frozenset[int],
-    progress: Progress,
-) -> list[Cut]:
-    """Take up an integer solution, as far as it hangs together with the base; the cuts that it breaks."""
+def _integers(flow: FlowModel, problem: Problem, outcome: Outcome) -> list[Cut]:
+    """Take up an integer solution, as far as it is connected with the base; the cuts that it breaks."""
     if outcome.values is None:
         return []
+    instance, goal, known = problem.instance, problem.goal, problem.known
+    pois = frozenset(instance.pois)
     broken: list[Cut] = []
     orders = []
     for m, road in enumerate(known.roads):
@@ -156,7 +157,7 @@ def _integers(
         if quickest(road, order) is None:
             raise RuntimeError(f"the solver's route of {instance.vehicles[m].name} breaks its fuel or limit")
         orders.append(without_idle_stops(road, order, goal.rewarded()[m]))
-    adopt(progress, goal, known, tuple(orders))
+    adopt(problem.progress, goal, known, tuple(orders))
     return broken
 
 

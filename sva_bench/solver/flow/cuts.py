@@ -7,7 +7,6 @@ The only importer of networkx.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import networkx
 import numpy as np
@@ -15,26 +14,13 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from sva_bench.arrays import FloatArray
-from sva_bench.solver.program import Legs, Rows
+from sva_bench.solver.flow.formulation import Legs
+from sva_bench.solver.knowledge import Cut
+from sva_bench.solver.program import Rows
 
 TOLERANCE = 0.02  # violation below which a fractional cut costs more than it gains
 CUTS_A_ROUND = 20  # per vehicle
 _SCALE = 1_000_000  # the maximum flow is computed in integers
-
-
-@dataclass(frozen=True, kw_only=True, order=True)
-class Cut:
-    """One cut of one vehicle.
-
-    Attributes:
-        vehicle: Number of the vehicle.
-        inside: The sites of S, without the base, in order.
-        poi: The POI i in S.
-    """
-
-    vehicle: int
-    inside: tuple[int, ...]
-    poi: int
 
 
 def cut_rows(cuts: Iterable[Cut], legs: Legs, n: int) -> Rows:
@@ -57,7 +43,7 @@ def cut_rows(cuts: Iterable[Cut], legs: Legs, n: int) -> Rows:
 
 
 def violated_by_integers(visits: FloatArray, vehicle: int, base: int, pois: frozenset[int]) -> list[Cut]:
-    """Cuts for the parts of an integer solution that hang together but not with the base.
+    """Cuts for the components of an integer solution that aren't connected with the base.
 
     Args:
         visits: ``y`` of the vehicle, shape (n, n).

@@ -8,11 +8,13 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.flow.cuts import Cut, cut_rows
-from sva_bench.solver.knowledge import drive
+from sva_bench.solver.flow.cuts import cut_rows
+from sva_bench.solver.flow.formulation import columns_of, formulate
+from sva_bench.solver.goal import Goal
+from sva_bench.solver.knowledge import Cut, drive
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, LinearModel, Rows, columns_of, formulate
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.program import LinearModel, Rows
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.refuelling import Road
 
 
@@ -38,7 +40,7 @@ class DirectedModel:
         walk = euler_walk(np.rint(self.visits(values, vehicle)), self._instance.base)
         return tuple(j for j in walk if j in self._pois)
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point."""
         routes = [drive(road, order) for road, order in zip(self._roads, orders, strict=True)]
         return columns_of(self._instance, self.legs, self._scopes, routes)

@@ -23,12 +23,14 @@ from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.cuts import violated_by_integers
 from sva_bench.solver.flow.expected import DirectedModel
 from sva_bench.solver.flow.recourse import legs_out_of_pois, together
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.highs import Relaxation, maximise
-from sva_bench.solver.knowledge import Clock, Knowledge, Progress, adopt, without_idle_stops
+from sva_bench.solver.knowledge import Knowledge, adopt, without_idle_stops
 from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, LinearModel, RowBuilder, Rows
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.problem import Problem
+from sva_bench.solver.program import LinearModel, RowBuilder, Rows
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.units import LARGEST
 
 _log = logging.getLogger(__name__)
@@ -37,12 +39,11 @@ _log = logging.getLogger(__name__)
 _TOLERANCE = 1e-9  # relative; a cut that is broken by less adds nothing
 
 
-def prove_by_duals(
-    instance: Instance, scopes: Sequence[Scope], goal: Goal, recourse: Outcomes, kind: Cuts, known: Knowledge,
-    clock: Clock, gap: float, progress: Progress,
-) -> None:
-    """Prove the plan of ``progress``, or a better one, within the gap, by the L-shaped method."""
-    master = _Master(instance, scopes, goal, known, recourse, kind)
+def prove_by_duals(problem: Problem) -> None:
+    """Prove the plan of ``problem.progress``, or a better one, within the gap, by the L-shaped method."""
+    instance, goal, known, progress = problem.instance, problem.goal, problem.known, problem.progress
+    clock, gap = problem.clock, problem.gap
+    master = _Master(instance, problem.scopes, goal, known, problem.second_stage, problem.cuts)
     pois = frozenset(instance.pois)
     subtours = list(known.cuts)
     iteration = 0
@@ -118,7 +119,7 @@ class _Master(DirectedModel):
             build.add([first + eta, *used], [1.0, *(-lost[used])], 0.0, np.inf)
         return build.rows()
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point, with the least cost of the second stage that the cuts allow."""
         first = super().point(orders)
         if first is None:
@@ -144,25 +145,25 @@ class _Master(DirectedModel):
         """What each leg loses in an outcome, by the duals of its recourse program."""
         lost = self._lost[outcome]
         if self._kind == "pareto":
-            price = np.zeros(len(lost))
+            dual = np.zeros(len(lost))
             for costs, used in self._groups:
                 if lost[used[0]]:
-                    price[used] = -float(np.max(self._earned[used] / costs)) * costs
-            rest = np.where(self._onward, np.maximum(-self._earned - price, 0.0), 0.0)
-            return self._by_origin(-(lost * price + rest), lost * self._earned)
+                    dual[used] = -float(np.max(self._earned[used] / costs)) * costs
+            rest = np.where(self._onward, np.maximum(-self._earned - dual, 0.0), 0.0)
+            return self._by_origin(-(lost * dual + rest), lost * self._earned)
         program = self._duals[outcome]
         rows = np.concatenate([[lost[used[0]] * float(costs @ driven[used]) for costs, used in self._groups],
                                np.where(self._onward, driven, lost * driven)])
         lower = np.concatenate([rows[:len(self._groups)], np.where(self._onward, -np.inf, lost * driven)])
-        program.set_sides(lower, rows)
+        program.set_row_bounds(lower, rows)
         solved = program.solve(np.inf)
         if solved.values is None:
             raise RuntimeError(f"the recourse program of outcome {outcome} is {solved.status}")
-        price = np.zeros(len(lost))
+        dual = np.zeros(len(lost))
         for number, (costs, used) in enumerate(self._groups):
-            price[used] = solved.duals[number] * costs
+            dual[used] = solved.duals[number] * costs
         rest = solved.duals[len(self._groups):]
-        return self._by_origin(-(lost * price + rest), -lost * rest)
+        return self._by_origin(-(lost * dual + rest), -lost * rest)
 
     def _by_origin(self, onward: FloatArray, refuelled: FloatArray) -> FloatArray:
         """One figure for legs out of POIs, another for legs out of refuels."""

@@ -16,10 +16,11 @@ from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.errors import BadInput
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.expected import DirectedModel
+from sva_bench.solver.goal import Goal
 from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import Goal, LinearModel, RowBuilder, Rows
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.program import LinearModel, RowBuilder, Rows
+from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.refuelling import Road
 
 LEAST_AVAILABILITY = 1e-4
@@ -36,7 +37,7 @@ def refuse_free_legs(instance: Instance) -> None:
         free = np.argwhere((vehicle.fuel_s <= 0) & ~np.eye(len(instance.sites), dtype=np.bool_))
         if len(free):
             i, j = (instance.sites[k] for k in free[0])
-            raise BadInput(f"instance {instance.name}: {vehicle.name} drives {i} -> {j} for nothing, and the paper's "
+            raise BadInput(f"instance {instance.name}: {vehicle.name} drives {i} -> {j} at no cost, and the paper's "
                            "second stage needs costs above 0; use the method auto or expected")
 
 
@@ -57,7 +58,7 @@ def refuse_seldom_available(instance: Instance, availability: float) -> None:
 
 
 class EquivalentModel(DirectedModel):
-    """The deterministic equivalent: both stages in one program, the second one whole or relaxed."""
+    """The deterministic equivalent: both stages in one program, the second one integer or relaxed."""
 
     def __init__(
         self, instance: Instance, scopes: Sequence[Scope], goal: Goal, roads: Sequence[Road], recourse: Outcomes, *,
@@ -92,7 +93,7 @@ class EquivalentModel(DirectedModel):
         out: BoolArray = np.isin(self.legs.origin, instance.pois)
         return out
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point, with its only feasible recourse ``v = (1 - alpha) y``."""
         first = super().point(orders)
         if first is None:

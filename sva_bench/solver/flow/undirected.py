@@ -15,10 +15,11 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.flow.cuts import Cut
-from sva_bench.solver.preprocess import Scope
-from sva_bench.solver.program import SLACK_S, Goal, LinearModel, RowBuilder, Rows, sizes_of
-from sva_bench.solver.routes.heuristic import Orders
+from sva_bench.solver.goal import Goal, sizes_of
+from sva_bench.solver.knowledge import Cut
+from sva_bench.solver.preprocess import SLACK_S, Scope
+from sva_bench.solver.program import LinearModel, RowBuilder, Rows
+from sva_bench.solver.routes.heuristic import VisitOrders
 
 
 class UndirectedModel:
@@ -106,7 +107,7 @@ class UndirectedModel:
             order.append(there)
             here = there
 
-    def point(self, orders: Orders) -> FloatArray | None:
+    def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point."""
         point = np.zeros(len(self.model.objective))
         for m, order in enumerate(orders):

@@ -15,9 +15,8 @@ from numba import njit
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.solver.looking import look, stop_mark
-from sva_bench.solver.preprocess import shortest_paths
-from sva_bench.solver.program import SLACK_S
+from sva_bench.solver.polling import poll, stop_flag
+from sva_bench.solver.preprocess import SLACK_S, shortest_paths
 
 FRONT = 12
 """Most pairs of a front. Real ones have two to four; a longer one loses its slowest pairs, and a search some routes."""
@@ -33,9 +32,9 @@ class Tables:
         fuel_s: Fuel of a leg [s], shape (kinds, n, n).
         time_s: Driving time of a leg and the stop at its end [s], shape (kinds, n, n).
         quickest_s: Least time from a site to another, directly or over stations [s], shape (kinds, n, n).
-        first: Where the ways over stations between two sites begin in ``hops``, shape (kinds, n, n).
+        first: Where the chains of stations between two sites begin in ``hops``, shape (kinds, n, n).
         last: Where they end, shape (kinds, n, n).
-        hops: Ways over stations: fuel to the first station, time in all, fuel from the last one [s], shape (hops, 3).
+        hops: Chains of stations: fuel to the first station, time in all, fuel from the last one [s], shape (hops, 3).
         capacity_s: Fuel capacity [s], shape (kinds,).
         limit_s: Mission limit [s], shape (kinds,).
     """
@@ -74,8 +73,8 @@ def tables_of(instance: Instance) -> Tables:
         if len(stations) and vehicle.fuel_capacity_s < vehicle.mission_limit_s:
             chain = shortest_paths(quickest[k][np.ix_(stations, stations)], -1)
             with deferring_ctrl_c():
-                found, first[k], last[k] = _ways(fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k],
-                                                 stop_mark())
+                found, first[k], last[k] = _station_chains(
+                    fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k], stop_flag())
             first[k] += offset
             last[k] += offset
             offset += len(found)
@@ -87,8 +86,8 @@ def tables_of(instance: Instance) -> Tables:
 
 
 @njit(cache=True)
-def _ways(fuel, time, chain, stations, capacity, quickest, stop):
-    """The ways over stations that no other beats in all three respects, by increasing time; lowers ``quickest``."""
+def _station_chains(fuel, time, chain, stations, capacity, quickest, stop):
+    """The chains of stations that no other dominates in all three respects, by increasing time; lowers ``quickest``."""
     n, count = len(fuel), len(stations)
     first, last = np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
     found = np.empty((1024, 3))
@@ -96,7 +95,7 @@ def _ways(fuel, time, chain, stations, capacity, quickest, stop):
     some = np.empty((count * count, 3))
     for a in range(n):
         for b in range(n):
-            if look(stop):  # with a thousand stations each of so many pairs has a million ways
+            if poll(stop):  # with a thousand stations each of so many pairs has a million chains
                 return found[:0].copy(), np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
             first[a, b] = size
             number = 0
@@ -142,7 +141,7 @@ def step(times, fuels, count, leg_time, leg_fuel, hops, begin, end, near, far, c
     direct = 0
     hop = begin
     while True:
-        # Next direct candidate, and next way over stations; the earlier one first.
+        # Next direct candidate, and next chain of stations; the earlier one first.
         while direct < count and fuels[direct] + leg_fuel > capacity:
             direct += 1
         time_direct = times[direct] + leg_time if direct < count else np.inf
@@ -168,7 +167,7 @@ def step(times, fuels, count, leg_time, leg_fuel, hops, begin, end, near, far, c
             if direct >= count and hop >= end:
                 return size
             continue
-        # Insert into the front; ways come by increasing time of their own, not of their sum.
+        # Insert into the front; chains come by increasing time of their own, not of their sum.
         place = size
         while place > 0 and to_times[place - 1] > time:
             place -= 1
@@ -177,7 +176,7 @@ def step(times, fuels, count, leg_time, leg_fuel, hops, begin, end, near, far, c
         stop = place
         while stop < size and to_fuels[stop] >= fuel:
             stop += 1
-        if stop == place:  # nothing beaten: make room
+        if stop == place:  # none dominated: make room
             if size == FRONT:
                 if place == FRONT:
                     continue

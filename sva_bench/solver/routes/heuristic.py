@@ -14,13 +14,13 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
-from sva_bench.solver.looking import stop_mark
+from sva_bench.solver.polling import stop_flag
 from sva_bench.solver.routes.fronts import FRONT, Tables
 from sva_bench.solver.routes.packing import Route, best_packing
 from sva_bench.solver.routes.ruin_recreate import rounds as run_rounds
 from sva_bench.solver.routes.ruin_recreate import straighten
 
-Orders = tuple[tuple[int, ...], ...]
+VisitOrders = tuple[tuple[int, ...], ...]
 """POIs of each vehicle, in order of visit."""
 
 STARTS = 4
@@ -29,8 +29,8 @@ _LARGE = 120  # sites from which on rounds get fewer, for they get slower
 _POOL = 5000  # routes kept of one start
 _CYCLE = 50  # rounds between two returns to the best plan, or to nothing
 _HEAT = 0.03  # loss that is taken at the start of a cycle, relative to the best value
-_LOOKS = 4  # at the clock, in the rounds after a start
-_DETOUR = 0.01  # of the median leg; keeps a POI on the way from looking infinitely good
+_POLLS = 4  # of the clock, in the rounds after a start
+_DETOUR = 0.01  # of the median leg; keeps the ratio finite for a POI that costs no detour
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,14 +42,14 @@ class Found:
         routes: The routes met that count for the relaxation, each with its vehicle.
     """
 
-    orders: Orders
+    orders: VisitOrders
     routes: tuple[Route, ...]
 
 
 def search(
-    tables: Tables, weights: FloatArray, survival: FloatArray, start: Orders, *, seed: int = 0, starts: int = STARTS,
-    stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
-    offer: Callable[[Orders], None] = lambda orders: None,  # noqa: ARG005
+    tables: Tables, weights: FloatArray, survival: FloatArray, start: VisitOrders, *, seed: int = 0,
+    starts: int = STARTS, stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
+    offer: Callable[[VisitOrders], None] = lambda orders: None,  # noqa: ARG005
 ) -> Found:
     """A plan worth at least as much as the one it starts from.
 
@@ -84,14 +84,14 @@ def search(
         pool, length, kind = np.zeros((_POOL, n), np.int16), np.zeros(_POOL, np.int64), np.zeros(_POOL, np.int64)
         table, keys = np.full(2 * _POOL + 1, -1, np.int64), rng.integers(0, 2**63, n, dtype=np.uint64)
         size = 0
-        looks = (0, *range(1, rounds, -(-rounds // _LOOKS)), rounds)  # a first plan at once
-        for done, until in itertools.pairwise(looks):
+        polls = (0, *range(1, rounds, -(-rounds // _POLLS)), rounds)  # a first plan at once
+        for done, until in itertools.pairwise(polls):
             with deferring_ctrl_c():
                 size = run_rounds(
                     rng, until - done, done, _CYCLE, _HEAT, tables.kind, tables.base, tables.fuel_s,
                     tables.time_s, tables.quickest_s, tables.first, tables.last, tables.hops, tables.capacity_s,
                     tables.limit_s, near, weights, survival, detour, current, current_length, incumbent,
-                    incumbent_length, pool, length, kind, size, table, keys, ordered, stop_mark())
+                    incumbent_length, pool, length, kind, size, table, keys, ordered, stop_flag())
                 found = _as_orders(incumbent, incumbent_length)
                 if value_of(weights, survival, found) > value_of(weights, survival, best):
                     best = found
@@ -108,13 +108,13 @@ def search(
     return Found(orders=best, routes=good)
 
 
-def value_of(weights: FloatArray, survival: FloatArray, orders: Orders) -> float:
+def value_of(weights: FloatArray, survival: FloatArray, orders: VisitOrders) -> float:
     """Sum of the rewards, each times the chance to get that far."""
     return math.fsum(weights[m, j] * survival[m]**k if survival[m] < 1 else weights[m, j]
                      for m, order in enumerate(orders) for k, j in enumerate(order, start=1))
 
 
-def shorten(tables: Tables, orders: Orders) -> Orders:
+def shorten(tables: Tables, orders: VisitOrders) -> VisitOrders:
     """The same visits, each vehicle's in an order that no reversal and no move of up to three of them makes quicker."""
     n = tables.fuel_s.shape[1]
     array, length = _as_arrays(orders, n)
@@ -124,16 +124,16 @@ def shorten(tables: Tables, orders: Orders) -> Orders:
             if length[m]:
                 straighten(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
                            tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
-                           np.zeros((4, FRONT)), spare, sums, stop_mark())
+                           np.zeros((4, FRONT)), spare, sums, stop_flag())
     return _as_orders(array, length)
 
 
-def _as_arrays(orders: Orders, n: int) -> tuple[IntArray, IntArray]:
+def _as_arrays(orders: VisitOrders, n: int) -> tuple[IntArray, IntArray]:
     array, length = np.zeros((len(orders), n), np.int64), np.array([len(order) for order in orders], dtype=np.int64)
     for m, order in enumerate(orders):
         array[m, :len(order)] = order
     return array, length
 
 
-def _as_orders(array: IntArray, length: IntArray) -> Orders:
+def _as_orders(array: IntArray, length: IntArray) -> VisitOrders:
     return tuple(tuple(array[m, :length[m]].tolist()) for m in range(len(length)))

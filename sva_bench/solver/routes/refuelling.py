@@ -1,4 +1,4 @@
-"""Refuelling: the quickest way to visit POIs in a given order, exact, by a Pareto front of (time, fuel)."""
+"""Refuelling: the quickest route over POIs in a given order, exact, by a Pareto front of (time, fuel)."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.solver.preprocess import shortest_paths
-from sva_bench.solver.program import SLACK_S
+from sva_bench.solver.preprocess import SLACK_S, shortest_paths
 
 
 class _Hop(NamedTuple):
-    """A way from one stop to the next by stations.
+    """A chain of stations from one stop to the next.
 
     Attributes:
         fuel_s: Fuel to the first station [s].
@@ -42,7 +41,7 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Road:
-    """One vehicle's legs, and the ways over stations as they come to be known.
+    """One vehicle's legs, and the chains of stations, computed as they are needed.
 
     Attributes:
         base: The base.
@@ -120,7 +119,7 @@ def _quickest(road: Road, pois: tuple[int, ...]) -> Drive | None:
 
 
 def _hops(road: Road, here: int, there: int) -> list[_Hop]:
-    """The ways from here to there over at least one station that no other one beats in all respects."""
+    """The chains of at least one station from here to there that no other one dominates."""
     if (here, there) in road.hops:
         return road.hops[here, there]
     found = []

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sva_bench.solver.looking import look
+from sva_bench.solver.polling import poll
 from sva_bench.solver.routes.fronts import FRONT, fronts, route_time, time_with
 
-_SHORT = 8  # POIs up to which a longer way may be tried, for it may save a refuel
+_SHORT = 8  # POIs up to which slower orders are tried, for they may save a refuel
 _RUIN = 0.6  # greatest share of the visits removed
 _BAN = 0.7  # share of the rounds in which POIs are barred from a random vehicle
 _SWAP = 0.1  # share of the rounds that begin by swapping the routes of two vehicles
@@ -36,6 +36,8 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
            pool_size, pool_table, keys, ordered, stop):
     """So many rounds; works on ``current``, ``best`` and ``pool`` in place; the size of the pool.
 
+    Long because compiled: a dozen scratch arrays are made once, and each part would need nearly all of them.
+
     Args:
         rng: Random numbers.
         count: Rounds.
@@ -47,9 +49,9 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
         near: For each POI the others by their distance, shape (n, n).
         weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
         survival: Chance to get to the next POI, shape (M,); 1 where the order of visits is indifferent.
-        detour: Keeps a POI on the way from looking infinitely good [s].
+        detour: Added to each detour, so that the ratio stays finite [s].
         current: POIs of each vehicle, in order, shape (M, n); ``current_length``: how many, shape (M,).
-        best: The best plan, alike.
+        best: The best plan, in the same form.
         pool: Routes met, shape (most, n), with length, kind and a hash table of twice their number or more.
         keys: Random keys of the sites for hashing, shape (n,).
         ordered: Whether routes with the same POIs in another order are different ones.
@@ -71,7 +73,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
         current_value += worth(current[m], current_length[m], weights[m], survival[m])
         best_value += worth(best[m], best_length[m], weights[m], survival[m])
     for number in range(done, done + count):
-        if look(stop):
+        if poll(stop):
             break
         orders[:], lengths[:] = current, current_length
         if vehicles > 1 and rng.random() < _SWAP:
@@ -117,7 +119,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
         if value >= current_value - heat * left * best_value:
             current[:], current_length[:] = orders, lengths
             current_value = value
-        if number % cycle == cycle - 1:  # begin anew by turns from nothing and from the best
+        if number % cycle == cycle - 1:  # restart by turns from nothing and from the best
             current[:], current_length[:] = best, best_length
             current_value = best_value
             if number // cycle % 2 == 0:
@@ -154,9 +156,9 @@ def _ruin(rng, orders, lengths, near, removed):
     if visits == 0:
         return
     count = 1 + int(rng.random() * max(1, int(_RUIN * visits)))
-    way = int(rng.random() * 3)
+    operator = int(rng.random() * 3)
     removed[:] = False
-    if way == 0:  # any: each with the chance that leaves so many on average
+    if operator == 0:  # any: each with the chance that leaves so many on average
         for m in range(len(lengths)):
             for k in range(lengths[m]):
                 removed[orders[m, k]] = rng.random() * visits < count
@@ -166,12 +168,12 @@ def _ruin(rng, orders, lengths, near, removed):
         centre = -1
         for m in range(len(lengths)):
             for k in range(lengths[m]):
-                if way == 1:
+                if operator == 1:
                     removed[orders[m, k]] = start <= seen < start + count
                 elif seen == start:
                     centre = orders[m, k]
                 seen += 1
-        if way == 2:
+        if operator == 2:
             spread = int(count * len(near) / visits)
             for k in range(min(spread, len(near))):
                 removed[near[centre, k]] = True
@@ -188,7 +190,11 @@ def _ruin(rng, orders, lengths, near, removed):
 def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel, time, quickest, first, last, hops,
               capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score, place, least,
               reward, total, scratch):
-    """Insert POIs, those of most reward for the least detour first, until none fits."""
+    """Insert POIs, those of most reward for the least detour first, until none fits.
+
+    Long because compiled: what is known of a detour is kept from one insertion to the next, in arrays that each part
+    would need.
+    """
     vehicles, n = weights.shape
     visited[:] = False
     score[:] = 0.0
@@ -284,7 +290,7 @@ def straighten(order, length, base, fuel, time, first, last, hops, capacity, lim
     ahead, back = sums[0], sums[1]
     _sums(order, length, base, time, ahead, back)
     improved = True
-    while improved and not look(stop):
+    while improved and not poll(stop):
         improved = False
         for i in range(length):
             for j in range(i + 1, length):
@@ -313,15 +319,15 @@ def straighten(order, length, base, fuel, time, first, last, hops, capacity, lim
                     without = ahead[i + size + 1] - ahead[i] - (time[before, after] if before != after else 0.0)
                     a = base if position == 0 else order[position - 1]
                     b = base if position == length else order[position]
-                    for way in range(2 if size > 1 else 1):
-                        if way == 0:
+                    for backwards in range(2 if size > 1 else 1):
+                        if backwards == 0:
                             change = time[a, order[i]] + ahead[i + size] - ahead[i + 1] + time[order[i + size - 1], b]
                         else:
                             change = time[a, order[i + size - 1]] + back[i + size] - back[i + 1] + time[order[i], b]
                         change -= without + time[a, b]
                         if change >= -_EPSILON and survival == 1.0 and (length > _SHORT or not refuels):
                             continue
-                        _move(order, length, i, size, position, way, spare)
+                        _move(order, length, i, size, position, backwards, spare)
                         later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit,
                                            scratch)
                         gain = worth(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
@@ -344,13 +350,13 @@ def _sums(order, length, base, time, ahead, back):
 
 
 @njit(cache=True)
-def _move(order, length, start, size, position, way, to):
-    """The order with a block moved before another position, reversed if ``way`` is 1."""
+def _move(order, length, start, size, position, backwards, to):
+    """The order with a block moved before another position, reversed if ``backwards`` is 1."""
     filled = 0
     for k in range(length + 1):
         if k == position:
             for b in range(size):
-                to[filled] = order[start + b] if way == 0 else order[start + size - 1 - b]
+                to[filled] = order[start + b] if backwards == 0 else order[start + size - 1 - b]
                 filled += 1
         if k < length and not start <= k < start + size:
             to[filled] = order[k]

@@ -1,4 +1,4 @@
-"""Pictures of maps as grey levels. The only importer of PIL, which tells the formats apart by their content."""
+"""Pictures of maps as grey levels. The only importer of PIL, which recognises the formats by their content."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sva_bench.arrays import BoolArray
 from sva_bench.world.maps.plain_images import plain_levels, plain_size
 
 MAX_CELLS = 16_000_000  # 4000 x 4000: four times the largest map that the benchmarks speak of
-_FORMATS = ("PPM", "PNG", "BMP")  # PIL calls the whole family of PGM by its last member
+_FORMATS = ("PPM", "PNG", "BMP")  # PIL calls the PGM family by its last member
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # before numbers written out by an editor
 _DEEP = ("I", "I;16", "I;16B", "I;16L", "I;16N")  # 16 bits a pixel
 

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from sva_bench.errors import BadFile
+from sva_bench.files.fields import Positive
 from sva_bench.files.printable import counted
 from sva_bench.geometry.cells import Cells
 from sva_bench.world.maps.files import WIDEST_M, MapFile, content_of, locate, normal
 from sva_bench.world.maps.images import MAX_CELLS
+from sva_bench.world.maps.section import MapSection
 
 _FREE_TERRAIN, _SOLID_TERRAIN = b".GS", b"@OTW"
+
+
+class MovingAiMap(MapSection):
+    """An octile map of the MovingAI benchmarks."""
+
+    cell_m: Annotated[Positive, Field(ge=1e-3, le=100)] = 1.0
+
+    def read(self, root: Path, *, anywhere: bool = False) -> tuple[Cells, tuple[MapFile, ...]]:  # noqa: ARG002
+        return read_movingai_map(root, self.file, self.cell_m)
 
 
 def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tuple[MapFile, ...]]:
@@ -28,7 +41,7 @@ def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tupl
     """
     path = locate(root, name)
     content = content_of(path)
-    # An editor's byte-order mark is no part of the text, and no more lines are taken apart than cells may be.
+    # An editor's byte-order mark is no part of the text, and no more lines are split than there may be rows.
     lines = content.removeprefix(b"\xef\xbb\xbf").split(b"\n", MAX_CELLS + 4)
     lines = [line.removesuffix(b"\r") for line in lines]
     while lines and not lines[-1].strip():
@@ -39,7 +52,7 @@ def read_movingai_map(root: Path, name: str, cell_m: float) -> tuple[Cells, tupl
     for number in (1, 2):
         words = lines[number].split() if number < len(lines) else []
         if len(words) != 2 or words[0] not in (b"height", b"width") or not words[1].isdigit() or len(words[1]) > 9:
-            raise BadFile(path, number + 1, "", "expected 'height' and 'width' with a whole number each")
+            raise BadFile(path, number + 1, "", "expected 'height' and 'width' with an integer each")
         size[words[0].decode()] = int(words[1])
     if len(size) != 2:
         raise BadFile(path, 3, "", "expected 'height' and 'width', each once")

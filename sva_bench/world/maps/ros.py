@@ -13,6 +13,7 @@ import math
 import re
 from difflib import get_close_matches
 from pathlib import Path, PurePosixPath
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +26,27 @@ from sva_bench.files.yaml_text import pretty_yaml
 from sva_bench.geometry.cells import Cells
 from sva_bench.world.maps.files import FARTHEST_M, WIDEST_M, MapFile, content_of, locate, normal
 from sva_bench.world.maps.images import BadImage, GreyImage, grey_image
+from sva_bench.world.maps.section import MapSection
 
 _log = logging.getLogger(__name__)
 
 
 _USUAL_UNKNOWN, _MANY = 205, 1e-3  # the level that map_saver writes for unknown; share of cells that is no accident
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
-_MODES: tuple[MapMode, ...] = ("trinary", "scale", "raw")
+_MODES: tuple[MapMode, ...] = get_args(MapMode)
 _YES, _NO = ("true", "yes", "on", "1"), ("false", "no", "off", "0")  # YAML 1.1 has all of them, and ROS reads it
+
+
+class RosMap(MapSection):
+    """A map of map_server or Nav2: its YAML file."""
+
+    unknown: Unknown = "occupied"
+
+    def read(self, root: Path, *, anywhere: bool = False) -> tuple[Cells, tuple[MapFile, ...]]:
+        return read_ros_map(root, self.file, self.unknown, anywhere=anywhere)
+
+    def written(self) -> dict[str, str | float]:
+        return self.model_dump(exclude_defaults=True)
 
 
 def read_ros_map(

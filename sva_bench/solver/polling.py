@@ -1,6 +1,6 @@
-"""A look up from compiled code: was Ctrl-C pressed, and is time up?
+"""Polling from compiled code: was Ctrl-C pressed, and is time up?
 
-Compiled code keeps Python from noticing signals. So code that may take long calls ``look`` now and then, which lets
+Compiled code keeps Python from noticing signals. So code that may take long calls ``poll`` now and then, which lets
 Python run its handlers and see the clock; called within ``deferring_ctrl_c``, they only leave a mark in ``stop``.
 """
 
@@ -18,8 +18,8 @@ from sva_bench.interrupts import flag
 
 _types: Any = _numba_types
 
-OFTEN = 256
-"""Steps of some microseconds between two looks."""
+POLL_EVERY = 256
+"""Steps of some microseconds between two polls."""
 
 _run_handlers = _types.ExternalFunction("PyErr_CheckSignals", _types.int32())
 _forget_error = _types.ExternalFunction("PyErr_Clear", _types.void())
@@ -27,13 +27,13 @@ _clock_gettime = _types.ExternalFunction("clock_gettime", _types.int32(_types.in
 _CLOCK = time.CLOCK_MONOTONIC
 
 
-def stop_mark() -> NDArray[np.uint8]:
-    """What ``look`` reads: not 0 once Ctrl-C was pressed, shape (1,)."""
+def stop_flag() -> NDArray[np.uint8]:
+    """What ``poll`` reads: not 0 once Ctrl-C was pressed, shape (1,)."""
     return np.frombuffer(flag(), dtype=np.uint8)
 
 
 @njit(cache=True)
-def look(stop):
+def poll(stop):
     """Whether to stop; gives Python's handlers of signals a chance to say so."""
     if _run_handlers() != 0:  # another handler's exception: compiled code can't raise it, but can end
         _forget_error()

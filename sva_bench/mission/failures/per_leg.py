@@ -1,0 +1,55 @@
+"""The process ``per_leg``: a draw before each next POI; what was collected before stays collected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sva_bench.choices import FailureProcess
+from sva_bench.mission.failures.process import (
+    FailureDraw,
+    Failures,
+    PlanningTerms,
+    Reliability,
+    RouteProfile,
+    availabilities,
+    failure_uniforms,
+    no_failures,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerLegFailure:
+    """Failures along the route, as the paper executes them; robots fail independently, by their marginals."""
+
+    name: FailureProcess = "per_leg"
+    how: str = "per leg"
+    collapses: bool = False
+    joint: bool = True
+
+    def draw(self, asked: FailureDraw) -> Failures:
+        """A uniform for each POI that a robot could try; the first that reaches ``s`` is where it fails."""
+        fails = no_failures(asked.trials, len(asked.vehicles))
+        for column, s in enumerate(availabilities(asked.reliability)):
+            for k in range(asked.pois, 0, -1):  # downwards, so that the first failure stands
+                u = failure_uniforms(asked.seed, column, k, asked.trials, asked.first)
+                fails.before_poi[u >= s, column] = k
+        return fails
+
+    def route_value(self, route: RouteProfile, reliability: Reliability) -> float:
+        """``sum_k s^k e_k``.
+
+        Source:
+            Section 5.2 of the paper.
+        """
+        return float(sum(reliability.availability**k * e for k, e in enumerate(route.incentives, start=1)))
+
+    def terms(self, reliability: Sequence[Reliability]) -> PlanningTerms:
+        """All of an incentive is earned if the vehicle gets there, with chance ``s`` from each POI to the next."""
+        return PlanningTerms(share=np.ones(len(reliability)), survival=availabilities(reliability))
+
+    def can_leave(self, reliability: Reliability) -> bool:  # noqa: ARG002
+        """Always: it fails on the way."""
+        return True

@@ -1,0 +1,44 @@
+"""A plan proved by branch-and-price."""
+
+from __future__ import annotations
+
+import logging
+
+from sva_bench.solver.columns.branch_and_price import BranchAndPrice
+from sva_bench.solver.columns.column_generation import ColumnGeneration
+from sva_bench.solver.knowledge import adopt, drive
+from sva_bench.solver.problem import Problem
+from sva_bench.solver.routes.heuristic import VisitOrders
+
+_log = logging.getLogger(__name__)
+
+_WITHIN = 0.99  # of the gap, for rounding
+
+
+def prove_by_columns(problem: Problem) -> None:
+    """Prove the plan of ``problem.progress``, or a better one, within the gap, by branch-and-price."""
+    began = problem.clock.used_s()
+
+    def cutoff() -> float:
+        """Bounds up to here hold nothing better: too close, or below the next value that a plan can have."""
+        return problem.progress.value + problem.progress.slack(_WITHIN * problem.gap)
+
+    def offer(orders: VisitOrders) -> None:
+        adopt(problem.progress, problem.goal, problem.known, orders)
+
+    generation = ColumnGeneration(instance=problem.instance, goal=problem.goal, scopes=problem.scopes,
+                                  survival=problem.goal.chances(), cutoff=cutoff, out=problem.clock.out,
+                                  left_s=problem.clock.left_s)
+    for m, order in (*enumerate(problem.progress.orders), *problem.routes):
+        generation.add_route(m, drive(problem.known.roads[m], order))
+    search_tree = BranchAndPrice(generation=generation, offer=offer, left_s=problem.clock.left_s,
+                                 tell=problem.progress.tighten)
+    try:
+        if search_tree.run():
+            problem.progress.tighten(cutoff())
+        elif problem.clock.out():
+            problem.progress.status = "time_limit"
+    finally:
+        problem.progress.nodes, problem.progress.rounds = search_tree.nodes, generation.priced
+        problem.progress.seconds["columns"] = problem.clock.used_s() - began
+        _log.debug("columns: %d nodes, %d columns, %s", search_tree.nodes, len(generation.pool), generation.calls)

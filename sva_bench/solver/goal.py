@@ -1,0 +1,77 @@
+"""What a solve maximises, and what it must keep. Knows numbers alone: no failure process, no method."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.solver.risk import Risk
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Goal:
+    """What a solve maximises, and what it must keep.
+
+    Attributes:
+        weights: Reward of a visit by vehicle m to site j, shape (M, n); may be negative.
+        floors: Weights and the least sum of them that a plan must reach.
+        driving: What a second of driving and stopping costs.
+        survival: Chance of each vehicle to get to its next POI, shape (M,): the k-th visit of a route earns the k-th
+            power of it; ``None`` = certain.
+        risk: A measure of risk, whose weight is not in ``weights``; its outcomes are the floors, which are then no
+            constraints.
+    """
+
+    weights: FloatArray
+    floors: tuple[tuple[FloatArray, float], ...] = ()
+    driving: float = 0.0
+    survival: FloatArray | None = None
+    risk: Risk | None = None
+
+    def chances(self) -> FloatArray:
+        """``survival``, or ones."""
+        return np.ones(len(self.weights)) if self.survival is None else self.survival
+
+    def times(self, factor: float) -> Goal:
+        """The same goal with incentives, and what is compared with them, in another unit."""
+        return replace(
+            self, weights=self.weights * factor, driving=self.driving * factor,
+            floors=tuple((weights * factor, floor * factor) for weights, floor in self.floors),
+            risk=None if self.risk is None else self.risk.times(factor))
+
+    def within(self, reach: BoolArray) -> Goal:
+        """The same goal without the rewards of visits that can't be made.
+
+        Args:
+            reach: Whether vehicle m can visit site j, shape (M, n).
+        """
+        risk = self.risk and replace(self.risk, outcomes=replace(
+            self.risk.outcomes, incentives=np.where(reach, self.risk.outcomes.incentives, 0.0)))
+        return replace(self, weights=np.where(reach, self.weights, 0.0), risk=risk)
+
+    def essential(self) -> Goal:
+        """The same goal but for a constant, without what no plan can change of its measure of risk."""
+        if self.risk is None:
+            return self
+        risk = self.risk.essential()
+        return replace(self, risk=risk, floors=() if risk is None else risk.floors())
+
+    def rates(self) -> FloatArray:
+        """The most that the visit of vehicle m to site j can earn, or cost, shape (M, n)."""
+        rates: FloatArray = np.abs(self.weights) * self.chances()[:, None]
+        return rates if self.risk is None else rates + self.risk.rates()
+
+    def rewarded(self) -> BoolArray:
+        """Whether the visit of vehicle m to site j counts anywhere, shape (M, n)."""
+        counts: BoolArray = self.weights != 0
+        for weights, _ in self.floors:
+            counts = counts | (weights != 0)
+        return counts
+
+
+def sizes_of(floors: Sequence[tuple[FloatArray, float]]) -> FloatArray:
+    """By what to divide each floor's row so that a solver's absolute tolerance is a relative one, shape (floors,)."""
+    return np.array([max(abs(floor), float(np.abs(weights).max(initial=0.0))) or 1.0 for weights, floor in floors])

@@ -1,0 +1,130 @@
+"""The methods that prove a plan, a line each, and the rule by which ``auto`` chooses among them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sva_bench import choices
+from sva_bench.choices import Method
+from sva_bench.errors import BadInput
+from sva_bench.solver.columns.prove import prove_by_columns
+from sva_bench.solver.flow.branch_and_cut import prove_by_cuts
+from sva_bench.solver.flow.expected import DirectedModel
+from sva_bench.solver.flow.lshaped import prove_by_duals
+from sva_bench.solver.flow.recourse import EquivalentModel
+from sva_bench.solver.flow.undirected import UndirectedModel, serves
+from sva_bench.solver.problem import Problem
+
+LONG = {1: 2.0, 2: 2.0, 3: 2.6, 4: 2.6}
+"""Mission limit in longest legs from which the edge model proves sooner than columns do, by number of vehicles."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolutionMethod:
+    """A method.
+
+    Attributes:
+        name: How options call it; ``choices.METHODS`` has its description.
+        prove: Proves the plan of a problem's progress, or a better one, within the gap.
+        second_stage: Whether it keeps the second stage as the paper has it.
+        discounts: Whether it serves rewards that depend on the order of visits.
+        risk: Whether it serves measures of risk.
+        serves: Whether it serves an instance, whatever the goal.
+    """
+
+    name: Method
+    prove: Callable[[Problem], None]
+    second_stage: bool = False
+    discounts: bool = False
+    risk: bool = False
+    serves: Callable[[Problem], bool] = lambda problem: True  # noqa: ARG005
+
+    @property
+    def description(self) -> str:
+        """What it is, in a few words."""
+        return choices.METHODS[self.name]
+
+    def accepts(self, problem: Problem) -> bool:
+        """Whether it proves plans of this problem."""
+        return ((self.discounts or problem.goal.survival is None) and (self.risk or problem.goal.risk is None)
+                and self.serves(problem))
+
+
+def _directed(problem: Problem) -> None:
+    prove_by_cuts(DirectedModel(problem.instance, problem.scopes, problem.goal, problem.known.roads), problem)
+
+
+def _undirected(problem: Problem) -> None:
+    prove_by_cuts(UndirectedModel(problem.instance, problem.scopes, problem.goal), problem)
+
+
+def _equivalent(problem: Problem, *, relaxed: bool = False) -> None:
+    prove_by_cuts(EquivalentModel(problem.instance, problem.scopes, problem.goal, problem.known.roads,
+                                  problem.second_stage, relaxed=relaxed), problem)
+
+
+def _relaxed(problem: Problem) -> None:
+    _equivalent(problem, relaxed=True)
+
+
+def _is_undirected(problem: Problem) -> bool:
+    return serves(problem.instance, problem.scopes)
+
+
+_ALL = (
+    SolutionMethod(name="expected", prove=_directed),
+    SolutionMethod(name="dep", prove=_equivalent, second_stage=True),
+    SolutionMethod(name="relaxed", prove=_relaxed, second_stage=True),
+    SolutionMethod(name="lshaped", prove=prove_by_duals, second_stage=True),
+    SolutionMethod(name="undirected", prove=_undirected, serves=_is_undirected),
+    SolutionMethod(name="branch-and-price", prove=prove_by_columns, discounts=True, risk=True),
+)
+METHODS: Mapping[Method, SolutionMethod] = {method.name: method for method in _ALL}
+"""The methods by name; ``auto`` is one of them, chosen by ``choice``."""
+
+
+def keeps_second_stage(name: Method) -> bool:
+    """Whether a method keeps the second stage as the paper has it; ``auto`` chooses none that does."""
+    return name in METHODS and METHODS[name].second_stage
+
+
+def serves_discounts(name: Method) -> bool:
+    """Whether a method serves rewards that depend on the order of visits; ``auto`` chooses one that does."""
+    return name not in METHODS or METHODS[name].discounts
+
+
+def method_for(name: Method, problem: Problem) -> SolutionMethod:
+    """The method of that name, or the one that ``auto`` chooses.
+
+    Raises:
+        BadInput: If it doesn't serve the problem.
+    """
+    method = METHODS[name if name in METHODS else choice(problem)]
+    if not method.accepts(problem):
+        raise BadInput(f"instance {problem.instance.name}: the method {method.name} ({method.description}) doesn't "
+                       "serve it; take the method auto")
+    return method
+
+
+def choice(problem: Problem) -> Method:
+    """What ``auto`` chooses, by what was measured in ``benchmarks/solver``.
+
+    Long routes that never refuel, by few vehicles, over symmetric costs want the edge model. Where a mission limit is
+    missing routes are too long for labels, and the directed model takes over. All else wants routes as columns, and
+    failures along the route and measures of risk leave no other choice.
+    """
+    instance, scopes, goal = problem.instance, problem.scopes, problem.goal
+    if goal.survival is not None or goal.risk is not None:
+        return "branch-and-price"
+    if not all(math.isfinite(v.mission_limit_s) for v in instance.vehicles):
+        return "expected"
+    # Of all legs: those that a short limit leaves are short themselves.
+    longest = max((float(v.fuel_s[np.isfinite(v.fuel_s)].max()) for v in instance.vehicles), default=0.0)
+    shortest_limit = min((v.mission_limit_s for v in instance.vehicles), default=0.0)
+    if len(scopes) in LONG and shortest_limit >= LONG[len(scopes)] * longest and serves(instance, scopes):
+        return "undirected"
+    return "branch-and-price"

@@ -1,0 +1,69 @@
+"""Methods: each proves the same plan where it accepts the problem, and is refused where it doesn't."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from sva_bench.choices import Method
+from sva_bench.errors import BadInput
+from sva_bench.generate.instances import random_instance
+from sva_bench.mission.instance import Instance
+from sva_bench.solver.methods import METHODS
+from sva_bench.solver.risk import RiskMeasure
+from sva_bench.solver.two_stage import plan_averse, plan_deterministic, plan_stochastic
+
+every_method = pytest.mark.parametrize("method", METHODS)
+OPEN_FIELD = random_instance("A", pois=7, vehicles=2, availability=0.75, seed=4)
+REFUELLING = random_instance("B", pois=6, vehicles=2, availability=0.75, seed=4)
+
+
+@every_method
+def test_a_method_proves_the_plan_that_auto_proves(method: Method) -> None:
+    # Symmetric costs, one filling for the mission: every method accepts that.
+    plan, known = (plan_stochastic(OPEN_FIELD, method=name) for name in (method, "auto"))
+    assert (plan.method, plan.status) == (method, "optimal")
+    assert plan.value == pytest.approx(known.value, rel=1e-6)
+    tied, known_tied = (plan_deterministic(OPEN_FIELD, known, method=name).plan for name in (method, "auto"))
+    assert tied.value == pytest.approx(known_tied.value, rel=1e-6)
+
+
+@every_method
+def test_a_method_says_what_it_is(method: Method) -> None:
+    assert METHODS[method].name == method
+    assert METHODS[method].description
+
+
+@every_method
+def test_failures_along_the_route_go_to_the_methods_that_serve_them(method: Method) -> None:
+    instance = replace(OPEN_FIELD, failure="per_leg")
+    if METHODS[method].discounts:
+        assert plan_stochastic(instance, method=method).value == pytest.approx(plan_stochastic(instance).value)
+    else:
+        with pytest.raises(BadInput, match=f"{method} plans under mission, the instance fails per leg"):
+            plan_stochastic(instance, method=method)
+
+
+def test_the_edge_model_refuses_robots_that_refuel() -> None:
+    with pytest.raises(BadInput, match=r"the method undirected \(.*\) doesn't serve it; take the method auto"):
+        plan_stochastic(REFUELLING, method="undirected")
+
+
+@pytest.mark.parametrize("instance", [OPEN_FIELD, REFUELLING, replace(OPEN_FIELD, failure="per_leg")],
+                         ids=["open field", "refuelling", "per leg"])
+def test_auto_chooses_one_of_them(instance: Instance) -> None:
+    assert plan_stochastic(instance).method in list(METHODS)
+
+
+def test_auto_proves_measures_of_risk_by_a_method_that_serves_them() -> None:
+    method = plan_averse(OPEN_FIELD, RiskMeasure(kind="cvar", weight=0.5)).method
+    assert METHODS[method].risk  # type: ignore[index]
+
+
+def test_the_documentation_names_every_method() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
+    for method in get_args(Method):
+        assert f"`{method}`" in text
