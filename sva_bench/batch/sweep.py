@@ -22,7 +22,8 @@ from sva_bench.files.documents import Document, Loc, parse_yaml, read_yaml, vali
 from sva_bench.files.fields import Name, Number, Section
 from sva_bench.files.patterns import has_pattern, matching
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.study.options import Options, Progress
+from sva_bench.study.options import Options
+from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 from sva_bench.world.variants import adapted, option_of, world_with
 
@@ -191,7 +192,7 @@ def varied(words: Sequence[str]) -> dict[str, list[Any]]:
     return vary
 
 
-def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
+def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
     """The grid that a sweep comes to.
 
     Args:

@@ -1,16 +1,12 @@
-"""Run folders: manifest, tables, plans, summary. Written under a temporary name and renamed when complete."""
+"""Run folders: tables, plans, summary. Written under a temporary name and renamed when complete."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-import os
-import platform
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +15,8 @@ import pyarrow as pa
 from sva_bench import __version__
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.files.atomic import draft_folder, remove_left_behind
-from sva_bench.files.digest import PACKAGES
 from sva_bench.files.pretty import pretty_json
+from sva_bench.files.records import Record, as_dict
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
 from sva_bench.travel.fuel import FuelCosts
@@ -72,23 +68,10 @@ def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
     return f"{scenario}{'+' if foreign else '-'}{planner}"
 
 
-def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
-             seconds: Mapping[str, float]) -> dict[str, Any]:
-    """What was run, with what, where and how long: the only place for wall-clock times."""
-    return {
-        "format": "sva-bench/manifest@1", "version": __version__, "seed": seed, "options": dict(options),
-        "command": ["sva-bench", *sys.argv[1:]], "started": started,
-        "seconds": {phase: round(taken, 3) for phase, taken in seconds.items()},
-        "machine": {"platform": platform.platform(), "python": platform.python_version(),
-                    "cpus": len(os.sched_getaffinity(0))},
-        "packages": {name: version(name) for name in PACKAGES}, "world": dict(world),
-    }
-
-
-def write_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write a JSON file that a person can read."""
+def write_record(path: Path, record: Record) -> None:
+    """Write a record as a JSON file that a person can read."""
     # A name that is no UTF-8 becomes an escape as JSON has it.
-    path.write_bytes(pretty_json(dict(data)).encode("utf-8", "backslashreplace"))
+    path.write_bytes(pretty_json(as_dict(record)).encode("utf-8", "backslashreplace"))
 
 
 def write_map(folder: Path, source: MapSource) -> None:

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 from sva_bench.analysis.precision import Precision
 from sva_bench.choices import Fidelity, PathPlanner
 from sva_bench.execution.execute import Settings
-from sva_bench.solver.two_stage import (
-    SolveLimits,
-)
+from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.world.model import World
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,7 +47,6 @@ class Options:
         return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
                 "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
                 "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
-
 
 
 def settings_of(world: World, options: Options) -> Settings:

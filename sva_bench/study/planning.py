@@ -6,38 +6,68 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sva_bench.analysis.reach import reached
-from sva_bench.choices import PathPlanner
+from sva_bench.analysis.summaries import Reach
+from sva_bench.choices import FailureProcess, PathPlanner
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError
+from sva_bench.execution.execute import Case
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.mission.plan_file import read_plan
+from sva_bench.solver.outcomes import possible
 from sva_bench.solver.routes.refuelling import quickest
 from sva_bench.solver.two_stage import (
+    MOST_SUBSETS,
     Knowledge,
+    SolveLimits,
     knowledge_of,
     plan_deterministic,
     plan_nominal,
     plan_stochastic,
     wait_and_see,
 )
-from sva_bench.study.assumptions import PlansByProcess
-from sva_bench.study.informed import InformedPlans, plan_informed
-from sva_bench.study.options import Options, Progress
-from sva_bench.study.summing import model_is_executed
+from sva_bench.study.options import Options
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.travel.times import plan_travel_times
+from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import Scenario, World
 
 _log = logging.getLogger(__name__)
 
 NOMINAL = "nominal"
 """The scenario of the availabilities under ``robots:``."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class InformedPlans:
+    """What somebody would plan who knew beforehand who is available.
+
+    Attributes:
+        plans: The plan for each set of available robots.
+        expected: Their expected value.
+    """
+
+    plans: Mapping[frozenset[str], Plan]
+    expected: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlansByProcess:
+    """The plans of a scenario for each failure process.
+
+    Attributes:
+        instance: What they were made for.
+        stochastic: The best plan under each failure process.
+        deterministic: The plan that knows no failures.
+    """
+
+    instance: Instance
+    stochastic: Mapping[FailureProcess, Plan]
+    deterministic: Plan
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,8 +103,13 @@ class Planned:
         return [self.stochastic, self.deterministic, *(self.informed.plans.values() if self.informed else ())]
 
 
+def model_is_executed(world: World) -> bool:
+    """Whether failures are planned for and executed as in the two-stage model."""
+    return world.plan_failure == world.execute_failure == "mission"
+
+
 def plan_scenarios(
-    world: World, costs: Mapping[str, FuelCosts], options: Options, progress: Progress
+    world: World, costs: Mapping[str, FuelCosts], options: Options, progress: OnProgress
 ) -> dict[str, Planned]:
     """Both plans of each scenario. Scenarios share what doesn't depend on availabilities.
 
@@ -119,7 +154,37 @@ def plan_scenarios(
     return planned
 
 
-def plan_costs(world: World, planner: PathPlanner, progress: Progress) -> dict[str, FuelCosts]:
+def two_cases(scenario: Scenario, planned: Planned) -> list[Case]:
+    """Both plans of a scenario, to be executed."""
+    return [Case(scenario=scenario, planner="stochastic", plan=planned.stochastic, role="stochastic"),
+            Case(scenario=scenario, planner="deterministic", plan=planned.deterministic, role="deterministic")]
+
+
+def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, force: bool) -> InformedPlans:
+    """The best plan for every set of robots that can be available.
+
+    Args:
+        instance: The instance; failures are those of ``mission``.
+        limits: When each solve may stop.
+        known: What solves of the same instance with other availabilities found.
+        force: Solve however many sets there are.
+
+    Raises:
+        BadInput: If there are more than 16, and that isn't forced.
+    """
+    sets = possible(instance)
+    if len(sets) > MOST_SUBSETS and not force:
+        raise BadInput(f"{instance.name}: {len(sets)} sets of robots can be available, and the informed planner solves "
+                       f"for each; beyond {MOST_SUBSETS} it has to be told so with --evpi")
+    plans = {}
+    for available in sets:
+        sure = replace(instance, joint=None, failure="mission", vehicles=tuple(
+            replace(v, availability=1.0 if v.name in available else 0.0) for v in instance.vehicles))
+        plans[available] = unless_interrupted(plan_stochastic(sure, limits, known=known))
+    return InformedPlans(plans=plans, expected=sum(sets[s] * (plan.value or 0.0) for s, plan in plans.items()))
+
+
+def plan_costs(world: World, planner: PathPlanner, progress: OnProgress) -> dict[str, FuelCosts]:
     """Fuel costs of each robot model in the world, by its name."""
     models = {robot.model.name: robot.model for robot in world.robots}
     costs = {}
@@ -160,7 +225,7 @@ def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list
     return lost
 
 
-def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
+def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> Reach:
     """What robots cannot reach within fuel and limit, as every summary says it."""
     return reached(out_of_reach(world, costs), [robot.name for robot in world.robots],
                    [poi.name for poi in world.pois])

@@ -18,6 +18,7 @@ import pytest
 
 from sva_bench.batch.folder import begin, settings_in, shard_path, write_maps
 from sva_bench.batch.grid import Grid, Point
+from sva_bench.batch.schema import BatchSettings
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.study.options import Options
 from tests.test_batch import rows_of
@@ -101,7 +102,7 @@ def test_a_batch_that_did_nothing_yet_is_in_nobodys_way(tmp_path: Path) -> None:
     world, out = world_of(tmp_path), tmp_path / "out"
     out.mkdir()
 
-    def settings(trials: int) -> dict[str, Any]:
+    def settings(trials: int) -> BatchSettings:
         return Grid(points=[Point(world=world, planner="prmstar")], seeds=[0], options=Options(trials=trials),
                     unit_trials=10).settings()
 
@@ -110,7 +111,7 @@ def test_a_batch_that_did_nothing_yet_is_in_nobodys_way(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match=r"settings\.options\.trials"):
         begin(out, settings(20), resume=True)
     begin(out, settings(20), resume=False)
-    assert settings_in(out)[0].data == settings(20)
+    assert settings_in(out)[1] == settings(20)
     shard_path(out, "small-seed0").touch()
     with pytest.raises(BadInput, match="--resume"):
         begin(out, settings(20), resume=False)
