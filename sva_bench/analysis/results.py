@@ -373,6 +373,10 @@ class ComparedScenario(Scenario):
     @model_validator(mode="after")
     def _fits_together(self) -> ComparedScenario:
         _of_these_robots(self.plans, self.availability)
+        if sorted(row.plan for row in self.ranking) != sorted(self.plans):
+            raise ValueError("ranking: expected each of 'plans' once")
+        if not {name for pair in self.comparisons for name in (pair.a, pair.b)} <= set(self.plans):
+            raise ValueError("comparisons: expected pairs of 'plans'")
         return self
 
 
