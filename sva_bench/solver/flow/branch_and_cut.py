@@ -16,7 +16,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.cuts import Cut, violated_by_fractions, violated_by_integers
-from sva_bench.solver.highs import Outcome, Relaxation, maximise
+from sva_bench.solver.highs import MipResult, Relaxation, maximise
 from sva_bench.solver.knowledge import Clock, Knowledge, Progress, adopt, without_idle_stops
 from sva_bench.solver.program import Goal, LinearModel, Rows
 from sva_bench.solver.routes.heuristic import Orders
@@ -142,7 +142,7 @@ def _branch(
 
 
 def _integers(
-    flow: FlowModel, instance: Instance, goal: Goal, known: Knowledge, outcome: Outcome, pois: frozenset[int],
+    flow: FlowModel, instance: Instance, goal: Goal, known: Knowledge, outcome: MipResult, pois: frozenset[int],
     progress: Progress,
 ) -> list[Cut]:
     """Take up an integer solution, as far as it hangs together with the base; the cuts that it breaks."""
