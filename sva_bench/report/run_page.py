@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -33,6 +32,7 @@ from sva_bench.report.wording import (
     with_interval,
 )
 from sva_bench.storage.manifest import Manifest
+from sva_bench.storage.run_folder import Legs
 from sva_bench.storage.stored_run import Content
 from sva_bench.world.model import World
 
@@ -189,15 +189,15 @@ def _in_per_cent(found: Share) -> str:
         100 * found.ci95[0], 100 * found.ci95[1])))
 
 
-def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
+def _legs(legs: Legs) -> list[str]:
     with holding_back_ctrl_c():
         from sva_bench.report import charts
 
-    planned, driven = (np.asarray(legs[key], dtype=np.float64) for key in ("planned_s", "driven_s"))
+    planned, driven = legs.planned_s, legs.driven_s
     parts = [heading("Time and fuel, planned against driven")]
     if not (planned > 0).any():
         return [*parts, note("No leg was driven.")]
-    names = [str(robot) for robot in legs["robot"]]
+    names = list(legs.robot)
     rows = []
     for robot in dict.fromkeys(names):
         mine = np.array([name == robot for name in names]) & (planned > 0)
@@ -207,8 +207,9 @@ def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
                          f"{100 * (driven[mine].sum() / planned[mine].sum() - 1):+.2f}", f"{off.min():+.2f}",
                          f"{off.max():+.2f}"])
     late = np.argsort(-(driven - planned), kind="stable")[:_WORST_LEGS]
-    worst = [[*(str(legs[key][k]) for key in ("scenario", "planner", "robot", "rollout", "origin", "destination")),
-              f"{planned[k]:.2f}", f"{driven[k]:.2f}", f"{driven[k] - planned[k]:+.2f}"] for k in late.tolist()]
+    worst = [[legs.scenario[k], legs.planner[k], legs.robot[k], str(legs.rollout[k]), legs.origin[k],
+              legs.destination[k], f"{planned[k]:.2f}", f"{driven[k]:.2f}", f"{driven[k] - planned[k]:+.2f}"]
+             for k in late.tolist()]
     return [*parts,
             figure(charts.legs_driven(planned, driven, names), "Each point is a leg under one noise draw. Fuel is "
                    "measured in seconds of driving, so a leg's time is its fuel."),

@@ -23,7 +23,7 @@ from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
 from sva_bench.storage.manifest import MANIFEST, Manifest
-from sva_bench.storage.run_folder import LEG_COLUMNS, MAP, stem_of
+from sva_bench.storage.run_folder import MAP, Legs, stem_of
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
 from sva_bench.storage.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
@@ -42,7 +42,7 @@ class Content:
         summary: The summary.
         routes: Route of each robot, by scenario and planner.
         stems: Names of a plan's files, by scenario and planner.
-        legs: Columns of ``legs.parquet``.
+        legs: The legs that were driven.
         world: The world, for its picture.
         manifest: What was run.
     """
@@ -50,7 +50,7 @@ class Content:
     summary: AnySummary
     routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]
     stems: Mapping[tuple[str, str], str]
-    legs: Mapping[str, Sequence[Any]]
+    legs: Legs
     world: World
     manifest: Manifest
 
@@ -157,20 +157,22 @@ def _routes(folder: Path, world: World, stems: Mapping[tuple[str, str], str]
     return {key: read_routes(folder / "plans" / f"{stem}.json", robots, sites) for key, stem in stems.items()}
 
 
-def _legs(path: Path, world: World, words: Mapping[str, frozenset[str]]) -> Mapping[str, Any]:
+def _legs(path: Path, world: World, words: Mapping[str, frozenset[str]]) -> Legs:
     sites = frozenset(site.name for site in world.sites)
     known = {**words, "origin": sites, "destination": sites}
-    parts: dict[str, list[Any]] = {name: [] for name in LEG_COLUMNS}
+    parts: dict[str, list[Any]] = {name: [] for name in LEGS.names}
     for piece in pieces_of(path, LEGS, most=MOST_LEGS, words=known):
         for name in ("planned_s", "driven_s"):
             ends = pc.min_max(piece.column(name)).as_py()
             if piece.num_rows and not 0 <= ends["min"] <= ends["max"] < 1e9:
                 raise BadFile(path, None, name, "expected times between 0 and 1e9 s; run the command in manifest.json "
                               "again")
-        for name in LEG_COLUMNS:
+        for name in LEGS.names:
             parts[name].append(_plainly(piece.column(name)))
-    return {name: np.concatenate(found) if name.endswith("_s") and found else [x for part in found for x in part]
-            for name, found in parts.items()}
+    columns: dict[str, Any] = {
+        name: np.concatenate(found or [np.zeros(0)]) if name.endswith("_s") else [x for part in found for x in part]
+        for name, found in parts.items()}
+    return Legs(**columns)
 
 
 def _plainly(column: pa.ChunkedArray) -> Any:

@@ -20,7 +20,7 @@ from sva_bench.recording.rerun import record
 from sva_bench.report.run_page import write_report
 from sva_bench.storage.manifest import manifest_of
 from sva_bench.storage.run_folder import (
-    leg_columns,
+    legs_of,
     run_folder,
     run_name,
     stem_of,
@@ -73,7 +73,7 @@ def publish(
                 record(folder / "recordings" / f"{stem}.rrd", world, done.traces,
                        title=f"{world.name}, {scenario}, {planner}")
                 progress("recording", number + 1, len(executed))
-        legs = leg_columns(executed)
+        legs = legs_of(executed)
         write_legs(folder / "legs.parquet", legs)
         write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
                        settings_of(world, options))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import beta
 
+from sva_bench.analysis.comparison import comparison_summary, ranking
 from sva_bench.analysis.figures import end_figures
 from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, ScenarioSummary, Share
 from sva_bench.analysis.statistics import bounded_mean, estimate
@@ -18,11 +19,9 @@ from sva_bench.analysis.summary import (
     Judged,
     ScenarioTrials,
     charges,
-    comparison_summary,
     ledger,
     plan_result,
     promise_of,
-    ranking,
     scenario_summary,
 )
 from sva_bench.choices import ENDS, End
