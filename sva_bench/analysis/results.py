@@ -299,7 +299,7 @@ class ScenarioFacts(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scenario(Record):
+class ScenarioPlans(Record):
     """A scenario and what came of its plans."""
 
     name: Name
@@ -308,7 +308,7 @@ class Scenario(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScenarioFigures(Scenario):
+class ScenarioFigures(ScenarioPlans):
     """What came of the two plans of a scenario, as far as sums over trials tell."""
 
     vss: VssFigures
@@ -363,7 +363,7 @@ class ScenarioSummary(ScenarioFigures):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ComparedScenario(Scenario):
+class ComparedScenario(ScenarioPlans):
     """One scenario of ``execute``: every pair of plans compared, and all of them from best to worst."""
 
     plans: Annotated[Mapping[PlanName, GivenPlanResult], Field(min_length=1)]

@@ -14,8 +14,8 @@ from sva_bench.analysis.results import (
     SUMMARY,
     Amount,
     ComparedScenario,
-    Scenario,
     ScenarioFacts,
+    ScenarioPlans,
     ScenarioSummary,
     told,
 )
@@ -135,7 +135,7 @@ def summary_form(data: object) -> type[Summary] | type[ComparisonSummary]:
     return ComparisonSummary if isinstance(first, dict) and "comparisons" in first else Summary
 
 
-def _of_the_same_plans(scenarios: Sequence[Scenario]) -> None:
+def _of_the_same_plans(scenarios: Sequence[ScenarioPlans]) -> None:
     first = scenarios[0]
     if len({scenario.name for scenario in scenarios}) < len(scenarios):
         raise ValueError("scenarios: a name stands twice")
