@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from sva_bench.analysis.figures import difference_figure, end_figures, value_figure
-from sva_bench.analysis.statistics import Estimate, controlled, estimate
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.statistics import controlled, estimate
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End, FailureProcess
 from sva_bench.execution.execute import (
@@ -178,8 +179,8 @@ def main() -> None:
             for rollouts in told.rollouts:
                 for seed in range(told.rounds):
                     for kind, scenario, found, truth in intervals(of, truths, rollouts, told.trials, seed):
-                        assert found.interval is not None
-                        low, high = found.interval
+                        assert found.ci95 is not None
+                        low, high = found.ci95
                         slack = 1e-9 * max(1.0, abs(truth))
                         held.setdefault((scenario, kind), {}).setdefault(rollouts, []).append(
                             (low - slack <= truth <= high + slack, high - low, high - low <= slack))

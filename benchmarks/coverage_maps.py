@@ -51,12 +51,12 @@ def coverage(population: FloatArray, maps: int, rounds: int) -> tuple[float, flo
     for _ in range(rounds):
         sample = rng.choice(population, maps)
         found = sample_mean(sample.tolist())
-        if found.interval is None:
+        if found.ci95 is None:
             none += 1
             continue
         half = student_t.ppf(0.975, maps - 1) * sample.std(ddof=1) / math.sqrt(maps)
         plain.append(abs(sample.mean() - truth) <= half)
-        ours.append(found.interval[0] <= truth <= found.interval[1])
+        ours.append(found.ci95[0] <= truth <= found.ci95[1])
     return 100 * float(np.mean(plain)), 100 * float(np.mean(ours)), 100 * none / rounds
 
 

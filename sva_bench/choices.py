@@ -42,4 +42,7 @@ Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 Fidelity = Literal["kinematic", "rollout", "physics"]
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
+Role = Literal["stochastic", "deterministic", "informed", "informed_part", "worst_tie", "given"]
+"""What a plan is executed for: ours; what is behind the informed planner, and one of its plans; the least fortunate of
+the deterministic plans that tie; or given from elsewhere."""
 EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]

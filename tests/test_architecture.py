@@ -131,6 +131,19 @@ def test_no_module_wants_splitting(module: str) -> None:
     assert lines <= MOST_LINES, f"sva_bench/{module} has {lines} lines: it wants to be two"
 
 
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    # Within a room too, whoever asks, and when: a module can be read after those that it imports.
+    names = {module.removesuffix(".py").removesuffix("/__init__").replace("/", "."): module for module in MODULES}
+    known = {module: {names[found] for _, name in imports_of(PACKAGE / module) if name.startswith("sva_bench.")
+                      for found in (name.removeprefix("sva_bench."), name.removeprefix("sva_bench.").rpartition(".")[0])
+                      if found in names and names[found] != module} for module in MODULES}
+    left = dict(known)
+    while ready := [module for module, needs in left.items() if not needs & left.keys()]:
+        for module in ready:
+            del left[module]
+    assert not left, {module: sorted(needs & left.keys()) for module, needs in left.items()}
+
+
 def test_a_check_loads_neither_physics_nor_solvers_nor_statistics() -> None:
     # They take longer to load than a check of most worlds takes.
     heavy = {"pybullet", "highspy", "networkx", "scipy.stats", "scipy.optimize"}

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from sva_bench.analysis.over_maps import Percentage
 from sva_bench.batch.aggregates import aggregate
+from sva_bench.files.records import as_dict
+from tests.results_for_tests import unit
 from tests.test_cli import sva_bench, world_file
 from tests.worlds_for_tests import SMALL
 
@@ -74,29 +76,21 @@ def test_worlds_of_one_name_are_refused(tmp_path: Path) -> None:
 
 
 def test_vss_over_maps_takes_maps_as_the_sample() -> None:
-    def unit(world: str, mean: float) -> dict[str, Any]:
-        return {"world": world, "scenarios": [{"name": "S", "availability": {"uv1": 0.5},
-                                               "vss": {"executed": {"mean": mean}, "executed_pct": None}}]}
-
     # Map a: mean of its seeds 1 and 3 is 2; map b: 6. Over maps: 4, sd sqrt(8), half-width 12.706 sqrt(8) / sqrt(2).
     (row,) = aggregate([unit("a", 1.0), unit("a", 3.0), unit("b", 6.0)])
-    assert row["maps"] == 2
-    assert row["vss"]["mean"] == 4.0
-    np.testing.assert_allclose(row["vss"]["ci95"], [4 - 25.412, 4 + 25.412], atol=1e-3)
-    assert row["vss_pct"] == {"mean": None, "ci95": None, "maps": 0}
+    assert row.maps == 2
+    assert row.vss.mean == 4.0
+    np.testing.assert_allclose(row.vss.ci95 or (), [4 - 25.412, 4 + 25.412], atol=1e-3)
+    assert row.vss_pct == Percentage(mean=None, ci95=None, maps=0)
 
 
 def test_percentages_say_over_how_many_maps_they_are_where_one_collects_nothing() -> None:
-    def unit(world: str, share: float | None, availability: float = 0.5) -> dict[str, Any]:
-        return {"world": world, "scenarios": [{"name": "S", "availability": {"uv1": availability},
-                                               "vss": {"executed": {"mean": 1.0}, "executed_pct": share}}]}
-
-    (row,) = aggregate([unit("a", 9.5), unit("b", None)])
-    assert (row["maps"], row["vss_pct"]) == (2, {"mean": 9.5, "ci95": None, "maps": 1})
-    (row,) = aggregate([unit("a", 9.5), unit("b", 9.5)])
-    assert row["vss_pct"] == {"mean": 9.5, "ci95": None}  # maps that agree don't tell how maps differ
-    (row,) = aggregate([unit("a", 0.0, 1.0), unit("b", 0.0, 1.0)])
-    assert row["vss_pct"] == {"mean": 0.0, "ci95": [0.0, 0.0]}  # no robot fails: both plans are the same anywhere
+    (row,) = aggregate([unit("a", 1.0, 9.5), unit("b", 1.0, None)])
+    assert (row.maps, as_dict(row.vss_pct)) == (2, {"mean": 9.5, "ci95": None, "maps": 1})
+    (row,) = aggregate([unit("a", 1.0, 9.5), unit("b", 1.0, 9.5)])
+    assert as_dict(row.vss_pct) == {"mean": 9.5, "ci95": None}  # maps that agree don't tell how maps differ
+    (row,) = aggregate([unit("a", 1.0, 0.0, 1.0), unit("b", 1.0, 0.0, 1.0)])
+    assert as_dict(row.vss_pct) == {"mean": 0.0, "ci95": [0.0, 0.0]}  # no robot fails: both plans are the same anywhere
 
 
 def plan_file(folder: Path, name: str, routes: dict[str, list[str]]) -> Path:

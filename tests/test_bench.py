@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from sva_bench.analysis.precision import Precision
+from sva_bench.analysis.results import Loss
+from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
 from sva_bench.study.options import Options
 from sva_bench.study.run import measure
@@ -25,47 +26,50 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> World:
     return world_of(tmp_path_factory.mktemp("world"), text)
 
 
-def vss_of(scenario: Any) -> float:
-    return float(scenario["vss"]["modelled"])
-
-
-def summary_of(world: World) -> Any:
+def summary_of(world: World) -> Summary:
     return measure(world, QUICK, None, lambda *_: None).summary
 
 
 def test_figures_of_a_mission_agree_with_what_the_model_says(world: World) -> None:
     summary = summary_of(world)
-    for scenario in summary["scenarios"]:
-        assert vss_of(scenario) == pytest.approx(14.0 if scenario["name"] == "half" else 0.0)
-        plan, vss = scenario["plans"]["stochastic"], scenario["vss"]
-        assert scenario["ws"] == pytest.approx(plan["expected"] + scenario["evpi"])
-        assert scenario["value_of_process"] is None
-        assert vss["executed_range"][0] <= vss["executed"]["mean"] <= vss["executed_range"][1]
+    for scenario in summary.scenarios:
+        assert scenario.vss.modelled == pytest.approx(14.0 if scenario.name == "half" else 0.0)
+        plan, vss = scenario.plans["stochastic"], scenario.vss
+        assert scenario.ws is not None
+        assert scenario.evpi is not None
+        assert vss.executed_range is not None
+        assert scenario.ws == pytest.approx(plan.expected + scenario.evpi)
+        assert scenario.value_of_process is None
+        assert vss.executed_range[0] <= vss.executed.mean <= vss.executed_range[1]
         # Nobody runs dry or late here: the draws are all that moves the mean, and the control takes them out.
-        if set(plan["ends"]) <= {"home", "failed"}:
-            assert plan["executed_controlled"]["mean"] == pytest.approx(plan["expected"])
+        if set(plan.ends) <= {"home", "failed"}:
+            assert plan.executed_controlled.mean == pytest.approx(plan.expected)
 
 
 def test_planning_for_failures_along_the_route_is_worth_something_under_them_alone(world: World) -> None:
-    along = summary_of(replace(world, execute_failure="per_leg"))["scenarios"][0]
-    exact = summary_of(replace(world, plan_failure="per_leg", execute_failure="per_leg"))["scenarios"][0]
-    assert along["value_of_process"] >= 0
-    assert along["value_of_process"] == exact["value_of_process"] == pytest.approx(
-        exact["plans"]["stochastic"]["expected"] - along["plans"]["stochastic"]["expected"])
-    assert along["ws"] is along["evpi"] is along["vss_mean_value"] is along["vss"]["executed_range"] is None
+    along = summary_of(replace(world, execute_failure="per_leg")).scenarios[0]
+    exact = summary_of(replace(world, plan_failure="per_leg", execute_failure="per_leg")).scenarios[0]
+    assert along.value_of_process is not None
+    assert along.value_of_process >= 0
+    assert along.value_of_process == exact.value_of_process == pytest.approx(
+        exact.plans["stochastic"].expected - along.plans["stochastic"].expected)
+    assert (along.ws, along.evpi, along.vss_mean_value, along.vss.executed_range) == (None,) * 4
 
 
 def test_the_informed_planner_comes_to_the_wait_and_see_value(world: World) -> None:
     summary = measure(world, replace(QUICK, informed=True), None, lambda *_: None).summary
-    for scenario in summary["scenarios"]:
-        informed = scenario["plans"]["informed"]
-        assert informed["expected"] == pytest.approx(scenario["ws"])
-        found = scenario["evpi_executed"]
-        low, high = found["ci95"]
-        assert low - 1e-9 <= scenario["evpi"] <= high + 1e-9  # of seed 0; nobody runs dry in this world
-        assert found["mean"] == pytest.approx(
-            informed["executed"]["mean"] - scenario["plans"]["stochastic"]["executed"]["mean"])
-        assert informed["ledger"]["out_of_fuel"] == 0.0
+    for scenario in summary.scenarios:
+        informed = scenario.plans["informed"]
+        assert informed.expected == pytest.approx(scenario.ws)
+        found = scenario.evpi_executed
+        assert found is not None
+        assert found.ci95 is not None
+        assert scenario.evpi is not None
+        low, high = found.ci95
+        assert low - 1e-9 <= scenario.evpi <= high + 1e-9  # of seed 0; nobody runs dry in this world
+        assert found.mean == pytest.approx(
+            informed.executed.mean - scenario.plans["stochastic"].executed.mean)
+        assert informed.ledger.out_of_fuel == 0.0
 
 
 @pytest.mark.parametrize("seed", range(3))  # whose first trials find different robots available
@@ -73,11 +77,11 @@ def test_the_informed_planner_promises_the_wait_and_see_value_whoever_is_availab
     world: World, seed: int,
 ) -> None:
     done = measure(world, replace(QUICK, informed=True, seed=seed, trials=20), None, lambda *_: None)
-    for scenario in done.summary["scenarios"]:
-        informed, ws = scenario["plans"]["informed"], pytest.approx(scenario["ws"])
-        assert informed["promised"] == informed["ledger"]["promised"] == informed["bound"] == ws
-        assert informed["ledger"]["assumption"] == pytest.approx(0.0)
-        assert informed["status"] == "optimal"
+    for scenario in done.summary.scenarios:
+        informed, ws = scenario.plans["informed"], pytest.approx(scenario.ws)
+        assert informed.promised == informed.ledger.promised == informed.bound == ws
+        assert informed.ledger.assumption == pytest.approx(0.0)
+        assert informed.status == "optimal"
 
 
 def test_nothing_can_be_known_beforehand_of_failures_along_the_route(world: World) -> None:
@@ -90,29 +94,33 @@ def test_a_run_goes_on_until_it_is_as_precise_as_asked_for(world: World) -> None
     loose, tight, never = (measure(
         world, replace(begun, precision=Precision(pct=pct, max_trials=most)), None, lambda *_: None).summary
         for pct, most in ((1000.0, 100), (5.2, 400), (1e-6, 80)))
-    assert (loose["trials"], loose["precision"]["met"]) == (50, True)
-    assert 50 < tight["trials"] < 400
-    assert tight["precision"]["met"]
-    assert tight["precision"]["reached_pct"] <= 5.2
-    assert tight["rollouts"] == 4 * tight["trials"] / 50
-    assert (never["trials"], never["precision"]["met"]) == (80, False)
+    assert loose.precision is not None
+    assert tight.precision is not None
+    assert never.precision is not None
+    assert (loose.trials, loose.precision.met) == (50, True)
+    assert 50 < tight.trials < 400
+    assert tight.precision.met
+    assert tight.precision.reached_pct is not None
+    assert tight.precision.reached_pct <= 5.2
+    assert tight.rollouts == 4 * tight.trials / 50
+    assert (never.trials, never.precision.met) == (80, False)
     # The trials are those of a run that was told to have as many from the start.
-    told = measure(world, replace(begun, trials=tight["trials"], rollouts=tight["rollouts"]), None, lambda *_: None)
-    assert told.summary["scenarios"] == tight["scenarios"]
+    told = measure(world, replace(begun, trials=tight.trials, rollouts=tight.rollouts), None, lambda *_: None)
+    assert told.summary.scenarios == tight.scenarios
 
 
 def test_the_wrong_assumption_costs_what_the_plan_for_the_right_one_collects_more(world: World) -> None:
     summary = measure(world, replace(QUICK, assumptions=True), None, lambda *_: None).summary
-    for scenario in summary["scenarios"]:
-        rows = scenario["assumptions"]
-        assert [(row["executed_under"], row["planner"], row["planned_for"]) for row in rows] == [
+    for scenario in summary.scenarios:
+        rows = scenario.assumptions or ()
+        assert [(row.executed_under, row.planner, row.planned_for) for row in rows] == [
             (process, planner, made_for) for process in ("mission", "per_leg") for planner, made_for in (
                 ("stochastic", "mission"), ("stochastic", "per_leg"), ("deterministic", None))]
         for row in rows:
-            assert row["loss_modelled"] >= -1e-9
-            if row["planned_for"] == row["executed_under"]:
-                assert row["loss"] == {"mean": 0.0, "ci95": [0.0, 0.0], "distinguishable": False, "same_plan": True}
+            assert row.loss_modelled >= -1e-9
+            if row.planned_for == row.executed_under:
+                assert row.loss == Loss(mean=0.0, ci95=(0.0, 0.0), distinguishable=False, same_plan=True)
         # Under mission the table repeats what the run itself executed.
         for row, name in ((rows[0], "stochastic"), (rows[2], "deterministic")):
-            assert row["executed"] == scenario["plans"][name]["executed"]
-        assert rows[3]["loss_modelled"] == pytest.approx(scenario["value_of_process"])
+            assert row.executed == scenario.plans[name].executed
+        assert rows[3].loss_modelled == pytest.approx(scenario.value_of_process)

@@ -17,7 +17,7 @@ import pytest
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.cli.terminal import set_up_logging
-from sva_bench.study import planning
+from sva_bench.study import costs
 from tests.worlds_for_tests import SMALL
 
 QUIET = SMALL.replace("wheel_gain_sd: 0.01", "wheel_gain_sd: 0.0")
@@ -329,7 +329,7 @@ def test_a_plan_that_cannot_be_driven_is_refused_before_anything_is_planned(
     def planned(*_: object, **__: object) -> None:
         raise AssertionError("travel times are planned")
 
-    monkeypatch.setattr(planning, "plan_travel_times", planned)
+    monkeypatch.setattr(costs, "plan_travel_times", planned)
     assert run_command_line(command.format("p.json").split()) == code
     said = capsys.readouterr().err
     assert says in said

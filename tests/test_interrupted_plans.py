@@ -12,10 +12,11 @@ import pytest
 from sva_bench.generate import mission as proposal
 from sva_bench.generate.mission import propose_mission
 from sva_bench.solver import two_stage
-from sva_bench.study import informed, planning
-from sva_bench.study.costs import plan_costs
+from sva_bench.solver.two_stage import SolveLimits, knowledge_of
+from sva_bench.study import planning
+from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.options import Options
-from sva_bench.study.planning import plan_scenarios
+from sva_bench.study.planning import plan_informed, plan_scenarios
 from tests.worlds_for_tests import world_of
 
 
@@ -26,8 +27,7 @@ def interrupted(solve: Callable[..., Any]) -> Callable[..., Any]:
 
 @pytest.mark.parametrize(("module", "solve", "options"), [
     (planning, "plan_nominal", Options()), (planning, "plan_stochastic", Options()),
-    (planning, "plan_stochastic", Options(assumptions=True)), (informed, "plan_stochastic", Options(informed=True)),
-    (two_stage, "_greatest", Options(evpi=True)),
+    (planning, "plan_stochastic", Options(assumptions=True)), (two_stage, "_greatest", Options(evpi=True)),
 ])
 def test_a_run_has_no_use_for_a_plan_that_was_interrupted(
     module: Any, solve: str, options: Options, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -37,6 +37,14 @@ def test_a_run_has_no_use_for_a_plan_that_was_interrupted(
     monkeypatch.setattr(module, solve, interrupted(getattr(module, solve)))
     with pytest.raises(KeyboardInterrupt):
         plan_scenarios(world, costs, options, lambda *_: None)
+
+
+def test_the_informed_planner_has_no_use_for_one_either(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    world = world_of(tmp_path)
+    instance = instance_of(world, plan_costs(world, "prmstar", lambda *_: None), world.scenarios[0])
+    monkeypatch.setattr(planning, "plan_stochastic", interrupted(two_stage.plan_stochastic))
+    with pytest.raises(KeyboardInterrupt):
+        plan_informed(instance, SolveLimits(), knowledge_of(instance), force=False)
 
 
 def test_a_mission_that_is_proposed_is_the_same_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,28 +11,28 @@ from sva_bench.analysis.moments import figure_of
 from sva_bench.analysis.precision import Precision, half_width_pct, precision_of
 from sva_bench.analysis.statistics import estimate
 from sva_bench.errors import BadInput
+from tests.results_for_tests import Interval, summary
 from tests.test_cli import sva_bench
 
 
-def summary(ci95: list[float] | None, mean: float, trials: int = 100, rollouts: int = 8) -> dict[str, Any]:
-    return {"trials": trials, "rollouts": rollouts, "scenarios": [
-        {"vss": {"executed": {"ci95": ci95}}, "plans": {"stochastic": {"executed": {"mean": mean}}}}]}
+def pct_of(ci95: Interval | None, mean: float) -> float | None:
+    return half_width_pct(summary(ci95, mean).scenarios)
 
 
 def test_precision_is_per_cent_of_the_stochastic_plan_by_hand() -> None:
     # Half of 4 is 2: 1 % of 200.
-    assert half_width_pct(summary([8.0, 12.0], 200.0)) == 1.0
-    assert half_width_pct(summary([0.0, 0.0], 0.0)) == 0.0  # plans that are worth nothing, alike in every trial
-    assert half_width_pct(summary([-1.0, 1.0], 0.0)) is None
-    assert half_width_pct(summary(None, 200.0)) is None
+    assert pct_of((8.0, 12.0), 200.0) == 1.0
+    assert pct_of((0.0, 0.0), 0.0) == 0.0  # plans that are worth nothing, alike in every trial
+    assert pct_of((-1.0, 1.0), 0.0) is None
+    assert pct_of(None, 200.0) is None
 
 
 def test_trials_and_noise_draws_double_until_they_are_enough() -> None:
     asked = Precision(pct=1.0, max_trials=500)
-    assert asked.next_size(summary([8.0, 12.0], 200.0)) is None
-    assert asked.next_size(summary([8.0, 12.1], 200.0)) == (200, 16)
-    assert asked.next_size(summary([8.0, 12.1], 200.0, 400, 32)) == (500, 40)
-    assert asked.next_size(summary([8.0, 12.1], 200.0, 500, 40)) is None
+    assert asked.next_size(summary((8.0, 12.0), 200.0)) is None
+    assert asked.next_size(summary((8.0, 12.1), 200.0)) == (200, 16)
+    assert asked.next_size(summary((8.0, 12.1), 200.0, 400, 32)) == (500, 40)
+    assert asked.next_size(summary((8.0, 12.1), 200.0, 500, 40)) is None
 
 
 @pytest.mark.parametrize("text", ["1", "0%", "-1%", "nan%", "inf%", "one%", "%", ""])
@@ -63,8 +62,8 @@ def test_stopping_when_precise_enough_costs_little_coverage() -> None:
                 kept & dry[rollout], 50.0, 0.0), (0.0, 75.0), rollout, noisy=True))
             if (found.half_width or 0) <= 12:
                 break
-        assert found.interval is not None
-        held += found.interval[0] <= truth <= found.interval[1]
+        assert found.ci95 is not None
+        held += found.ci95[0] <= truth <= found.ci95[1]
         sizes.append(k)
     assert held / rounds >= 0.92
     assert min(sizes) < np.median(sizes)

@@ -8,13 +8,15 @@ from pathlib import Path
 import pytest
 
 from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached
+from sva_bench.analysis.summaries import ComparisonSummary, Reach
 from sva_bench.cli.terminal import print_summary
+from sva_bench.study.compare import execute_plans
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.given_plans import read_plans
 from sva_bench.study.options import Options
 from sva_bench.study.planning import check_plans
 from sva_bench.study.publish import Run
-from sva_bench.study.run import execute_plans, run
+from sva_bench.study.run import run
 from tests.test_cli import sva_bench, world_file
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -38,9 +40,9 @@ def told(done: Run, capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
 def test_where_nothing_is_reached_table_page_and_summary_say_what_check_says(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     done = run_of(tmp_path, DRY)
-    assert done.summary["reach"] == {
-        "nothing": True, "robots": ["uv1", "uv2"], "pois": ["p1", "p2", "p3", "p4"],
-        "missed": {robot: ["p1", "p2", "p3", "p4"] for robot in ("uv1", "uv2")}}
+    assert done.summary.reach == Reach(
+        nothing=True, robots=("uv1", "uv2"), pois=("p1", "p2", "p3", "p4"),
+        missed=dict.fromkeys(("uv1", "uv2"), ("p1", "p2", "p3", "p4")))
     for text in told(done, capsys):
         assert NOTHING in text
         assert "changes nothing here" not in text
@@ -53,7 +55,7 @@ def test_where_nothing_is_reached_table_page_and_summary_say_what_check_says(
 def test_a_robot_that_reaches_nothing_is_named(
         limit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     done = run_of(tmp_path, SMALL.replace(limit, limit.split()[0] + " 1", 1))
-    assert done.summary["reach"]["robots"] == ["uv1"]
+    assert done.summary.reach.robots == ("uv1",)
     for text in told(done, capsys):
         assert "uv1 reaches no POI within its fuel and limit, and stays home." in text
         assert NOTHING not in text
@@ -62,7 +64,7 @@ def test_a_robot_that_reaches_nothing_is_named(
 def test_pois_that_no_robot_reaches_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # p3 is the remotest: 30 s of driving suffice for the others, there and back.
     done = run_of(tmp_path, SMALL.replace("mission_limit_s: 120", "mission_limit_s: 24"))
-    missed = done.summary["reach"]["pois"]
+    missed = done.summary.reach.pois
     assert missed
     assert len(missed) < 4
     for text in told(done, capsys):
@@ -71,14 +73,13 @@ def test_pois_that_no_robot_reaches_are_named(tmp_path: Path, capsys: pytest.Cap
 
 def test_where_everything_is_reached_nothing_is_said(tmp_path: Path) -> None:
     done = run_of(tmp_path, SMALL)
-    assert done.summary["reach"] == {"nothing": False, "robots": [], "pois": [], "missed": {}}
-    assert beyond_reach(done.summary) == []
-    assert beyond_reach({}) == []  # a summary from before
+    assert done.summary.reach == Reach(nothing=False, robots=(), pois=(), missed={})
+    assert beyond_reach(done.summary.reach) == []
 
 
 def test_many_pois_are_counted_not_listed() -> None:
     pois = [f"p{k}" for k in range(50)]
-    said = beyond_reach({"reach": reached({"uv1": pois[:40]}, ["uv1", "uv2"], pois)})
+    said = beyond_reach(reached({"uv1": pois[:40]}, ["uv1", "uv2"], pois))
     assert said == [f"uv1 reaches none of {', '.join(pois[:20])} and 20 more within its fuel and limit, and will never "
                     "be sent there."]
 
@@ -93,7 +94,7 @@ def test_a_map_of_a_batch_where_nothing_is_reached_is_named(tmp_path: Path) -> N
     assert said in (tmp_path / "b" / "report.html").read_text()
     units = json.loads((tmp_path / "b" / "summary.json").read_text())["units"]
     assert {unit["world"]: unit["reach"]["nothing"] for unit in units} == {"small": False, "dry": True}
-    assert maps_without_reach([unit for unit in units if unit["world"] == "small"]) == []
+    assert maps_without_reach([]) == []
 
 
 def executed(folder: Path, plans: dict[str, dict[str, list[str]]]) -> Run:
@@ -114,11 +115,12 @@ def test_a_plan_that_breaks_its_limits_is_told_before_its_figure(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     done = executed(tmp_path, {"dry": {"uv1": ["base", "p1", "p2", "p3", "p4", "base"]}, "good": {"uv1": [
         "base", "p1", "base"], "uv2": ["base", "p4", "base"]}})
-    plans = done.summary["scenarios"][0]["plans"]
+    assert isinstance(done.summary, ComparisonSummary)
+    plans = done.summary.scenarios[0].plans
     # Robots: uv1 runs dry in each of 20 trials, uv2 stays home. A robot that fails at the base is not lost on the way.
-    assert {name: (plan["feasible"], plan["lost"]) for name, plan in plans.items()} == {
+    assert {name: (plan.feasible, plan.lost) for name, plan in plans.items()} == {
         "dry": (False, 20), "good": (True, 0)}
-    assert plans["good"]["ends"]["failed"] == 20
+    assert plans["good"].ends["failed"] == 20
     terminal, page = told(done, capsys)
     for text in (terminal, page):
         assert "dry (infeasible, 20 of 40 robot missions lost) " in text

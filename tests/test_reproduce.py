@@ -44,10 +44,10 @@ def test_rewards_move_to_the_reliable_vehicles_and_the_vss_grows() -> None:
 def test_the_simulation_is_executed_as_in_the_paper_and_as_planned(tmp_path: Path) -> None:
     world = world_of(tmp_path, SMALL.replace("limit_s: 120", "limit_s: 30"))
     rows = simulation([world], SETTINGS, None, lambda *_: None)
-    assert [(row["world"], row["scenario"]) for row in rows] == [("small", "half"), ("small", "safe")]
-    safe = rows[1]
+    assert [(row.world, row.scenario) for row in rows] == [("small", "half"), ("small", "safe")]
+    safe = rows[1].under
     assert safe["mission"] == safe["per_leg"]  # nobody fails: both processes are the same
-    assert not safe["mission"]["vss"]["distinguishable"]
+    assert not safe["mission"].vss.excludes_zero
     page = simulation_page(rows, SETTINGS)
     assert "400 trials, 4 noise draws, fidelity kinematic, seed 0" in page
     assert page.count("| small | half |") == 2

@@ -36,7 +36,7 @@ def test_what_is_counted_is_plural_only_where_it_is_not_one(module: str) -> None
 
 
 NEVER_ONE = {  # said of what is more than a bound, or two at least
-    "fewest maps", "summary['rollouts'] noise draws", "len(content) bytes", "points worlds", "units units",
+    "fewest maps", "summary.rollouts noise draws", "len(content) bytes", "points worlds", "units units",
     "rows outcomes", "size bytes", "len(sets) sets", "len(items) entries", "longest entries", "len(routes) routes",
     "len(route) stops", "most files", "head.num_rows rows", "largest bytes", "pois POIs", "rows cells",
     "robots robots", "least POIs", "slowest.pois POIs", "listed(study.pois) POIs",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -74,12 +72,6 @@ class Figure:
         """Mean over trials of what noise took."""
         return float(self.taken.sums.sum()) / self.drawn.count
 
-    def as_dict(self) -> dict[str, Any]:
-        """For a file."""
-        return {"count": self.drawn.count, "mean": self.drawn.mean, "squares": self.drawn.squares,
-                "drawn_bounds": list(self.drawn_bounds), "taken_bounds": list(self.taken_bounds),
-                "counts": self.taken.counts.tolist(), "sums": self.taken.sums.tolist()}
-
 
 def figure_of(drawn: FloatArray, drawn_bounds: Bounds, taken: FloatArray, taken_bounds: Bounds, rollout: IntArray,
               *, noisy: bool) -> Figure:
@@ -102,16 +94,6 @@ def figure_of(drawn: FloatArray, drawn_bounds: Bounds, taken: FloatArray, taken_
     return Figure(
         drawn=Moments(count=len(drawn), mean=mean, squares=float(np.sum((drawn - mean) ** 2))),
         drawn_bounds=drawn_bounds, taken=shared, taken_bounds=taken_bounds)
-
-
-def figure_from(data: Mapping[str, Any]) -> Figure:
-    """The figure that such a file holds."""
-    low, high = data["drawn_bounds"]
-    least, most = data["taken_bounds"]
-    return Figure(
-        drawn=Moments(count=data["count"], mean=data["mean"], squares=data["squares"]),
-        drawn_bounds=(low, high), taken_bounds=(least, most),
-        taken=Clusters(counts=np.array(data["counts"], dtype=np.int64), sums=np.array(data["sums"], dtype=np.float64)))
 
 
 def joined(a: Figure, b: Figure) -> Figure:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from sva_bench.analysis.results import ScenarioSummary
+from sva_bench.analysis.summaries import ReachedPrecision, Summary
 from sva_bench.errors import BadInput
 
 
@@ -22,7 +23,7 @@ class Precision:
     pct: float
     max_trials: int
 
-    def next_size(self, summary: Mapping[str, Any]) -> tuple[int, int] | None:
+    def next_size(self, summary: Summary) -> tuple[int, int] | None:
         """Trials and rollouts to go on with: twice as many of both; ``None`` = enough.
 
         More trials of the same noise draws would not tell more of the noise, so both grow. Few looks, each at twice
@@ -32,34 +33,27 @@ class Precision:
             Chow & Robbins (1965), On the Asymptotic Theory of Fixed-Width Sequential Confidence Intervals; Glynn &
             Whitt (1992), The Asymptotic Validity of Sequential Stopping Rules for Stochastic Simulations.
         """
-        if self.met(summary) or summary["trials"] >= self.max_trials:
+        if self.reached(summary.scenarios).met or summary.trials >= self.max_trials:
             return None
-        trials = min(2 * summary["trials"], self.max_trials)
-        return trials, math.ceil(summary["rollouts"] * trials / summary["trials"])
+        trials = min(2 * summary.trials, self.max_trials)
+        return trials, math.ceil(summary.rollouts * trials / summary.trials)
 
-    def met(self, summary: Mapping[str, Any]) -> bool:
-        """Whether every scenario is as sure as asked for."""
-        reached = half_width_pct(summary)
-        return reached is not None and reached <= self.pct
-
-    def as_dict(self, summary: Mapping[str, Any]) -> dict[str, Any]:
-        """What a summary says of it."""
-        return {"asked_pct": self.pct, "reached_pct": half_width_pct(summary), "met": self.met(summary),
-                "max_trials": self.max_trials}
+    def reached(self, scenarios: Sequence[ScenarioSummary]) -> ReachedPrecision:
+        """What became of it; met where every scenario is as sure as asked for."""
+        reached = half_width_pct(scenarios)
+        return ReachedPrecision(asked_pct=self.pct, reached_pct=reached, max_trials=self.max_trials,
+                                met=reached is not None and reached <= self.pct)
 
 
-def half_width_pct(summary: Mapping[str, Any]) -> float | None:
+def half_width_pct(scenarios: Sequence[ScenarioSummary]) -> float | None:
     """The greatest half-width of an executed VSS, in per cent of the stochastic plan's mean.
 
     Nothing varies: 0. ``None`` where there is no interval, or nothing that it could be per cent of.
     """
     widths = []
-    for scenario in summary["scenarios"]:
-        interval, mean = scenario["vss"]["executed"]["ci95"], scenario["plans"]["stochastic"]["executed"]["mean"]
-        if interval is None:
-            return None
-        half = (interval[1] - interval[0]) / 2
-        if half > 0 and mean <= 0:
+    for scenario in scenarios:
+        half, mean = scenario.vss.executed.half_width, scenario.stochastic.executed.mean
+        if half is None or (half > 0 and mean <= 0):
             return None
         widths.append(100 * half / mean if half > 0 else 0.0)
     return max(widths, default=0.0)

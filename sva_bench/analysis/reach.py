@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+
+from sva_bench.analysis.results import GivenPlanResult
+from sva_bench.analysis.summaries import ComparisonSummary, Reach
 
 NOTHING = "no robot reaches any POI: give them more fuel or time"
 _NAMED = 20  # POIs or maps that a sentence names
 
 
-def reached(missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Sequence[str]) -> dict[str, Any]:
+def reached(missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Sequence[str]) -> Reach:
     """What ``summary.json`` says of reach.
 
     Args:
@@ -17,62 +19,49 @@ def reached(missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Se
         robots: All robots.
         pois: All POIs.
     """
-    return {
-        "nothing": all(len(missed.get(robot, ())) == len(pois) for robot in robots),
-        "robots": [robot for robot in robots if len(missed.get(robot, ())) == len(pois)],
-        "pois": [poi for poi in pois if all(poi in missed.get(robot, ()) for robot in robots)],
-        "missed": {robot: list(missed[robot]) for robot in robots if missed.get(robot)},
-    }
+    return Reach(
+        nothing=all(len(missed.get(robot, ())) == len(pois) for robot in robots),
+        robots=tuple(robot for robot in robots if len(missed.get(robot, ())) == len(pois)),
+        pois=tuple(poi for poi in pois if all(poi in missed.get(robot, ()) for robot in robots)),
+        missed={robot: tuple(missed[robot]) for robot in robots if missed.get(robot)})
 
 
-def nothing_reached(summary: Mapping[str, Any]) -> bool:
-    """Whether no robot reaches any POI; summaries written before this was asked don't say."""
-    return bool(summary.get("reach", {}).get("nothing", False))
-
-
-def beyond_reach(summary: Mapping[str, Any]) -> list[str]:
+def beyond_reach(reach: Reach) -> list[str]:
     """A sentence for each robot that can't visit some POIs within its fuel and limit; none where nothing is reached."""
-    reach = summary.get("reach", {})
-    if reach.get("nothing", False):
+    if reach.nothing:
         return []
-    said = [f"{robot} reaches no POI within its fuel and limit, and stays home." if robot in reach["robots"] else
+    said = [f"{robot} reaches no POI within its fuel and limit, and stays home." if robot in reach.robots else
             f"{robot} reaches none of {_named(pois)} within its fuel and limit, and will never be sent there."
-            for robot, pois in reach.get("missed", {}).items()]
-    if reach.get("pois"):
-        said.append(f"No robot reaches {_named(reach['pois'])}.")
+            for robot, pois in reach.missed.items()]
+    if reach.pois:
+        said.append(f"No robot reaches {_named(reach.pois)}.")
     return said
 
 
-def maps_without_reach(units: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What to say of the maps of a batch on which nothing can be collected."""
-    names = list(dict.fromkeys(f"{unit['world']} ({unit['variant']})" if unit["variant"] else str(unit["world"])
-                               for unit in units if nothing_reached(unit)))
+def maps_without_reach(labels: Sequence[str]) -> list[str]:
+    """What to say of the maps of a batch on which nothing can be collected; a map may be named for several seeds."""
+    names = list(dict.fromkeys(labels))
     if not names:
         return []
     return [f"On {len(names)} map{'s' * (len(names) > 1)} ({_named(names)}) {NOTHING}, or leave "
             f"{'it' if len(names) == 1 else 'them'} out."]
 
 
-def infeasible(plan: Mapping[str, Any]) -> bool:
-    """Whether a plan breaks fuel or limit and is driven all the same; plans of ``run`` never do."""
-    return not plan.get("feasible", True)
-
-
-def lost_robots(plan: Mapping[str, Any]) -> str:
+def lost_robots(plan: GivenPlanResult) -> str:
     """``500 of 2000``: how many robot missions ended along the route."""
-    return f"{plan['lost']} of {sum(plan['ends'].values())}" if "lost" in plan else ""
+    return f"{plan.lost} of {sum(plan.ends.values())}"
 
 
-def warned(plan: Mapping[str, Any]) -> str:
+def warned(plan: GivenPlanResult) -> str:
     """What a ranking says of a plan before its figure: that it is infeasible, and how many robots were lost."""
-    words = ["infeasible"] * infeasible(plan) + [f"{lost_robots(plan)} robot missions lost"] * bool(plan.get("lost"))
+    words = ["infeasible"] * (not plan.feasible) + [f"{lost_robots(plan)} robot missions lost"] * bool(plan.lost)
     return f" ({', '.join(words)})" if words else ""
 
 
-def infeasible_plans(summary: Mapping[str, Any]) -> list[str]:
+def infeasible_plans(summary: ComparisonSummary) -> list[str]:
     """A sentence about the plans that break fuel or limit."""
-    names = list(dict.fromkeys(name for scenario in summary["scenarios"] for name, plan in scenario["plans"].items()
-                               if infeasible(plan)))
+    names = list(dict.fromkeys(name for scenario in summary.scenarios for name, plan in scenario.plans.items()
+                               if not plan.feasible))
     if not names:
         return []
     return [f"{_named(names)} {'is' if len(names) == 1 else 'are'} infeasible: fuel or mission limit would be broken. "

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.stats import beta
 from scipy.stats import t as student_t
 
 from sva_bench.analysis.moments import Bounds, Figure
+from sva_bench.analysis.results import Distribution, Estimate
 from sva_bench.arrays import FloatArray
 
 CONFIDENCE = 0.95
@@ -19,28 +18,6 @@ WORST = 0.1
 """Share of the trials whose mean is reported as the tail (CVaR)."""
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _SPREADLESS = 1e-12  # relative to the bounds: rounding of sums, not spread
-
-
-@dataclass(frozen=True, kw_only=True)
-class Estimate:
-    """A mean and its 95 % interval; ``None`` where the data carry none."""
-
-    mean: float
-    interval: tuple[float, float] | None
-
-    @property
-    def distinguishable(self) -> bool:
-        """Whether the interval leaves zero out. Differences that are all zero are not distinguishable from it."""
-        return self.interval is not None and (self.interval[0] > 0 or self.interval[1] < 0)
-
-    @property
-    def half_width(self) -> float | None:
-        """Half of the interval's width."""
-        return None if self.interval is None else (self.interval[1] - self.interval[0]) / 2
-
-    def as_dict(self) -> dict[str, Any]:
-        """As in ``summary.json``."""
-        return {"mean": self.mean + 0.0, "ci95": None if self.interval is None else [x + 0.0 for x in self.interval]}
 
 
 def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
@@ -60,11 +37,11 @@ def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
     """
     drawn, taken = _drawn_interval(figure, comparisons), _taken_interval(figure, comparisons)
     if drawn is None or taken is None:
-        return Estimate(mean=figure.mean, interval=None)
+        return _estimate(figure.mean, None)
     middle, lost = figure.drawn.mean, figure.mean_taken
     below = math.hypot(middle - drawn[0], max(taken[1] - lost, 0.0))
     above = math.hypot(drawn[1] - middle, max(lost - taken[0], 0.0))
-    return Estimate(mean=figure.mean, interval=(figure.mean - below, figure.mean + above))
+    return _estimate(figure.mean, (figure.mean - below, figure.mean + above))
 
 
 def controlled(figure: Figure, expected: float) -> Estimate:
@@ -85,8 +62,13 @@ def controlled(figure: Figure, expected: float) -> Estimate:
     taken = _taken_interval(figure, 1)
     mean = expected - figure.mean_taken
     if taken is None:
-        return Estimate(mean=mean, interval=None)
-    return Estimate(mean=mean, interval=(min(mean, expected - taken[1]), max(mean, expected - taken[0])))
+        return _estimate(mean, None)
+    return _estimate(mean, (min(mean, expected - taken[1]), max(mean, expected - taken[0])))
+
+
+def _estimate(mean: float, ci95: tuple[float, float] | None) -> Estimate:
+    """An estimate without minus zeros."""
+    return Estimate(mean=mean + 0.0, ci95=None if ci95 is None else (ci95[0] + 0.0, ci95[1] + 0.0))
 
 
 def _drawn_interval(figure: Figure, comparisons: int) -> tuple[float, float] | None:
@@ -166,18 +148,18 @@ def sample_mean(values: Sequence[float]) -> Estimate:
     mean, count = float(np.mean(sample)), len(sample)
     beyond = float(np.ptp(sample)) / math.sqrt(count)
     if count < 2 or beyond <= _SPREADLESS * abs(mean):
-        return Estimate(mean=mean, interval=None)
+        return _estimate(mean, None)
     squares = float(np.sum((sample - mean) ** 2))
     half = float(student_t.ppf(0.5 + CONFIDENCE / 2, count - 1)) * math.sqrt(squares / (count - 1) / count)
     low, high = bounded_mean(count, mean, squares, (float(sample.min()) - beyond, float(sample.max()) + beyond))
-    return Estimate(mean=mean, interval=(min(low, mean - half), max(high, mean + half)))
+    return _estimate(mean, (min(low, mean - half), max(high, mean + half)))
 
 
-def distribution(values: FloatArray) -> dict[str, float]:
+def distribution(values: FloatArray) -> Distribution:
     """Quantiles of trials, all of them figures that a trial came to, and the mean of the worst tenth."""
-    found = {f"q{round(100 * q):02d}": float(np.quantile(values, q, method="inverted_cdf")) for q in _QUANTILES}
-    return {"least": float(np.min(values)), **found, "greatest": float(np.max(values)),
-            "cvar10": tail_mean(values, WORST)}
+    q05, q25, q50, q75, q95 = (float(np.quantile(values, q, method="inverted_cdf")) for q in _QUANTILES)
+    return Distribution(least=float(np.min(values)), q05=q05, q25=q25, q50=q50, q75=q75, q95=q95,
+                        greatest=float(np.max(values)), cvar10=tail_mean(values, WORST))
 
 
 def tail_mean(values: FloatArray, worst: float) -> float:

@@ -4,36 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sva_bench.analysis.moments import Figure, pooled
-from sva_bench.analysis.statistics import Estimate, estimate, sample_mean
-from sva_bench.batch.folder import Failure, shard_path
+from sva_bench.analysis.over_maps import BatchSummary, GivenUp, MapRow, MapVss, OverMaps, Percentage, UnitSummary
+from sva_bench.analysis.results import Estimate, VssFigures
+from sva_bench.analysis.statistics import estimate, sample_mean
+from sva_bench.batch.folder import shard_path
 from sva_bench.batch.grid import Grid
 from sva_bench.batch.shards import Note, read_note, unit_of
-from sva_bench.batch.tallies import join, scenario_from
-
-KIND = "sva-bench/batch@1"
+from sva_bench.batch.tallies import join, scenario_of
 
 
-def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failures: Sequence[Failure]
-               ) -> dict[str, Any]:
-    """The content of ``summary.json``, from the shards of the units that are done.
+def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failures: Sequence[GivenUp]) -> BatchSummary:
+    """The summary of a batch, from the shards of the units that are done.
 
     Shards are joined in the order of the grid, whatever the order they were written in, so the sums are the same.
     """
     notes = list(_notes(grid, folder, done))
-    entries = [entry_of(note) for note in notes]
-    return {
-        "format": KIND, "trials": grid.options.trials, "fidelity": grid.options.fidelity,
-        "worlds": list(dict.fromkeys(point.world.name for point in grid.points)), "seeds": list(grid.seeds),
-        "variants": list(dict.fromkeys(point.variant for point in grid.points)),
-        "units": entries, "maps": maps(entries, over_seeds(notes)), "aggregate": aggregate(entries),
-        "failed": [{"unit": f.unit, "world": f.world, "seed": f.seed, "reason": f.reason, "attempts": f.attempts}
-                   for f in failures],
-    }
+    units = [unit_summary(note) for note in notes]
+    return BatchSummary(
+        trials=grid.options.trials, fidelity=grid.options.fidelity,
+        worlds=tuple(dict.fromkeys(point.world.name for point in grid.points)), seeds=tuple(grid.seeds),
+        variants=tuple(dict.fromkeys(point.variant for point in grid.points)), units=tuple(units),
+        maps=map_rows(units, over_seeds(notes)), aggregate=aggregate(units), failed=tuple(failures))
 
 
 def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterator[Note]:
@@ -57,13 +52,17 @@ def joined(a: Note, b: Note) -> Note:
                 tallies={name: join(tally, b.tallies[name]) for name, tally in a.tallies.items()})
 
 
-def entry_of(note: Note) -> dict[str, Any]:
+def unit_summary(note: Note) -> UnitSummary:
     """The summary of one point and seed."""
-    return {**note.facts, "variant": note.variant, "trials": note.trials, "scenarios": [
-        scenario_from(fact, note.tallies[fact["name"]], note.robots) for fact in note.facts["scenarios"]]}
+    facts = note.facts
+    return UnitSummary(
+        world=facts.world, seed=facts.seed, trials=note.trials, rollouts=facts.rollouts, fidelity=facts.fidelity,
+        failure=facts.failure, travel=facts.travel, reproducible=facts.reproducible, reach=facts.reach,
+        variant=note.variant, scenarios=tuple(
+            scenario_of(scenario, note.tallies[scenario.name], note.robots) for scenario in facts.scenarios))
 
 
-def aggregate(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def aggregate(units: Sequence[UnitSummary]) -> tuple[OverMaps, ...]:
     """VSS over maps, for each variant and scenario: the maps are the sample, seeds and trials are nested in them.
 
     The interval is that of a mean over maps, each map's figure being the mean over its seeds. A map where the
@@ -71,19 +70,27 @@ def aggregate(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     Where every robot is sure to be there, both plans are the same on any map; elsewhere maps that agree leave open
     how maps differ, and there is no interval.
     """
-    sure = {(e.get("variant", ""), s["name"]) for e in entries for s in e["scenarios"]}
-    sure -= {(e.get("variant", ""), s["name"]) for e in entries for s in e["scenarios"]
-             if any(p < 1 for p in s["availability"].values())}
+    doubtful = {(unit.variant, s.name) for unit in units for s in unit.scenarios
+                if any(p < 1 for p in s.availability.values())}
     rows = []
-    for (variant, scenario), by_map in _figures(entries).items():
-        certain = (variant, scenario) in sure
-        vss = [float(np.mean([mean for mean, _ in figures])) for figures in by_map.values()]
-        shares = [[pct for _, pct in figures if pct is not None] for figures in by_map.values()]
+    for (variant, scenario), by_map in _by_map(units).items():
+        certain = (variant, scenario) not in doubtful
+        vss = [float(np.mean([seed.executed.mean for seed in seeds])) for seeds in by_map.values()]
+        shares = [[seed.executed_pct for seed in seeds if seed.executed_pct is not None] for seeds in by_map.values()]
         pcts = [float(np.mean(pct)) for pct in shares if pct]
-        rows.append({"variant": variant, "scenario": scenario, "maps": len(by_map),
-                     "vss": over(vss, sure=certain),
-                     "vss_pct": over(pcts, sure=certain) | ({} if len(pcts) == len(by_map) else {"maps": len(pcts)})})
-    return rows
+        rows.append(OverMaps(
+            variant=variant, scenario=scenario, maps=len(by_map), vss=over(vss, sure=certain),
+            vss_pct=_percentage(pcts, len(by_map), sure=certain)))
+    return tuple(rows)
+
+
+def _percentage(figures: Sequence[float], maps: int, *, sure: bool) -> Percentage:
+    """Over those of so many maps that have a percentage."""
+    fewer = None if len(figures) == maps else len(figures)
+    if not figures:
+        return Percentage(mean=None, ci95=None, maps=fewer)
+    found = over(figures, sure=sure)
+    return Percentage(mean=found.mean, ci95=found.ci95, maps=fewer)
 
 
 Key = tuple[str, str, str]
@@ -95,51 +102,41 @@ def over_seeds(notes: Sequence[Note]) -> dict[Key, Estimate]:
     together: dict[Key, Figure] = {}
     for note in notes:
         for scenario, tally in note.tallies.items():
-            key = note.variant, scenario, note.facts["world"]
+            key = note.variant, scenario, note.facts.world
             together[key] = pooled(together[key], tally.difference) if key in together else tally.difference
     return {key: estimate(figure) for key, figure in together.items()}
 
 
-def maps(entries: Sequence[Mapping[str, Any]], executed: Mapping[Key, Estimate]) -> list[dict[str, Any]]:
+def map_rows(units: Sequence[UnitSummary], executed: Mapping[Key, Estimate]) -> tuple[MapRow, ...]:
     """VSS map by map.
 
     Args:
-        entries: Summaries, a map and seed at a time.
+        units: Summaries, a map and seed at a time.
         executed: As ``over_seeds`` gives it.
     """
-    differing = {(e.get("variant", ""), s["name"], e["world"]) for e in entries for s in e["scenarios"]
-                 if not s["vss"]["same_plan"]}
     rows = []
-    for (variant, scenario), by_map in _figures(entries).items():
-        for world, figures in by_map.items():
-            key = variant, scenario, world
-            pct = [share for _, share in figures if share is not None]
-            rows.append({
-                "variant": variant, "world": world, "scenario": scenario, "seeds": len(figures),
-                "vss": executed[key].as_dict() | {"same_plan": key not in differing},
-                "vss_pct": float(np.mean(pct)) if pct else None})
-    order = {world: number for number, world in enumerate(dict.fromkeys(e["world"] for e in entries))}
-    return sorted(rows, key=lambda row: (order[row["world"]], row["variant"]))
+    for (variant, scenario), by_map in _by_map(units).items():
+        for world, seeds in by_map.items():
+            found = executed[variant, scenario, world]
+            pct = [seed.executed_pct for seed in seeds if seed.executed_pct is not None]
+            rows.append(MapRow(
+                variant=variant, world=world, scenario=scenario, seeds=len(seeds), vss_pct=float(np.mean(pct)) if pct
+                else None, vss=MapVss(mean=found.mean, ci95=found.ci95, same_plan=all(s.same_plan for s in seeds))))
+    order = {world: number for number, world in enumerate(dict.fromkeys(unit.world for unit in units))}
+    return tuple(sorted(rows, key=lambda row: (order[row.world], row.variant)))
 
 
-Figures = dict[tuple[str, str], dict[str, list[tuple[float, float | None]]]]
-
-
-def _figures(entries: Sequence[Mapping[str, Any]]) -> Figures:
-    """Mean and percentage of the executed VSS, seed by seed, by variant and scenario, then by map."""
-    found: Figures = {}
-    for entry in entries:
-        for scenario in entry["scenarios"]:
-            vss = scenario["vss"]
-            found.setdefault((entry.get("variant", ""), scenario["name"]), {}).setdefault(entry["world"], []).append(
-                (vss["executed"]["mean"], vss["executed_pct"]))
+def _by_map(units: Sequence[UnitSummary]) -> dict[tuple[str, str], dict[str, list[VssFigures]]]:
+    """The VSS seed by seed, by variant and scenario, then by map."""
+    found: dict[tuple[str, str], dict[str, list[VssFigures]]] = {}
+    for unit in units:
+        for scenario in unit.scenarios:
+            found.setdefault((unit.variant, scenario.name), {}).setdefault(unit.world, []).append(scenario.vss)
     return found
 
 
-def over(figures: Sequence[float], *, sure: bool) -> dict[str, Any]:
+def over(figures: Sequence[float], *, sure: bool) -> Estimate:
     """Mean of a sample of maps, with its interval; ``sure`` where no map could have another figure."""
-    if not figures:
-        return {"mean": None, "ci95": None}
-    found = sample_mean(figures).as_dict()
+    found = sample_mean(figures)
     alike = sure and len(figures) > 1 and len(set(figures)) == 1
-    return {**found, "ci95": [found["mean"]] * 2} if alike else found
+    return Estimate(mean=found.mean, ci95=(found.mean, found.mean)) if alike else found

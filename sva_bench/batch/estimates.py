@@ -12,8 +12,8 @@ from sva_bench.batch.folder import units_in
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob
 from sva_bench.batch.strands import strand
-from sva_bench.study.costs import Progress
 from sva_bench.workers.engine import Job
+from sva_bench.workers.progress import OnProgress
 
 # Measured on a core of a shared virtual machine.
 _PATHS_S, _PLANS_S, _ROW_S = 5.0, 5.0, 1.5e-6
@@ -25,7 +25,7 @@ _ROW_BYTES = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class StrandCost:
     """One point and seed: units, rows, bytes on disk, and processor time [s]."""
 
     point: Point
@@ -36,11 +36,11 @@ class Estimate:
     processor_s: float
 
 
-def estimates(grid: Grid, cache: Cache, folder: Path, progress: Progress = lambda *_: None) -> list[Estimate]:
+def estimates(grid: Grid, cache: Cache, folder: Path, progress: OnProgress = lambda *_: None) -> list[StrandCost]:
     """What is left of a grid, a point and seed at a time."""
     done = frozenset(units_in(folder)) if folder.is_dir() else frozenset()
     seen: set[str] = set()
-    listed: list[Estimate] = []
+    listed: list[StrandCost] = []
     of = len(grid.points) * len(grid.seeds)
     for point, seed in grid.strands():
         progress("estimating", len(listed), of)
@@ -48,7 +48,7 @@ def estimates(grid: Grid, cache: Cache, folder: Path, progress: Progress = lambd
     return listed
 
 
-def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: Cache, seen: set[str]) -> Estimate:
+def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: Cache, seen: set[str]) -> StrandCost:
     world = point.world
     left = [count for first, count in grid.ranges() if grid.unit_name(point, seed, first) not in done]
     rows = sum(left) * len(world.scenarios) * 2 * len(world.robots)
@@ -72,7 +72,7 @@ def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: 
             break
         jobs = steps.send(results)
     steps.close()
-    return Estimate(point=point, seed=seed, units=len(left), rows=rows, disk_bytes=rows * _ROW_BYTES,
+    return StrandCost(point=point, seed=seed, units=len(left), rows=rows, disk_bytes=rows * _ROW_BYTES,
                     processor_s=seconds)
 
 

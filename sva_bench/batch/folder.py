@@ -8,31 +8,18 @@ import fcntl
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from sva_bench.batch.schema import FailuresFile, ManifestFile, SettingsEntry
+from sva_bench.analysis.over_maps import GivenUp
+from sva_bench.batch.schema import FAILURES, MANIFEST, BatchManifest, BatchSettings, GivenUpUnits
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.atomic import by_way_of, why
 from sva_bench.files.documents import read_json, validate
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
-
-MANIFEST = "sva-bench/batch-manifest@1"
-FAILURES = "sva-bench/batch-failures@1"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Failure:
-    """A unit that was given up, and why."""
-
-    unit: str
-    world: str
-    seed: int
-    reason: str
-    attempts: int
+from sva_bench.files.records import as_dict
 
 
 @contextlib.contextmanager
@@ -70,7 +57,7 @@ def at_work(folder: Path) -> bool:
     return False
 
 
-def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
+def begin(folder: Path, settings: BatchSettings, *, resume: bool) -> None:
     """Make a locked folder ready for a batch of these settings.
 
     Raises:
@@ -91,14 +78,14 @@ def begin(folder: Path, settings: Mapping[str, Any], *, resume: bool) -> None:
     except OSError as error:
         raise _unwritable(folder, error) from None
     if not held:
-        content = pretty_json({"format": MANIFEST, "settings": dict(settings)}).encode()
+        content = pretty_json(as_dict(BatchManifest(settings=settings))).encode()
         if len(content) > MOST_BYTES:
             raise BadInput(f"the worlds and variants of this batch take {len(content)} bytes; at most {MOST_BYTES} are "
                            "kept in one folder: cut it into several batches")
         write(manifest, content)
 
 
-def settings_in(folder: Path) -> tuple[Part, SettingsEntry]:
+def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
     """The settings that a batch folder was made with, as they stand there and as they were checked.
 
     Raises:
@@ -112,13 +99,13 @@ def settings_in(folder: Path) -> tuple[Part, SettingsEntry]:
     if isinstance(document.data, dict) and document.data.get("format") == "sva-bench/manifest@1":
         raise BadInput(f"{folder}: the folder of a run, not of a batch; 'sva-bench report' with this folder writes its "
                        "report again")
-    settings = validate(document, ManifestFile, MANIFEST).settings
+    settings = validate(document, BatchManifest, MANIFEST).settings
     return Part(document, ("settings",), document.data["settings"]), settings
 
 
-def refuse_other_settings(folder: Path, settings: Mapping[str, Any]) -> None:
+def refuse_other_settings(folder: Path, settings: BatchSettings) -> None:
     """Refuse to go on with a folder of other settings, naming what differs with both values."""
-    held, now = settings_in(folder)[0].data, json.loads(json.dumps(settings))
+    held, now = settings_in(folder)[0].data, json.loads(json.dumps(as_dict(settings)))
     differences = list(islice(_differences(held, now), _MOST_TOLD + 1))
     if not differences:
         return
@@ -162,19 +149,17 @@ def units_in(folder: Path) -> set[str]:
     return {path.stem.removeprefix("outcomes-") for path in folder.glob("outcomes-*.parquet")}
 
 
-def failures_in(folder: Path) -> list[Failure]:
+def failures_in(folder: Path) -> list[GivenUp]:
     """The units that were given up."""
     path = folder / "failures.json"
     if not path.exists():
         return []
-    _, file = read_ours(path, FailuresFile, FAILURES)
-    return [Failure(**vars(entry)) for entry in file.failures]
+    return list(read_ours(path, GivenUpUnits, FAILURES)[1].failures)
 
 
-def write_failures(folder: Path, failures: Sequence[Failure]) -> None:
+def write_failures(folder: Path, failures: Sequence[GivenUp]) -> None:
     """Put down the units that were given up."""
-    write(folder / "failures.json", pretty_json(
-        {"format": FAILURES, "failures": [asdict(failure) for failure in failures]}).encode())
+    write(folder / "failures.json", pretty_json(as_dict(GivenUpUnits(failures=tuple(failures)))).encode())
 
 
 def write_maps(folder: Path, files: Mapping[str, bytes]) -> None:

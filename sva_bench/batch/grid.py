@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from sva_bench import __version__
-from sva_bench.batch.schema import PointEntry, SettingsEntry
+from sva_bench.batch.schema import BatchSettings, OptionsEntry, PointEntry
+from sva_bench.choices import PathPlanner
 from sva_bench.errors import BadInput
 from sva_bench.files.digest import digest
 from sva_bench.files.read_back import Part
+from sva_bench.files.records import as_dict
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.options import Options
 from sva_bench.world.load import world_as_dict, world_of
@@ -35,7 +36,7 @@ class Point:
     """
 
     world: World
-    planner: Any
+    planner: PathPlanner
     variant: str = ""
 
     @property
@@ -47,6 +48,12 @@ class Point:
     def label(self) -> str:
         """For a person."""
         return f"{self.world.name} ({self.variant})" if self.variant else self.world.name
+
+    def entry(self) -> PointEntry:
+        """As a manifest holds it."""
+        source = self.world.map_source
+        return PointEntry(variant=self.variant, planner=self.planner, world=world_as_dict(self.world),
+                          files=None if source is None else source.digests())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,15 +72,14 @@ class Grid:
     options: Options
     unit_trials: int
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> BatchSettings:
         """Everything that the rows and shards of a batch depend on."""
-        options = self.options.as_dict()
-        del options["planner"]
-        return {"version": __version__, "seeds": list(self.seeds), "options": options,
-                "unit_trials": self.unit_trials, "points": {point.name: {
-                    "variant": point.variant, "planner": point.planner, "world": world_as_dict(point.world),
-                    **({} if point.world.map_source is None else {"files": point.world.map_source.digests()})}
-                    for point in self.points}}
+        told = self.options
+        options = OptionsEntry(
+            trials=told.trials, rollouts=told.rollouts, fidelity=told.fidelity, informed=False, assumptions=False,
+            time_limit_s=told.limits.time_limit_s, gap=told.limits.gap, evpi=told.evpi)
+        return BatchSettings(version=__version__, seeds=tuple(self.seeds), options=options,
+                             unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points})
 
     def map_files(self) -> dict[str, bytes]:
         """The files behind worlds of maps, by their names within the batch folder; equal ones once."""
@@ -130,7 +136,7 @@ def refuse_too_many(points: int, seeds: int, trials: int, unit_trials: int) -> N
                        f"batch has {MOST_UNITS} at most: take fewer seeds, or more trials a unit (--unit-trials)")
 
 
-def grid_of(document: Part, settings: SettingsEntry) -> Grid:
+def grid_of(document: Part, settings: BatchSettings) -> Grid:
     """The grid that gave the settings in a batch's manifest.
 
     Raises:
@@ -160,9 +166,9 @@ def _map_folder_at(path: Path, entry: PointEntry) -> Path:
     return path.parent if entry.files is None else path.parent / _map_folder(entry.files)
 
 
-def batch_name(settings: Mapping[str, Any]) -> str:
+def batch_name(settings: BatchSettings) -> str:
     """Default name of a batch folder: equal batches get equal names."""
-    return f"batch-{digest(settings)[:8]}"
+    return f"batch-{digest(as_dict(settings))[:8]}"
 
 
 def options_at(grid: Grid, point: Point, seed: int) -> Options:

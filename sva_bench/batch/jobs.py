@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from sva_bench.analysis.summaries import Facts
 from sva_bench.arrays import FloatArray
-from sva_bench.batch.shards import Facts, Shard, shard_of
+from sva_bench.batch.shards import Shard, shard_of
 from sva_bench.choices import PathPlanner
 from sva_bench.execution.execute import (
     Case,

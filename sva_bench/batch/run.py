@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from sva_bench.batch.aggregates import aggregate, entry_of, joined, summary_of
+from sva_bench.analysis.over_maps import BatchSummary, GivenUp, OverMaps
+from sva_bench.batch.aggregates import aggregate, joined, summary_of, unit_summary
 from sva_bench.batch.cache import Cache
 from sva_bench.batch.conductor import Conductor, Hooks
 from sva_bench.batch.folder import (
-    Failure,
     begin,
     failures_in,
     locked,
@@ -28,12 +27,13 @@ from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.shards import Note, Shard, read_note, unit_of
 from sva_bench.batch.strands import Strand, strand
 from sva_bench.files.pretty import pretty_json
+from sva_bench.files.records import as_dict
 from sva_bench.report.batch_page import write_batch_report
 from sva_bench.workers.engine import Engine
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Progress:
+class BatchProgress:
     """How far a batch is.
 
     Attributes:
@@ -48,7 +48,7 @@ class Progress:
     units: int
     before: int
     seconds: float
-    vss: Callable[[], list[dict[str, Any]]]
+    vss: Callable[[], Sequence[OverMaps]]
 
     @property
     def rate(self) -> float | None:
@@ -63,8 +63,8 @@ class Progress:
 
 def run_batch(
     grid: Grid, folder: Path, engine: Callable[[], AbstractContextManager[Engine]], cache: Cache,
-    report: Callable[[Progress], None], *, resume: bool, retry: bool = False,
-) -> dict[str, Any]:
+    report: Callable[[BatchProgress], None], *, resume: bool, retry: bool = False,
+) -> BatchSummary:
     """Measure every unit of a grid that is not measured yet, and sum up.
 
     Args:
@@ -77,7 +77,7 @@ def run_batch(
         retry: Take up again the units that were given up.
 
     Returns:
-        The content of ``summary.json``.
+        What it comes to.
 
     Raises:
         BadInput: If the folder holds something else, is in use, or cannot be written to.
@@ -93,7 +93,7 @@ def run_batch(
                     shard=books.keep, unit_failed=books.unit_failed, strand_failed=books.strand_failed,
                     tick=lambda: report(books.progress()))).run(books.strands())
         summary = summary_of(grid, folder, books.done, books.failures)
-        write(folder / "summary.json", pretty_json(summary).encode())
+        write(folder / "summary.json", pretty_json(as_dict(summary)).encode())
         with writing(folder / "report.html") as draft:
             write_batch_report(draft, summary)
         return summary
@@ -146,14 +146,14 @@ class _Books:
         names = [self._grid.unit_name(point, seed, first) for first, _ in self._grid.ranges()]
         self._put_down([(name, point, seed) for name in names if name not in over], reason, attempts)
 
-    def progress(self) -> Progress:
+    def progress(self) -> BatchProgress:
         """How far the batch is."""
-        return Progress(done=len(self.done), failed=len(self.failures), units=len(self._owner), before=self._before,
-                        seconds=time.monotonic() - self._begun,
-                        vss=lambda: aggregate([entry_of(note) for note in self._so_far.values()]))
+        return BatchProgress(done=len(self.done), failed=len(self.failures), units=len(self._owner),
+                             before=self._before, seconds=time.monotonic() - self._begun,
+                             vss=lambda: aggregate([unit_summary(note) for note in self._so_far.values()]))
 
     def _put_down(self, units: list[tuple[str, Point, int]], reason: str, attempts: int) -> None:
-        self.failures += [Failure(unit=unit, world=point.label, seed=seed, reason=reason, attempts=attempts)
+        self.failures += [GivenUp(unit=unit, world=point.label, seed=seed, reason=reason, attempts=attempts)
                           for unit, point, seed in units]
         write_failures(self._folder, self.failures)
 

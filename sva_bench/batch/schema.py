@@ -2,82 +2,96 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from sva_bench.analysis.over_maps import GivenUp
+from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, two
+from sva_bench.analysis.summaries import Facts
 from sva_bench.analysis.unseen import UNHAPPY
 from sva_bench.choices import ENDS, Fidelity, Objective, PathPlanner
-from sva_bench.files.fields import Name, Number, Section, WholeNumber
-from sva_bench.storage.results_schema import MOST_ROLLOUTS, MOST_TRIALS, Facts, Seed, Words
+from sva_bench.files.fields import Name, Number, Seed, WholeNumber
+from sva_bench.files.records import Record
+
+MANIFEST: Literal["sva-bench/batch-manifest@1"] = "sva-bench/batch-manifest@1"
+FAILURES: Literal["sva-bench/batch-failures@1"] = "sva-bench/batch-failures@1"
 
 _Sum = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e25, le=1e25)]
 _Square = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e40)]
 _Count = Annotated[int, Field(strict=True, ge=0, le=10**12)]
 
 
-class OptionsEntry(Section):
+@dataclass(frozen=True, kw_only=True)
+class OptionsEntry(Record):
+    """What all runs of a batch were told."""
+
+    informed: Literal[False]
+    assumptions: Literal[False]
     trials: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
     rollouts: Annotated[int, Field(strict=True, ge=1, le=MOST_ROLLOUTS)]
     fidelity: Fidelity
-    informed: Literal[False]
-    assumptions: Literal[False]
     time_limit_s: Annotated[Number, Field(ge=0)] | None
     gap: Annotated[Number, Field(ge=0)]
     evpi: bool
 
 
-class PointEntry(Section):
+@dataclass(frozen=True, kw_only=True)
+class PointEntry(Record):
+    """A world as it is measured; it is checked as any world is."""
+
     variant: Words
     planner: PathPlanner
-    world: dict[str, Any]
-    files: dict[Words, Words] | None = None
+    world: Mapping[str, Any]
+    files: Mapping[Words, Words] | None = None
 
 
-class SettingsEntry(Section):
+@dataclass(frozen=True, kw_only=True)
+class BatchSettings(Record):
+    """Everything that the rows and shards of a batch depend on."""
+
     version: Words
-    seeds: Annotated[list[Seed], Field(min_length=1)]
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1)]
     options: OptionsEntry
     unit_trials: Annotated[int, Field(strict=True, ge=1)]
-    points: Annotated[dict[Words, PointEntry], Field(min_length=1)]
+    points: Annotated[Mapping[Words, PointEntry], Field(min_length=1)]
 
 
-class ManifestFile(Section):
-    """``manifest.json`` of a batch; the worlds in it are checked as any world is."""
+@dataclass(frozen=True, kw_only=True)
+class BatchManifest(Record):
+    """``manifest.json`` of a batch."""
 
-    format: Literal["sva-bench/batch-manifest@1"]
-    settings: SettingsEntry
-
-
-class FailureEntry(Section):
-    unit: Words
-    world: Words
-    seed: Seed
-    reason: Words
-    attempts: WholeNumber
+    format: Literal["sva-bench/batch-manifest@1"] = MANIFEST
+    settings: BatchSettings
 
 
-class FailuresFile(Section):
+@dataclass(frozen=True, kw_only=True)
+class GivenUpUnits(Record):
     """``failures.json``: units that were given up."""
 
-    format: Literal["sva-bench/batch-failures@1"]
-    failures: list[FailureEntry]
+    format: Literal["sva-bench/batch-failures@1"] = FAILURES
+    failures: tuple[GivenUp, ...]
 
 
-_Bounds = Annotated[list[_Sum], Field(min_length=2, max_length=2)]
+_Bounds = Annotated[tuple[_Sum, _Sum], BeforeValidator(two)]
 
 
-class FigureEntry(Section):
+@dataclass(frozen=True, kw_only=True)
+class StoredFigure(Record):
+    """A figure (``analysis.moments``) as a shard holds it: its drawn part, and what was taken by noise draw."""
+
     count: Annotated[_Count, Field(ge=1)]
     mean: _Sum
     squares: _Square
     drawn_bounds: _Bounds
     taken_bounds: _Bounds
-    counts: list[_Count]
-    sums: list[_Sum]
+    counts: tuple[_Count, ...]
+    sums: tuple[_Sum, ...]
 
     @model_validator(mode="after")
-    def _fits_together(self) -> FigureEntry:
+    def _fits_together(self) -> StoredFigure:
         if len(self.counts) != len(self.sums) or (self.counts and sum(self.counts) != self.count):
             raise ValueError("counts and sums by noise draw don't add up to the trials")
         if self.drawn_bounds[0] > self.drawn_bounds[1] or self.taken_bounds[0] > self.taken_bounds[1]:
@@ -85,39 +99,50 @@ class FigureEntry(Section):
         return self
 
 
-class PlanEntry(Section):
-    total: FigureEntry
-    by_robot: list[_Sum]
-    ends: Annotated[list[_Count], Field(min_length=len(ENDS), max_length=len(ENDS))]
-    charged: Annotated[list[_Sum], Field(min_length=len(UNHAPPY), max_length=len(UNHAPPY))]
+@dataclass(frozen=True, kw_only=True)
+class StoredPlan(Record):
+    """A plan's trials, added up."""
+
+    total: StoredFigure
+    by_robot: tuple[_Sum, ...]
+    ends: Annotated[tuple[_Count, ...], Field(min_length=len(ENDS), max_length=len(ENDS))]
+    charged: Annotated[tuple[_Sum, ...], Field(min_length=len(UNHAPPY), max_length=len(UNHAPPY))]
+    statistics: Mapping[Name, StoredFigure] = field(default_factory=dict)
 
 
-class TallyEntry(Section):
-    difference: FigureEntry
-    plans: dict[Objective, PlanEntry]
+@dataclass(frozen=True, kw_only=True)
+class StoredTally(Record):
+    """A scenario's trials, added up."""
+
+    difference: StoredFigure
+    plans: Mapping[Objective, StoredPlan]
 
 
-class NoteFile(Section):
+@dataclass(frozen=True, kw_only=True)
+class StoredNote(Record):
     """What a shard says of itself, in the metadata of its table."""
 
     facts: Facts
     variant: Words
-    robots: Annotated[list[Name], Field(min_length=1)]
+    robots: Annotated[tuple[Name, ...], Field(min_length=1)]
     first: WholeNumber
     trials: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
-    tallies: dict[Name, TallyEntry]
+    tallies: Mapping[Name, StoredTally]
 
     @model_validator(mode="after")
-    def _fits_together(self) -> NoteFile:
+    def _fits_together(self) -> StoredNote:
         names = [scenario.name for scenario in self.facts.scenarios]
         if list(self.tallies) != names:
             raise ValueError("tallies: expected one for each scenario of 'facts', in its order")
         for number, scenario in enumerate(self.facts.scenarios):
-            if list(scenario.availability) != self.robots or len(scenario.plans) != 2:
+            if tuple(scenario.availability) != self.robots or len(scenario.plans) != 2:
                 raise ValueError(f"facts.scenarios[{number}]: expected the robots of 'robots', and two plans")
         for name, tally in self.tallies.items():
-            figures = [tally.difference, *(plan.total for plan in tally.plans.values())]
-            if len(tally.plans) != 2 or any(len(plan.by_robot) != len(self.robots) for plan in tally.plans.values()) \
+            plans = tally.plans.values()
+            figures = [tally.difference, *(plan.total for plan in plans),
+                       *(figure for plan in plans for figure in plan.statistics.values())]
+            if len(plans) != 2 or any(len(plan.by_robot) != len(self.robots) for plan in plans) \
+                    or len({tuple(plan.statistics) for plan in plans}) != 1 \
                     or {f.count for f in figures} != {self.trials} or len({len(f.counts) for f in figures}) != 1:
                 raise ValueError(f"tallies.{name}: not of two plans, these robots and these trials")
         return self

@@ -6,24 +6,22 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from pydantic import ValidationError
 
+from sva_bench.analysis.summaries import Facts
 from sva_bench.batch.grid import Grid, Point
-from sva_bench.batch.schema import NoteFile
-from sva_bench.batch.tallies import Tally, tally_as_dict, tally_from, tally_of
+from sva_bench.batch.schema import StoredNote
+from sva_bench.batch.tallies import Tally, stored_tally, tally_from, tally_of
 from sva_bench.errors import BadFile
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.files.complaints import dotted, first_complaint
+from sva_bench.files.records import as_dict, from_dict
 from sva_bench.storage.outcome_table import constant, outcome_table
 from sva_bench.storage.tables import SHARDS, read_note_of, write_table
 from sva_bench.world.model import World
-
-Facts = Mapping[str, Any]
-"""A summary without its figures: its head, and for each scenario what is known before any trial."""
 
 _KEY = b"sva-bench/unit"
 _REMOVE = "remove it and --resume"
@@ -81,15 +79,16 @@ def unit_of(grid: Grid, point: Point, seed: int, first: int) -> Unit:
 
 def shard_of(world: World, variant: str, executed: Sequence[Executed], settings: Settings, facts: Facts) -> Shard:
     """Rows and tally of trials, ready to be written."""
-    robots = [robot.name for robot in world.robots]
+    robots = tuple(robot.name for robot in world.robots)
     runs = {(run.case.scenario.name, run.case.planner): run for run in executed}
     note = Note(facts=facts, variant=variant, robots=robots, first=settings.first, trials=settings.trials, tallies={
         s.name: tally_of(runs[s.name, "stochastic"], runs[s.name, "deterministic"], noisy=not world.noise.silent)
         for s in world.scenarios})
-    words = {"facts": facts, "variant": variant, "robots": robots, "first": note.first, "trials": note.trials,
-             "tallies": {name: tally_as_dict(tally) for name, tally in note.tallies.items()}}
+    stored = StoredNote(
+        facts=facts, variant=variant, robots=robots, first=note.first, trials=note.trials,
+        tallies={name: stored_tally(tally) for name, tally in note.tallies.items()})
     sink = pa.BufferOutputStream()
-    write_table(sink, SHARDS.with_metadata({_KEY: json.dumps(words)}),
+    write_table(sink, SHARDS.with_metadata({_KEY: json.dumps(as_dict(stored))}),
                 [pa.concat_tables([_rows(run, robots, world.name, variant, settings) for run in executed])])
     return Shard(content=sink.getvalue().to_pybytes(), note=note)
 
@@ -102,27 +101,27 @@ def read_note(path: Path, unit: Unit) -> Note:
     """
     try:
         words = json.loads(read_note_of(path, _KEY))
-        NoteFile.model_validate(words)
+        note = from_dict(StoredNote, words)
     except ValidationError as error:
-        loc, problem = first_complaint(words, NoteFile, error)
+        loc, problem = first_complaint(words, StoredNote, error)
         raise BadFile(path, None, dotted(loc), f"{problem}, in the tally of this shard; {_REMOVE}") from None
     except (ValueError, RecursionError) as error:
         raise BadFile(path, None, "", f"no shard of a batch: its tally is no JSON ({type(error).__name__}); {_REMOVE}"
                       ) from None
-    world, facts = unit.point.world, words["facts"]
-    draws = {len(tally["difference"]["counts"]) for tally in words["tallies"].values()}
+    world = unit.point.world
+    draws = {len(tally.difference.counts) for tally in note.tallies.values()}
     most = 0 if world.noise.silent else unit.rollouts
     for key, found, known in (
-            ("world", facts["world"], world.name), ("seed", facts["seed"], unit.seed),
-            ("variant", words["variant"], unit.point.variant), ("first", words["first"], unit.first),
-            ("trials", words["trials"], unit.trials), ("robots", words["robots"], [r.name for r in world.robots]),
-            ("scenarios", [s["name"] for s in facts["scenarios"]], [s.name for s in world.scenarios]),
+            ("world", note.facts.world, world.name), ("seed", note.facts.seed, unit.seed),
+            ("variant", note.variant, unit.point.variant), ("first", note.first, unit.first),
+            ("trials", note.trials, unit.trials), ("robots", list(note.robots), [r.name for r in world.robots]),
+            ("scenarios", [s.name for s in note.facts.scenarios], [s.name for s in world.scenarios]),
             ("noise draws", all(0 < met <= most or met == most for met in draws), True)):
         if found != known:
             raise BadFile(path, None, key, f"the shard of another unit: expected {known!r:.60}, found {found!r:.60}; "
                           f"{_REMOVE}")
-    return Note(facts=facts, variant=words["variant"], robots=words["robots"], first=words["first"],
-                trials=words["trials"], tallies={name: tally_from(data) for name, data in words["tallies"].items()})
+    return Note(facts=note.facts, variant=note.variant, robots=note.robots, first=note.first, trials=note.trials,
+                tallies={name: tally_from(tally) for name, tally in note.tallies.items()})
 
 
 def _rows(run: Executed, robots: Sequence[str], world: str, variant: str, settings: Settings) -> pa.Table:

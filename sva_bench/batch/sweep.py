@@ -20,13 +20,12 @@ from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.complaints import shown
 from sva_bench.files.digest import digest
 from sva_bench.files.documents import Document, Loc, parse_yaml, read_yaml, validate
-from sva_bench.files.fields import Name, Number, Section
+from sva_bench.files.fields import Name, Number, Section, Seed
 from sva_bench.files.patterns import has_pattern, matching
 from sva_bench.seeds import MOST_SEED
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.storage.results_schema import Seed
-from sva_bench.study.costs import Progress
 from sva_bench.study.options import Options
+from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 from sva_bench.world.variants import adapted, option_of, world_with
 
@@ -202,7 +201,7 @@ def varied(words: Sequence[str]) -> dict[str, list[Any]]:
     return vary
 
 
-def grid_of(sweep: Sweep, progress: Progress = lambda *_: None) -> Grid:
+def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
     """The grid that a sweep comes to.
 
     Args:

@@ -4,78 +4,118 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from sva_bench.analysis.catalogue import measured
 from sva_bench.analysis.figures import difference_figure, value_figure
-from sva_bench.analysis.moments import Figure, figure_from, joined
+from sva_bench.analysis.moments import Clusters, Figure, Moments, joined
+from sva_bench.analysis.results import PlanFigures, ScenarioFacts, ScenarioFigures
 from sva_bench.analysis.statistics import estimate
-from sva_bench.analysis.summary import charges, plan_entry, scenario_entry
-from sva_bench.analysis.unseen import UNHAPPY
+from sva_bench.analysis.summary import charges, plan_figures, vss_figures
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.choices import ENDS
+from sva_bench.batch.schema import StoredFigure, StoredPlan, StoredTally
+from sva_bench.choices import ENDS, Objective
 from sva_bench.execution.execute import Executed
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanTally:
-    """One plan's trials under one scenario, added up: incentive of the team and by robot, ends, and what they cost."""
+    """One plan's trials under one scenario, added up: incentive of the team and by robot, ends, and what they cost.
+
+    Attributes:
+        total: What the team collected.
+        by_robot: What each robot collected in all trials, shape (robots,).
+        ends: How often missions ended which way, shape (5,).
+        charged: What each unhappy end cost in all trials, shape (3,).
+        statistics: Those that are measured trial by trial.
+    """
 
     total: Figure
     by_robot: FloatArray
     ends: IntArray
     charged: FloatArray
+    statistics: Mapping[str, Figure]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tally:
     """Both plans' trials under one scenario, and what one collected beyond the other."""
 
-    plans: Mapping[str, PlanTally]
+    plans: Mapping[Objective, PlanTally]
     difference: Figure
 
 
 def tally_of(stochastic: Executed, deterministic: Executed, *, noisy: bool) -> Tally:
     """Add up the trials of a scenario."""
-    return Tally(
-        plans={run.case.planner: PlanTally(
-            total=value_figure(run, noisy=noisy), by_robot=run.incentive.sum(axis=0),
-            ends=np.bincount(run.end.ravel(), minlength=len(ENDS)), charged=np.array(list(charges(run).values())))
-            for run in (stochastic, deterministic)},
-        difference=difference_figure(stochastic, deterministic, noisy=noisy))
+    def added_up(run: Executed) -> PlanTally:
+        return PlanTally(total=value_figure(run, noisy=noisy), by_robot=run.incentive.sum(axis=0),
+                         ends=np.bincount(run.end.ravel(), minlength=len(ENDS)), charged=charges(run),
+                         statistics=measured(run, noisy=noisy))
+
+    return Tally(plans={"stochastic": added_up(stochastic), "deterministic": added_up(deterministic)},
+                 difference=difference_figure(stochastic, deterministic, noisy=noisy))
 
 
 def join(a: Tally, b: Tally) -> Tally:
     """Both ranges of trials together."""
-    return Tally(difference=joined(a.difference, b.difference), plans={
-        name: PlanTally(total=joined(plan.total, b.plans[name].total), by_robot=plan.by_robot + b.plans[name].by_robot,
-                        ends=plan.ends + b.plans[name].ends, charged=plan.charged + b.plans[name].charged)
-        for name, plan in a.plans.items()})
+    return Tally(difference=joined(a.difference, b.difference),
+                 plans={name: _join(plan, b.plans[name]) for name, plan in a.plans.items()})
 
 
-def tally_as_dict(tally: Tally) -> dict[str, Any]:
-    """For a file."""
-    return {"difference": tally.difference.as_dict(), "plans": {
-        name: {"total": plan.total.as_dict(), "by_robot": plan.by_robot.tolist(), "ends": plan.ends.tolist(),
-               "charged": plan.charged.tolist()} for name, plan in tally.plans.items()}}
+def _join(a: PlanTally, b: PlanTally) -> PlanTally:
+    return PlanTally(total=joined(a.total, b.total), by_robot=a.by_robot + b.by_robot, ends=a.ends + b.ends,
+                     charged=a.charged + b.charged, statistics={
+                         key: joined(figure, b.statistics[key]) for key, figure in a.statistics.items()
+                         if key in b.statistics})
 
 
-def tally_from(data: Mapping[str, Any]) -> Tally:
-    """The tally that such a file holds."""
-    return Tally(difference=figure_from(data["difference"]), plans={
-        name: PlanTally(total=figure_from(plan["total"]), by_robot=np.array(plan["by_robot"]),
-                        ends=np.array(plan["ends"]), charged=np.array(plan["charged"]))
-        for name, plan in data["plans"].items()})
-
-
-def scenario_from(fact: Mapping[str, Any], tally: Tally, robots: Sequence[str]) -> dict[str, Any]:
-    """An entry of ``scenarios`` in a summary, from what was known ahead and what came of the trials."""
+def scenario_of(facts: ScenarioFacts, tally: Tally, robots: Sequence[str]) -> ScenarioFigures:
+    """A scenario of a summary, from what was known ahead and what came of the trials."""
     count = tally.difference.drawn.count
-    plans = {name: plan_entry(
-        fact["plans"][name], estimate(plan.total),
+    plans: dict[str, PlanFigures] = {name: plan_figures(
+        facts.plans[name], estimate(plan.total),
         {robot: float(earned) / count for robot, earned in zip(robots, plan.by_robot, strict=True)},
-        {end: int(times) for end, times in zip(ENDS, plan.ends, strict=True)},
-        {end: float(lost) / count for end, lost in zip(UNHAPPY, plan.charged, strict=True)})
+        {end: int(times) for end, times in zip(ENDS, plan.ends, strict=True)}, plan.charged / count,
+        {key: estimate(figure) for key, figure in plan.statistics.items()})
         for name, plan in tally.plans.items()}
-    return scenario_entry(fact["name"], fact["availability"], plans, estimate(tally.difference), fact)
+    return ScenarioFigures(
+        name=facts.name, availability=facts.availability, plans=plans,
+        vss=vss_figures(facts, plans, estimate(tally.difference)), vss_mean_value=facts.vss_mean_value,
+        vss_mean_value_executed=facts.vss_mean_value, ws=facts.ws, evpi=facts.evpi,
+        value_of_process=facts.value_of_process)
+
+
+def stored_tally(tally: Tally) -> StoredTally:
+    """As a shard holds it."""
+    return StoredTally(difference=stored_figure(tally.difference), plans={
+        name: StoredPlan(
+            total=stored_figure(plan.total), by_robot=tuple(plan.by_robot.tolist()), ends=tuple(plan.ends.tolist()),
+            charged=tuple(plan.charged.tolist()),
+            statistics={key: stored_figure(figure) for key, figure in plan.statistics.items()})
+        for name, plan in tally.plans.items()})
+
+
+def tally_from(stored: StoredTally) -> Tally:
+    """The tally that a shard holds."""
+    return Tally(difference=figure_from(stored.difference), plans={
+        name: PlanTally(total=figure_from(plan.total), by_robot=np.array(plan.by_robot),
+                        ends=np.array(plan.ends), charged=np.array(plan.charged),
+                        statistics={key: figure_from(figure) for key, figure in plan.statistics.items()})
+        for name, plan in stored.plans.items()})
+
+
+def stored_figure(figure: Figure) -> StoredFigure:
+    """As a shard holds it."""
+    return StoredFigure(
+        count=figure.drawn.count, mean=figure.drawn.mean, squares=figure.drawn.squares,
+        drawn_bounds=figure.drawn_bounds, taken_bounds=figure.taken_bounds,
+        counts=tuple(figure.taken.counts.tolist()), sums=tuple(figure.taken.sums.tolist()))
+
+
+def figure_from(stored: StoredFigure) -> Figure:
+    """The figure that a shard holds."""
+    return Figure(
+        drawn=Moments(count=stored.count, mean=stored.mean, squares=stored.squares),
+        drawn_bounds=stored.drawn_bounds, taken_bounds=stored.taken_bounds,
+        taken=Clusters(counts=np.array(stored.counts, dtype=np.int64), sums=np.array(stored.sums, dtype=np.float64)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
@@ -39,6 +39,9 @@ from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder, check_output
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.workers.pool import local_workers
+
+if TYPE_CHECKING:
+    from sva_bench.analysis.summaries import AnySummary
 
 _PRELOAD = "sva_bench.execution.execute"
 """What worker processes load while this one plans."""
@@ -162,10 +165,10 @@ def execute(
     load_libraries()
     with holding_back_ctrl_c():
         from sva_bench.storage.run_folder import tidy
+        from sva_bench.study.compare import execute_plans
         from sva_bench.study.costs import plan_costs
         from sva_bench.study.options import Options
         from sva_bench.study.planning import check_plans
-        from sva_bench.study.run import execute_plans
 
     tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
@@ -227,13 +230,15 @@ def _main(version: Annotated[bool, typer.Option("--version", help="Print the ver
         raise typer.Exit
 
 
-def _show(summary: Any, folder: Path, as_json: bool, *, csv: bool = False) -> None:
+def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False) -> None:
     if csv:
         from sva_bench.storage.stored_run import write_csv
 
         write_csv(folder)
     if as_json:
-        print_json(summary)
+        from sva_bench.files.records import as_dict
+
+        print_json(as_dict(summary))
     else:
         print_summary(summary)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)

@@ -155,6 +155,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
         from sva_bench.batch.folder import at_work, failures_in, settings_in, units_in
         from sva_bench.batch.grid import grid_of
         from sva_bench.cli.watching import over_maps, print_failed
+        from sva_bench.files.records import as_dict
 
     _existing(folder)
     running = at_work(folder)
@@ -165,7 +166,8 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     summary = summary_of(grid, folder, done, failures)
     if as_json:
         print_json({"format": "sva-bench/batch-status@1", "at_work": running, "units": len(units), "done": len(done),
-                    "aggregate": summary["aggregate"], "failed": summary["failed"]})
+                    "aggregate": [as_dict(row) for row in summary.aggregate],
+                    "failed": [as_dict(unit) for unit in summary.failed]})
         return
     console = results()
     state = "at work" if running else "complete" if len(done) == len(units) else "not at work; --resume goes on" \
@@ -173,8 +175,8 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     console.print(f"{len(done)} of {counted(len(units), 'unit')} done, {len(failures)} failed: {state}",
                   highlight=False)
     if done:
-        console.print(over_maps(summary["aggregate"], "VSS over maps, so far"))
-    print_failed(summary["failed"], console)
+        console.print(over_maps(summary.aggregate, "VSS over maps, so far"))
+    print_failed(summary.failed, console)
 
 
 def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool) -> None:
@@ -208,6 +210,7 @@ def _run(
         from sva_bench.batch.run import run_batch
         from sva_bench.batch.tables import write_tables
         from sva_bench.cli.watching import print_batch, watching
+        from sva_bench.files.records import as_dict
         from sva_bench.workers.answers import Caps
         from sva_bench.workers.local import LocalProcesses
         from sva_bench.workers.pool import count_of
@@ -245,11 +248,11 @@ def _run(
     if as_csv:
         write_tables(folder, summary)
     if as_json:
-        print_json(summary)
+        print_json(as_dict(summary))
     else:
         print_batch(summary)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
-    if summary["failed"]:
+    if summary.failed:
         if as_json:
-            messages.print(f"{counted(len(summary['failed']), 'unit was', 'units were')} given up", highlight=False)
+            messages.print(f"{counted(len(summary.failed), 'unit was', 'units were')} given up", highlight=False)
         raise typer.Exit(ExitCode.UNFINISHED_TRIALS)

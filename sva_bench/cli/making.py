@@ -47,9 +47,9 @@ def check_world(
                       f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
                       highlight=False)
     reach = reach_of(loaded, costs)
-    for said in beyond_reach({"reach": reach}):
+    for said in beyond_reach(reach):
         console.print(said, highlight=False, markup=False)
-    verdict = f"can be read, but {NOTHING}" if reach["nothing"] else "is a good world"
+    verdict = f"can be read, but {NOTHING}" if reach.nothing else "is a good world"
     counts = {"station": len(loaded.stations), "POI": len(loaded.pois), "robot": len(loaded.robots),
               "scenario": len(loaded.scenarios)}
     console.print(f"{loaded.name} {verdict}: "

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import logging
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.logging import RichHandler
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.segment import Segment
 from rich.table import Table
 
@@ -19,6 +20,10 @@ from sva_bench.errors import BadInput
 from sva_bench.files.printable import counted, printable
 from sva_bench.files.streams import CLOSED, output_is_closed
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.workers.progress import OnProgress
+
+if TYPE_CHECKING:
+    from sva_bench.analysis.summaries import AnySummary, Summary
 
 
 class SafeConsole(Console):
@@ -43,7 +48,7 @@ def results() -> Console:
     return SafeConsole(width=None if sys.stdout.isatty() else 140, markup=False)  # names may hold brackets
 
 
-def print_json(data: Any) -> None:
+def print_json(data: Mapping[str, Any]) -> None:
     """Print a result as JSON on standard output.
 
     Raises:
@@ -67,7 +72,7 @@ def set_up_logging(verbose: bool) -> None:
 
 
 @contextmanager
-def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
+def progress_bars() -> Iterator[OnProgress]:
     """Progress bars on standard error; plain lines where that is no terminal."""
     if not messages.is_terminal:
         said: set[str] = set()
@@ -79,7 +84,7 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
         yield say
         return
-    tasks: dict[str, Any] = {}
+    tasks: dict[str, TaskID] = {}
 
     def show(what: str, done: int, of: int) -> None:
         if what not in tasks:
@@ -96,72 +101,84 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
         bars.stop()
 
 
-def print_summary(summary: Any) -> None:
+def print_summary(summary: AnySummary) -> None:
     """Print a summary as a table, and what it comes to."""
-    from sva_bench.analysis.reach import infeasible, lost_robots
-    from sva_bench.report.wording import (
-        ASSUMPTION_HEAD,
-        answer,
-        assumption_rows,
-        ranked,
-        remarks,
-        vss_verdict,
-        with_interval,
-    )
+    from sva_bench.analysis.summaries import ComparisonSummary
+    from sva_bench.report.wording import answer, ranked, remarks
 
-    console = results()
-    scenarios, travel = summary["scenarios"], summary["travel"]
-    table = Table(title=f"{summary['world']}, seed {summary['seed']}: {counted(summary['trials'], 'trial')}, "
-                        f"{counted(summary['rollouts'], 'rollout')}, {summary['fidelity']}", title_justify="left")
-    compared = "vss" in scenarios[0]
-    judged = any("lost" in plan for plan in scenarios[0]["plans"].values())  # plans from anywhere may lose robots
-    for heading in ("scenario", "plan", *(("robots lost",) if judged else ()), "promised", "expected",
-                    "executed [95 %]", *scenarios[0]["availability"],
-                    *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
-        table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
-    for scenario in scenarios:
-        last = list(scenario["plans"])[-1]
-        for number, (name, plan) in enumerate(scenario["plans"].items()):
-            proof = "" if plan["status"] in ("optimal", None) else f" ({plan['status']})"
-            proof = " (infeasible)" if infeasible(plan) else proof
-            worth = ["", "", ""] if compared else []
-            if compared and number == 0:
-                vss, evpi = scenario["vss"], scenario["evpi"]
-                worth = [vss_verdict(scenario), f"{vss['modelled']:.1f}", "" if evpi is None else f"{evpi:.1f}"]
-            table.add_row(
-                "" if number else scenario["name"], name + proof, *((lost_robots(plan),) if judged else ()),
-                f"{plan['promised']:.1f}", f"{plan['expected']:.1f}",
-                with_interval(plan["executed"]), *(f"{x:.1f}" for x in plan["by_robot"].values()), *worth,
-                end_section=name == last)
-    console.print(table)
-    missions, unhappy = 0, []
-    for name in scenarios[0]["plans"]:
-        ends: dict[str, int] = {}
-        for scenario in scenarios:
-            for end, count in scenario["plans"][name]["ends"].items():
-                ends[end] = ends.get(end, 0) + count
-        missions += sum(ends.values())
-        bad = [f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if end in ends]
-        if bad:
-            unhappy.append(f"{', '.join(bad)} ({name})")
-    console.print(f"{counted(travel['pairs'], 'travel time')}, {travel['triangle_violations_pct']:.1f} % repaired, "
-                  f"by up to {travel['max_excess_pct']:.1f} %; planned under {summary['failure']['plan']}, executed "
-                  f"under {summary['failure']['execute']} failures.", highlight=False)
-    if unhappy:
-        console.print(f"Of {counted(missions, 'robot mission')} ended otherwise than home or by draw: "
-                      f"{'; '.join(unhappy)}.", highlight=False)
-    for scenario in scenarios:
-        if scenario.get("comparisons"):
-            console.print(f"{scenario['name']}: {ranked(scenario)}", highlight=False, markup=False)
+    console, travel, failure = results(), summary.travel, summary.failure
+    console.print(_plans_table(summary))
+    console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
+                  f"{travel.max_excess_pct:.1f} %; planned under {failure.plan}, executed under {failure.execute} "
+                  "failures.", highlight=False)
+    _print_unhappy(summary, console)
+    if isinstance(summary, ComparisonSummary):
+        for scenario in summary.scenarios:
+            if scenario.comparisons:
+                console.print(f"{scenario.name}: {ranked(scenario)}", highlight=False, markup=False)
     console.print(answer(summary), highlight=False)
     for said in remarks(summary):
         console.print(said, highlight=False)
-    if rows := assumption_rows(scenarios):
+    if not isinstance(summary, ComparisonSummary):
+        _print_assumptions(summary, console)
+    if not summary.reproducible:
+        console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
+
+
+def _plans_table(summary: AnySummary) -> Table:
+    from sva_bench.analysis.catalogue import statistics
+    from sva_bench.analysis.reach import lost_robots
+    from sva_bench.analysis.results import ComparedScenario, GivenPlanResult
+    from sva_bench.analysis.summaries import Summary
+    from sva_bench.report.wording import cell, vss_verdict
+
+    scenarios, shown = summary.scenarios, statistics("terminal")
+    compared, given = isinstance(summary, Summary), not isinstance(summary, Summary)  # given plans may lose robots
+    table = Table(title=f"{summary.world}, seed {summary.seed}: {counted(summary.trials, 'trial')}, "
+                        f"{counted(summary.rollouts, 'rollout')}, {summary.fidelity}", title_justify="left")
+    for heading in ("scenario", "plan", *(("robots lost",) if given else ()),
+                    *(f"{entry.heading} [95 %]" if entry.interval else entry.heading for entry in shown),
+                    *scenarios[0].availability, *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
+        table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
+    for scenario in scenarios:
+        for number, (name, plan) in enumerate(scenario.plans.items()):
+            proof = "" if plan.status in ("optimal", None) else f" ({plan.status})"
+            lost, worth = "", ["", "", ""]
+            if isinstance(plan, GivenPlanResult):
+                proof, lost = proof if plan.feasible else " (infeasible)", lost_robots(plan)
+            if not number and not isinstance(scenario, ComparedScenario):
+                worth = [vss_verdict(scenario.vss), f"{scenario.vss.modelled:.1f}",
+                         "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]
+            table.add_row(
+                "" if number else scenario.name, name + proof, *((lost,) if given else ()),
+                *(cell(entry, plan) for entry in shown), *(f"{x:.1f}" for x in plan.by_robot.values()),
+                *(worth if compared else ()), end_section=number == len(scenario.plans) - 1)
+    return table
+
+
+def _print_unhappy(summary: AnySummary, console: Console) -> None:
+    """Say how many missions ended otherwise than home or by draw."""
+    missions, unhappy = 0, []
+    for name in summary.scenarios[0].plans:
+        ends: Counter[str] = Counter()
+        for scenario in summary.scenarios:
+            ends.update(scenario.plans[name].ends)
+        missions += ends.total()
+        bad = [f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if ends[end]]
+        if bad:
+            unhappy.append(f"{', '.join(bad)} ({name})")
+    if unhappy:
+        console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
+                      highlight=False)
+
+
+def _print_assumptions(summary: Summary, console: Console) -> None:
+    from sva_bench.report.wording import ASSUMPTION_HEAD, assumption_rows
+
+    if rows := assumption_rows(summary.scenarios):
         crossed = Table(title="Plans under the failures they were made for and under the others", title_justify="left")
         for number, heading in enumerate(ASSUMPTION_HEAD):
             crossed.add_column(heading, justify="left" if number < 4 else "right")
         for row in rows:
             crossed.add_row(*row)
         console.print(crossed)
-    if not summary["reproducible"]:
-        console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import Any
 
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from sva_bench.analysis.over_maps import BatchSummary, GivenUp, OverMaps, UnitSummary
 from sva_bench.analysis.reach import maps_without_reach
-from sva_bench.batch.estimates import Estimate
-from sva_bench.batch.run import Progress
+from sva_bench.batch.estimates import StrandCost
+from sva_bench.batch.run import BatchProgress
 from sva_bench.cli.terminal import messages, results
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import over_few_maps, verdict, with_interval
+from sva_bench.report.wording import over_few_maps, percentage, verdict, with_interval
 
 _LINE_S = 10.0
 """Time between two plain lines [s]."""
@@ -26,7 +26,7 @@ _TABLE_S = 1.0
 
 
 @contextmanager
-def watching() -> Iterator[Callable[[Progress], None]]:
+def watching() -> Iterator[Callable[[BatchProgress], None]]:
     """Shows how far a batch is, on standard error."""
     begun, shown = False, time.monotonic()
 
@@ -37,14 +37,14 @@ def watching() -> Iterator[Callable[[Progress], None]]:
         shown = time.monotonic()
         return True
 
-    def greet(progress: Progress) -> None:
+    def greet(progress: BatchProgress) -> None:
         nonlocal begun
         if not begun and progress.done:
             messages.print(f"{progress.done} of {counted(progress.units, 'unit')} measured already", highlight=False)
         begun = True
 
     if not messages.is_terminal:
-        def say(progress: Progress) -> None:
+        def say(progress: BatchProgress) -> None:
             greet(progress)
             if due(_LINE_S):
                 messages.print(line(progress), highlight=False, markup=False, soft_wrap=True)
@@ -52,7 +52,7 @@ def watching() -> Iterator[Callable[[Progress], None]]:
         yield say
         return
     with Live(console=messages, transient=True, auto_refresh=False) as live:
-        def show(progress: Progress) -> None:
+        def show(progress: BatchProgress) -> None:
             greet(progress)
             if due(_TABLE_S):
                 rows = progress.vss()
@@ -62,7 +62,7 @@ def watching() -> Iterator[Callable[[Progress], None]]:
         yield show
 
 
-def how_far(progress: Progress) -> str:
+def how_far(progress: BatchProgress) -> str:
     """Units done, failed, rate and time left."""
     text = f"{progress.done} of {counted(progress.units, 'unit')} done, {progress.failed} failed"
     if progress.rate is not None and progress.left_s is not None:
@@ -70,74 +70,77 @@ def how_far(progress: Progress) -> str:
     return text
 
 
-def line(progress: Progress) -> str:
+def line(progress: BatchProgress) -> str:
     """All of it in one line."""
-    rows = [f"{row['scenario']}{' (' + row['variant'] + ')' if row['variant'] else ''} {with_interval(row['vss'])}"
-            for row in progress.vss()]
+    rows = [f"{row.label} {with_interval(row.vss)}" for row in progress.vss()]
     return how_far(progress) + (f"; VSS over maps so far: {', '.join(rows)}" if rows else "")
 
 
-def over_maps(rows: Sequence[Mapping[str, Any]], title: str) -> Table:
+def over_maps(rows: Sequence[OverMaps], title: str) -> Table:
     """The VSS over maps as a table."""
-    varied = any(row["variant"] for row in rows)
+    varied = any(row.variant for row in rows)
     table = Table(title=title, title_justify="left")
     for heading in (*(("variant",) if varied else ()), "scenario", "maps", "VSS [95 %]", "VSS % [95 %]"):
         table.add_column(heading, justify="left" if heading in ("scenario", "variant") else "right")
     for row in rows:
-        share = row["vss_pct"]
-        table.add_row(*((Text(row["variant"]),) if varied else ()), row["scenario"], str(row["maps"]),
-                      with_interval(row["vss"]), "" if share["mean"] is None else with_interval(share))
+        table.add_row(*((Text(row.variant),) if varied else ()), row.scenario, str(row.maps),
+                      with_interval(row.vss), percentage(row.vss_pct))
     return table
 
 
-def print_batch(summary: Any, console: Console | None = None) -> None:
+def print_batch(summary: BatchSummary, console: Console | None = None) -> None:
     """Print a batch: the VSS map by map, over maps, and what failed."""
     console = console or results()
-    worlds, seeds = len(summary["worlds"]), len(summary["seeds"])
-    varied = any(row["variant"] for row in summary["maps"])
-    table = Table(title=f"{counted(worlds, 'world')}, {counted(seeds, 'seed')}, {counted(summary['trials'], 'trial')}, "
-                        f"{summary['fidelity']}", title_justify="left")
+    console.print(_map_by_map(summary))
+    console.print(over_maps(summary.aggregate, "VSS over maps"))
+    if said := over_few_maps(summary.aggregate):
+        console.print(said, highlight=False)
+    for said in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing]):
+        console.print(said, highlight=False, markup=False)
+    print_failed(summary.failed, console)
+
+
+def _map_by_map(summary: BatchSummary) -> Table:
+    worlds, seeds = len(summary.worlds), len(summary.seeds)
+    varied = any(row.variant for row in summary.maps)
+    table = Table(title=f"{counted(worlds, 'world')}, {counted(seeds, 'seed')}, "
+                        f"{counted(summary.trials, 'trial')}, {summary.fidelity}", title_justify="left")
     for heading in ("world", *(("variant",) if varied else ()), "scenario", "stochastic", "deterministic",
                     "VSS [95 %]", "VSS %"):
         # Names of worlds tell them apart by their ends.
         table.add_column(heading, justify="left" if heading in ("world", "variant", "scenario") else "right",
                          overflow="fold")
-    means = _means(summary["units"])
+    means = _means(summary.units)
     before = None
-    for row in summary["maps"]:
-        this = (row["world"], row["variant"])
+    for row in summary.maps:
+        this = (row.world, row.variant)
         if before is not None and this != before:
             table.add_section()
-        name = [row["world"], *([Text(row["variant"])] if varied else [])]
-        plans = means[row["variant"], row["world"], row["scenario"]]
-        table.add_row(*(name if this != before else [""] * len(name)), row["scenario"],
-                      *(f"{mean:.1f}" for mean in plans), verdict(_distinguished(row["vss"])),
-                      "" if row["vss_pct"] is None else f"{row['vss_pct']:.1f}")
+        name: list[str | Text] = [row.world, *([Text(row.variant)] if varied else [])]
+        plans = means[row.variant, row.world, row.scenario]
+        table.add_row(*(name if this != before else [""] * len(name)), row.scenario,
+                      *(f"{mean:.1f}" for mean in plans),
+                      verdict(row.vss, distinguishable=row.vss.excludes_zero, same=row.vss.same_plan),
+                      "" if row.vss_pct is None else f"{row.vss_pct:.1f}")
         before = this
-    console.print(table)
-    console.print(over_maps(summary["aggregate"], "VSS over maps"))
-    if said := over_few_maps(summary["aggregate"]):
-        console.print(said, highlight=False)
-    for said in maps_without_reach(summary["units"]):
-        console.print(said, highlight=False, markup=False)
-    print_failed(summary["failed"], console)
+    return table
 
 
-def print_failed(failed: Sequence[Mapping[str, Any]], console: Console, most: int = 20) -> None:
+def print_failed(failed: Sequence[GivenUp], console: Console, most: int = 20) -> None:
     """Print the units that were given up, and why."""
     if not failed:
         return
     console.print(f"{len(failed)} unit{'s were' if len(failed) > 1 else ' was'} given up (batch retry takes "
                   f"{'them' if len(failed) > 1 else 'it'} up again):", highlight=False)
     for entry in failed[:most]:
-        console.print(f"  {entry['unit']}: {entry['world']}, seed {entry['seed']}: {entry['reason']} "
-                      f"({entry['attempts']} attempt{'s' if entry['attempts'] > 1 else ''})", highlight=False,
+        console.print(f"  {entry.unit}: {entry.world}, seed {entry.seed}: {entry.reason} "
+                      f"({entry.attempts} attempt{'s' if entry.attempts > 1 else ''})", highlight=False,
                       markup=False, soft_wrap=True)
     if len(failed) > most:
         console.print(f"  and {len(failed) - most} more: see failures.json", highlight=False)
 
 
-def print_grid(listed: Sequence[Estimate]) -> None:
+def print_grid(listed: Sequence[StrandCost]) -> None:
     """Print what a batch would do, and take."""
     console = results()
     table = Table(title="the grid", title_justify="left")
@@ -159,16 +162,11 @@ def print_grid(listed: Sequence[Estimate]) -> None:
 _MOST_LISTED = 200
 
 
-def _means(units: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str, str], list[float]]:
+def _means(units: Sequence[UnitSummary]) -> dict[tuple[str, str, str], list[float]]:
     """What each plan collected, on average over seeds."""
     found: dict[tuple[str, str, str], list[list[float]]] = {}
     for unit in units:
-        for scenario in unit["scenarios"]:
-            found.setdefault((unit["variant"], unit["world"], scenario["name"]), []).append(
-                [scenario["plans"][name]["executed"]["mean"] for name in ("stochastic", "deterministic")])
+        for scenario in unit.scenarios:
+            found.setdefault((unit.variant, unit.world, scenario.name), []).append(
+                [plan.executed.mean for plan in (scenario.stochastic, scenario.deterministic)])
     return {key: [sum(column) / len(rows) for column in zip(*rows, strict=True)] for key, rows in found.items()}
-
-
-def _distinguished(vss: Mapping[str, Any]) -> dict[str, Any]:
-    interval = vss["ci95"]
-    return {**vss, "distinguishable": interval is not None and (interval[0] > 0 or interval[1] < 0)}

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
-from sva_bench.choices import ENDS, Fidelity
+from sva_bench.choices import ENDS, Fidelity, Role
 from sva_bench.execution.engines.bullet import Simulator, downsampled
 from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, settle, trace_of
@@ -33,11 +33,12 @@ Leg = tuple[Hop, ...]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Case:
-    """One plan under one scenario."""
+    """One plan under one scenario, and what it is executed for."""
 
     scenario: Scenario
     planner: str
     plan: Plan
+    role: Role = "given"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from dataclasses import fields, is_dataclass
+from typing import Any, get_type_hints
 
 from pydantic import BaseModel, ValidationError
 
@@ -15,21 +16,21 @@ Loc = tuple[str | int, ...]
 
 
 def first_complaint(
-    data: Any, schema: type[BaseModel], error: ValidationError, written: Callable[[Loc], str | None] | None = None,
+    data: Any, schema: type[Any], error: ValidationError, written: Callable[[Loc], str | None] | None = None,
 ) -> tuple[Loc, str]:
     """Where the first thing to mend stands, and what to change there.
 
     Args:
         data: The document's data.
-        schema: The pydantic model that refused it.
+        schema: The dataclass or pydantic model that refused it.
         error: How it did.
         written: How a YAML file writes the scalar at a place; ``None`` where there is none. Of JSON, nothing.
     """
     # An unknown key explains a missing one beside it better than the other way round.
-    details = sorted(_as_meant(data, error.errors()), key=lambda d: d["type"] != "extra_forbidden")
+    details = sorted(_as_meant(data, error.errors()), key=lambda d: d["type"] not in _UNKNOWN)
     detail = details[0]
     loc = _existing(data, detail["loc"])
-    if detail["type"] == "extra_forbidden":
+    if detail["type"] in _UNKNOWN:
         key = str(detail["loc"][-1])
         known = _keys_at(schema, detail["loc"][:-1])
         if key in known:  # of another alternative
@@ -95,8 +96,12 @@ def _numeric(text: str) -> bool:
         return False
 
 
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""What pydantic says of an unknown key: of its models, and of dataclasses."""
+
 _PLAINLY = {  # what pydantic says of its own types, said of the file
-    "dict_type": "expected a mapping", "model_type": "expected a mapping", "list_type": "expected a list",
+    "dict_type": "expected a mapping", "model_type": "expected a mapping",
+    "dataclass_type": "expected a mapping", "tuple_type": "expected a list", "list_type": "expected a list",
     "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
     "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",
     "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
@@ -126,7 +131,7 @@ def _as_meant(data: Any, details: list[Any]) -> list[Any]:
             other = detail["type"].endswith("_type") or (detail["type"] == "literal_error" and holds)
             odd += 100 if whole and other else 0
             odd += 3 if holds and other else 0  # a list where a number belongs
-            odd += detail["type"] in ("extra_forbidden", "missing")
+            odd += detail["type"] in (*_UNKNOWN, "missing")
         return odd, str(tag).startswith("dict[")
 
     return tags[min(tags, key=strangeness)] if len(tags) > 1 else details
@@ -164,26 +169,32 @@ def _existing(data: Any, loc: Loc) -> Loc:
     return tuple(kept)
 
 
-def _keys_at(schema: type[BaseModel], loc: Loc) -> list[str]:
+def _keys_at(schema: type[Any], loc: Loc) -> list[str]:
     """Keys that the schema knows at ``loc``; those of every alternative of a union."""
-    found: set[type[BaseModel]] = {schema}
+    found: set[type[Any]] = {schema}
     for part in loc:
-        inner: set[type[BaseModel]] = set()
-        for model in found:
-            field = next((f for n, f in model.model_fields.items() if part in (n, f.alias)), None)
-            inner |= _models_in(field.annotation) if field else set()
+        inner: set[type[Any]] = set()
+        for form in found:
+            inner |= _forms_in(_keys_of(form).get(str(part)))
         found = inner or found
-    return sorted({field.alias or name for model in found for name, field in model.model_fields.items()})
+    return sorted({key for form in found for key in _keys_of(form)})
 
 
-def _models_in(annotation: Any) -> set[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _keys_of(form: type[Any]) -> dict[str, Any]:
+    """The keys of a dataclass or model, and what each holds."""
+    if issubclass(form, BaseModel):
+        return {field.alias or name: field.annotation for name, field in form.model_fields.items()}
+    hints = get_type_hints(form)
+    return {field.name: hints[field.name] for field in fields(form)}
+
+
+def _forms_in(annotation: Any) -> set[type[Any]]:
+    if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return {annotation}
-    models: set[type[BaseModel]] = set()
+    forms: set[type[Any]] = set()
     for argument in getattr(annotation, "__args__", ()):
-        models |= _models_in(argument)
-    return models
-
+        forms |= _forms_in(argument)
+    return forms
 
 
 def dotted(loc: Loc) -> str:

@@ -20,10 +20,10 @@ from pydantic import ValidationError
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.complaints import Loc as Loc
 from sva_bench.files.complaints import dotted, first_complaint, shown
-from sva_bench.files.fields import SectionT
 from sva_bench.files.json_lines import json_line
 from sva_bench.files.mistaken import what_it_is, what_the_bytes_are
 from sva_bench.files.printable import counted
+from sva_bench.files.records import FormT, from_dict
 from sva_bench.files.yaml_text import MAX_DEPTH, Node, compose, line_in, plain_data, written_in
 
 YAML_SUFFIXES = (".yaml", ".yml")
@@ -164,12 +164,12 @@ def _deeper_than(data: Any, levels: int) -> bool:
     return True
 
 
-def validate(document: Document, schema: type[SectionT], kind: str) -> SectionT:
+def validate(document: Document, schema: type[FormT], kind: str) -> FormT:
     """Check a document against a schema.
 
     Args:
         document: What was read.
-        schema: A pydantic model.
+        schema: A record, or a pydantic model.
         kind: The format that the file must declare, e.g. ``sva-bench/world@1``.
 
     Raises:
@@ -177,7 +177,7 @@ def validate(document: Document, schema: type[SectionT], kind: str) -> SectionT:
     """
     check_kind(document, kind)
     try:
-        return schema.model_validate(document.data)
+        return from_dict(schema, document.data)
     except ValidationError as error:
         written = None if document.is_json else document.written
         raise document.error(*first_complaint(document.data, schema, error, written)) from None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from sva_bench.files.complaints import Loc as Loc
+from sva_bench.seeds import MOST_SEED
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"
 """Pattern of names of worlds, sites, robots and scenarios."""
@@ -17,10 +18,10 @@ Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)
 """Times [s] and incentives: sums of more than 1e9 would lose the feasibility tolerance to rounding."""
 Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
 WholeNumber = Annotated[int, Field(strict=True, ge=0)]
+Seed = Annotated[int, Field(strict=True, ge=0, le=MOST_SEED)]
 
 
 class Section(BaseModel):
     """A part of a document: frozen, and an unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-SectionT = TypeVar("SectionT", bound=BaseModel)

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel
+from typing import Any
 
 from sva_bench.errors import BadFile
 from sva_bench.files.documents import Document, read_json, validate
+from sva_bench.files.records import FormT
 
 MOST_BYTES = 50_000_000
 """Of a summary, a manifest or a list of failures; read, it takes some ten times as much memory."""
 
-ModelT = TypeVar("ModelT", bound=BaseModel)
 
-
-def read_ours(path: Path, schema: type[ModelT], kind: str) -> tuple[Document, ModelT]:
+def read_ours(path: Path, schema: type[FormT], kind: str) -> tuple[Document, FormT]:
     """A document of ours, as read and as checked.
 
     Raises:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.mission.failures import MODEL
 from sva_bench.robot.model import BUILT_IN, USUAL_MODEL
 from sva_bench.seeds import key_of
+from sva_bench.workers.progress import OnProgress
 from sva_bench.world.load import world_of
 from sva_bench.world.maps.files import MapFile
 from sva_bench.world.maps.formats import format_of
@@ -45,12 +46,10 @@ _FIRST_WORDS: dict[WorldFamily, str] = {
 
 _SPACED: tuple[Loc, ...] = (("map",), ("sites",), ("robots",), ("scenarios",), ("failure",))
 
-Progress = Callable[[str, int, int], None]
-
 
 def random_world(
     family: WorldFamily, *, size_m: float, density: float | None, pois: int, stations: int, robots: int, seed: int,
-    progress: Progress,
+    progress: OnProgress,
 ) -> str:
     """The text of a random world's file: the same for the same arguments.
 
@@ -86,7 +85,7 @@ def random_world(
 
 def world_from_map(
     source: Path, target: Path, *, base: Point | None, pois: int, stations: int, robots: int,
-    settings: Mapping[str, object], spacing_m: float | None, seed: int, progress: Progress,
+    settings: Mapping[str, object], spacing_m: float | None, seed: int, progress: OnProgress,
 ) -> tuple[str, tuple[MapFile, ...]]:
     """The text of a world file for a map, and the copies of the map's files that belong beside it.
 
@@ -163,7 +162,7 @@ def sites_section(base: Point, stations: tuple[Point, ...], pois: tuple[Point, .
 
 def with_mission(
     name: str, data: Mapping[str, Any], remarks: Mapping[Loc, str], *, robots: int, seed: int, path: Path,
-    progress: Progress, ground: tuple[Obstacles, MapSource] | None = None,
+    progress: OnProgress, ground: tuple[Obstacles, MapSource] | None = None,
 ) -> str:
     """The text of a world file whose map and sites are given, with a mission that suits them.
 

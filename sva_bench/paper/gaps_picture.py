@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from sva_bench.paper.printed import FIGURE_3, Box
-from sva_bench.paper.runtimes import box_of
+from sva_bench.paper.printed import FIGURE_3, Box, box_of
 from sva_bench.paper.solves import METHODS, Row
 
 SIZE_IN = (7.2, 6.8)

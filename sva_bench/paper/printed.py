@@ -7,7 +7,10 @@ Source:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 LIMIT_S = 3600.0
 """Time limit of the paper's solves [s]."""
@@ -93,3 +96,10 @@ FIGURE_3: dict[tuple[int, str], Box] = {
     (60, "lshaped"): Box(least=0, lower=3.2, median=12.7, upper=16.5, most=23.73),
 }
 """Figure 3, box plots of gaps by number of POIs and method; the boxes are given as figures in the paper's source."""
+
+
+
+def box_of(gaps: Sequence[float]) -> Box:
+    """The five figures of some gaps: quartiles by linear interpolation, whiskers to the least and greatest."""
+    least, lower, middle, upper, most = (float(q) for q in np.percentile(gaps, (0, 25, 50, 75, 100)))
+    return Box(least=least, lower=lower, median=middle, upper=upper, most=most)

@@ -13,7 +13,7 @@ from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import unless_interrupted
 from sva_bench.report.wording import per_cent
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_deterministic, plan_nominal, plan_stochastic
-from sva_bench.study.costs import Progress
+from sva_bench.workers.progress import OnProgress
 
 CASES = (1.0, 0.75, 0.25, 0.0)
 """Availability of the last robot in the paper's cases 1 to 4, and in its scenarios S1 to S4."""
@@ -48,7 +48,7 @@ def three_vehicles(pois: int, availability: float, seed: int) -> Instance:
     return replace(made, vehicles=(first, replace(second, name="uv2"), replace(doubtful, name="uv3")))
 
 
-def rewards(sizes: Sequence[int] = (10, 20), seeds: Sequence[int] = _SEEDS, progress: Progress | None = None
+def rewards(sizes: Sequence[int] = (10, 20), seeds: Sequence[int] = _SEEDS, progress: OnProgress | None = None
             ) -> list[Reward]:
     """All cases of Figure 4, some instances of each."""
     rows = []

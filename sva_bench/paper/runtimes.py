@@ -9,10 +9,8 @@ from pathlib import Path
 from statistics import fmean, median, stdev
 from typing import TypeVar
 
-import numpy as np
-
 from sva_bench.errors import BadInput
-from sva_bench.paper.printed import FIGURE_3, FIGURE_3_LETTERS, LIMIT_S, TABLE_2, TABLE_3, Box
+from sva_bench.paper.printed import FIGURE_3, FIGURE_3_LETTERS, LIMIT_S, TABLE_2, TABLE_3, Box, box_of
 from sva_bench.paper.solves import FULL, METHODS, VEHICLES, Row, Study, read_rows, run
 
 NAME = "paper-runtimes"
@@ -161,12 +159,6 @@ def methods_table(rows: Sequence[Row], title: str, key: Callable[[Row], float]) 
                     f"{fmean(row.subtour_cuts for row in its):.0f}"])
     return _table([title, "method", "solves", "proved", "time s, median", "max", "gap %, average", "max", "BD", "SEC"],
                   lines)
-
-
-def box_of(gaps: Sequence[float]) -> Box:
-    """The five figures of some gaps: quartiles by linear interpolation, whiskers to the least and greatest."""
-    least, lower, middle, upper, most = (float(q) for q in np.percentile(gaps, (0, 25, 50, 75, 100)))
-    return Box(least=least, lower=lower, median=middle, upper=upper, most=most)
 
 
 def checks(rows: Sequence[Row]) -> list[str]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+from sva_bench.analysis.over_maps import BatchSummary, OverMaps, labelled
 from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -16,68 +16,59 @@ from sva_bench.report.wording import (
     optional,
     over_few_maps,
     per_cent,
+    percentage,
     vss_verdict,
     with_interval,
 )
 
 
-def write_batch_report(path: Path, summary: Mapping[str, Any]) -> None:
-    """Write the ``report.html`` of a batch.
-
-    Args:
-        path: Where to.
-        summary: Content of the batch's ``summary.json``.
-    """
-    with holding_back_ctrl_c():
-        from sva_bench.report import charts
-
-    rows, varied = summary["aggregate"], any(summary["variants"])
-    over = [[*([row["variant"]] if varied else []), row["scenario"], str(row["maps"]), with_interval(row["vss"]),
-             "" if row["vss_pct"]["mean"] is None else with_interval(row["vss_pct"])] for row in rows]
-    # A map is a point, as it is in the interval: seeds of one map are no sample of maps.
-    by_scenario: dict[str, list[float]] = {}
-    for row in summary["maps"]:
-        if row["vss_pct"] is not None:
-            by_scenario.setdefault(_labelled(row["scenario"], row["variant"]), []).append(row["vss_pct"])
-    seeds = ", the mean over its seeds" if len(summary["seeds"]) > 1 else ""
-    pictures = [figure(charts.boxes_of(by_scenario, "VSS over maps", "VSS [% of the stochastic plan]"),
-                       f"Each point is a map{seeds}.")] if by_scenario else []
-    failed = [[entry["unit"], entry["world"], str(entry["seed"]), entry["reason"]] for entry in summary["failed"]]
+def write_batch_report(path: Path, summary: BatchSummary) -> None:
+    """Write the ``report.html`` of a batch."""
+    rows, varied = summary.aggregate, any(summary.variants)
+    over = [[*([row.variant] if varied else []), row.scenario, str(row.maps), with_interval(row.vss),
+             percentage(row.vss_pct)] for row in rows]
+    failed = [[entry.unit, entry.world, str(entry.seed), entry.reason] for entry in summary.failed]
     caution = over_few_maps(rows)
     parts = [
-        f"<h1>Value of the stochastic solution over {counted(len(summary['worlds']), 'map')}</h1>",
+        f"<h1>Value of the stochastic solution over {counted(len(summary.worlds), 'map')}</h1>",
         f"<div class=answer><p>{sentence(_over_maps(rows))}</p>{note(VSS_PCT)}</div>",
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
-        *(note(said) for said in maps_without_reach(summary["units"])),
-        note(f"{counted(summary['trials'], 'trial')} of each plan in each scenario, fidelity {summary['fidelity']}; 95 "
+        *(note(said) for said in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing])),
+        note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, fidelity {summary.fidelity}; 95 "
              "% intervals in brackets. Over maps, the maps are the sample."),
         *([heading("Given up"), table(["unit", "map", "seed", "reason"], failed, words=(0, 1, 3))] if failed else []),
-        *pictures,
+        *_pictures(summary),
         heading("Map by map"),
         table(["scenario", "seed", "stochastic", "deterministic", "VSS", "VSS [%]", "VSS, modelled", "EVPI"],
-              [[s["name"], str(unit["seed"]),
-                *(with_interval(s["plans"][name]["executed"]) for name in ("stochastic", "deterministic")),
-                vss_verdict(s), per_cent(s["vss"]["executed_pct"]), f"{s['vss']['modelled']:.1f}", optional(s["evpi"])]
-               for unit in summary["units"] for s in unit["scenarios"]],
-              sections=[_labelled(unit["world"], unit["variant"]) for unit in summary["units"]
-                        for _ in unit["scenarios"]]),
+              [[s.name, str(unit.seed), *(with_interval(plan.executed) for plan in (s.stochastic, s.deterministic)),
+                vss_verdict(s.vss), per_cent(s.vss.executed_pct), f"{s.vss.modelled:.1f}", optional(s.evpi)]
+               for unit in summary.units for s in unit.scenarios],
+              sections=[unit.label for unit in summary.units for _ in unit.scenarios]),
     ]
     write_page(path, "batch", parts)
 
 
-def _over_maps(rows: Sequence[Mapping[str, Any]]) -> str:
+def _pictures(summary: BatchSummary) -> list[str]:
+    with holding_back_ctrl_c():
+        from sva_bench.report import charts
+
+    # A map is a point, as it is in the interval: seeds of one map are no sample of maps.
+    by_scenario: dict[str, list[float]] = {}
+    for row in summary.maps:
+        if row.vss_pct is not None:
+            by_scenario.setdefault(labelled(row.scenario, row.variant), []).append(row.vss_pct)
+    seeds = ", the mean over its seeds" if len(summary.seeds) > 1 else ""
+    return [figure(charts.boxes_of(by_scenario, "VSS over maps", "VSS [% of the stochastic plan]"),
+                   f"Each point is a map{seeds}.")] if by_scenario else []
+
+
+def _over_maps(rows: Sequence[OverMaps]) -> str:
     """What a batch comes to, in one sentence."""
-    if rows and all(row["maps"] == 1 for row in rows):
+    if rows and all(row.maps == 1 for row in rows):
         return "One map can't tell what planning for failures is worth over maps; below is its worth on this one."
     # The interval that is shown is the one that the verdict rests on.
-    sure = [row for row in rows if row["vss"]["ci95"] is not None and row["vss"]["ci95"][0] > 0]
-    pays = [f"{_labelled(row['scenario'], row['variant'])} (VSS {with_interval(row['vss'])})" for row in sure]
+    pays = [f"{row.label} (VSS {with_interval(row.vss)})" for row in rows if row.vss.ci95 and row.vss.ci95[0] > 0]
     return f"Over these maps planning for failures pays in {listed(pays)}." if pays else \
         "Over these maps no scenario shows a value of planning for failures beyond doubt."
-
-
-def _labelled(name: str, variant: str) -> str:
-    """A scenario or a map, and what a sweep varied in it."""
-    return f"{name} ({variant})" if variant else name

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
+from sva_bench.analysis.results import ComparedScenario, Estimate, ScenarioSummary
 from sva_bench.arrays import FloatArray
 from sva_bench.report.drawing import Axes, chart
+
+AnyScenario = ScenarioSummary | ComparedScenario
 
 _COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#999999")
 _HATCHES = ("", "///", "...", "xxx", "\\\\\\", "ooo", "+++", "---")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
-Scenario = Mapping[str, Any]
-
-
-def incentive_by_robot(scenarios: Sequence[Scenario], plan: str, beside: Sequence[str] = ()) -> str:
+def incentive_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence[str] = ()) -> str:
     """Bars: what each robot collected, scenario by scenario (Figures 4 and 7 of the paper).
 
     Args:
@@ -26,12 +25,12 @@ def incentive_by_robot(scenarios: Sequence[Scenario], plan: str, beside: Sequenc
         plan: Whose bars they are.
         beside: Plans whose charts stand beside this one: all have the axis of the greatest.
     """
-    robots = list(scenarios[0]["availability"])
-    heights = {robot: [s["plans"][plan]["by_robot"][robot] for s in scenarios] for robot in robots}
-    most = max(s["plans"][name]["by_robot"][robot] for s in scenarios for name in {plan, *beside} for robot in robots)
+    robots = list(scenarios[0].availability)
+    heights = {robot: [s.plans[plan].by_robot[robot] for s in scenarios] for robot in robots}
+    most = max(s.plans[name].by_robot[robot] for s in scenarios for name in {plan, *beside} for robot in robots)
 
     def draw(axes: Axes) -> None:
-        _bars(axes, [s["name"] for s in scenarios], heights, {})
+        _bars(axes, [s.name for s in scenarios], heights, {})
         axes.set_ylabel("mean incentive [world file's units]")
         axes.set_title(f"Incentive by robot, {plan} plan")
         if most > 0:
@@ -41,14 +40,14 @@ def incentive_by_robot(scenarios: Sequence[Scenario], plan: str, beside: Sequenc
                  (_width(len(scenarios), len(robots)), 3.6), draw)
 
 
-def plans_compared(scenarios: Sequence[Scenario]) -> str:
+def plans_compared(scenarios: Sequence[AnyScenario]) -> str:
     """Bars with intervals: what each plan collected, scenario by scenario (Figure 8)."""
-    plans = list(scenarios[0]["plans"])
-    heights = {name: [s["plans"][name]["executed"]["mean"] for s in scenarios] for name in plans}
-    ends = {name: [s["plans"][name]["executed"]["ci95"] for s in scenarios] for name in plans}
+    plans = list(scenarios[0].plans)
+    heights = {name: [s.plans[name].executed.mean for s in scenarios] for name in plans}
+    ends = {name: [s.plans[name].executed.ci95 for s in scenarios] for name in plans}
 
     def draw(axes: Axes) -> None:
-        _bars(axes, [s["name"] for s in scenarios], heights, ends)
+        _bars(axes, [s.name for s in scenarios], heights, ends)
         axes.set_ylabel("mean incentive [world file's units]")
         axes.set_title("Executed incentive, 95 % intervals")
 
@@ -56,14 +55,14 @@ def plans_compared(scenarios: Sequence[Scenario]) -> str:
                  (_width(len(scenarios), len(plans)), 3.6), draw)
 
 
-def differences(rows: Sequence[tuple[str, Mapping[str, Any]]], title: str, unit: str) -> str:
+def differences(rows: Sequence[tuple[str, Estimate]], title: str, unit: str) -> str:
     """Points with intervals on a line of zero: one row each."""
     def draw(axes: Axes) -> None:
         axes.axvline(0, color="#444", linewidth=1)
         for row, (_, found) in enumerate(rows):
-            if found["ci95"] is not None:
-                axes.plot(found["ci95"], [row, row], color=_COLOURS[0], linewidth=3, solid_capstyle="butt")
-            axes.plot(found["mean"], row, marker="o", color="black", markersize=6, linestyle="none")
+            if found.ci95 is not None:
+                axes.plot(found.ci95, [row, row], color=_COLOURS[0], linewidth=3, solid_capstyle="butt")
+            axes.plot(found.mean, row, marker="o", color="black", markersize=6, linestyle="none")
         axes.set_yticks(range(len(rows)), [label for label, _ in rows])
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlabel(unit)
@@ -73,24 +72,24 @@ def differences(rows: Sequence[tuple[str, Mapping[str, Any]]], title: str, unit:
     return chart(_name("differences", title), f"{title}: means and 95 % intervals", (6.0, 1.3 + 0.34 * len(rows)), draw)
 
 
-def distributions(scenarios: Sequence[Scenario]) -> str:
+def distributions(scenarios: Sequence[AnyScenario]) -> str:
     """Boxes: how a plan's incentive varies over trials."""
-    plans = list(scenarios[0]["plans"])
+    plans = list(scenarios[0].plans)
 
     def draw(axes: Axes) -> None:
         for number, name in enumerate(plans):
-            found = [s["plans"][name]["distribution"] for s in scenarios]
-            boxes = [{"med": d["q50"], "q1": d["q25"], "q3": d["q75"], "whislo": d["q05"], "whishi": d["q95"]}
+            found = [s.plans[name].distribution for s in scenarios]
+            boxes = [{"med": d.q50, "q1": d.q25, "q3": d.q75, "whislo": d.q05, "whishi": d.q95}
                      for d in found]
             at = [k + _offset(number, len(plans)) for k in range(len(scenarios))]
             drawn = axes.bxp(boxes, positions=at, widths=0.8 / len(plans) * 0.85, showfliers=False, patch_artist=True,
                              medianprops={"color": "black", "linewidth": 1.6}, manage_ticks=False)
             for box in drawn["boxes"]:
                 box.set(facecolor=_colour(number), hatch=_hatch(number))
-            axes.plot(at, [d["cvar10"] for d in found], linestyle="none", marker="v", color="black", markersize=5,
+            axes.plot(at, [d.cvar10 for d in found], linestyle="none", marker="v", color="black", markersize=5,
                       label="mean of the worst tenth" if number == 0 else None)
             axes.bar(0, 0, facecolor=_colour(number), hatch=_hatch(number), edgecolor="black", label=name)
-        _names(axes, [s["name"] for s in scenarios])
+        _names(axes, [s.name for s in scenarios])
         axes.set_ylabel("incentive of a trial [world file's units]")
         axes.set_title("Over trials: 5, 25, 50, 75, 95 %")
         _legend(axes)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
-from sva_bench.analysis.reach import infeasible, lost_robots, nothing_reached
+from sva_bench.analysis.catalogue import Section, statistics
+from sva_bench.analysis.reach import lost_robots
+from sva_bench.analysis.results import ComparedScenario, Estimate, ScenarioSummary, Share
+from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -20,6 +22,7 @@ from sva_bench.report.wording import (
     adjusted,
     answer,
     assumption_rows,
+    cell,
     finding,
     optional,
     per_cent,
@@ -28,131 +31,143 @@ from sva_bench.report.wording import (
     vss_verdict,
     with_interval,
 )
+from sva_bench.storage.manifest import Manifest
+from sva_bench.storage.run_folder import Legs
 from sva_bench.storage.stored_run import Content
 from sva_bench.world.model import World
 
 _WORST_LEGS = 10
 
-Scenarios = Sequence[Mapping[str, Any]]
+Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
 
 def write_report(path: Path, content: Content) -> None:
     """Write ``report.html``."""
     summary = content.summary
-    scenarios: Scenarios = summary["scenarios"]
-    compared = all("vss" in scenario for scenario in scenarios)
-    question = "Is the stochastic plan worth it" if compared else "What are the plans worth"
+    scenarios = summary.scenarios
+    question = "Is the stochastic plan worth it" if isinstance(summary, Summary) else "What are the plans worth"
     parts = [
-        f"<h1>{text(summary['world'])}: {question}, and how sure is that?</h1>",
+        f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
         *_answer(summary),
-        *(_comparison(scenarios) if compared else _ranking(scenarios)),
-        note(f"{counted(summary['trials'], 'trial')} of each plan in each scenario, "
-             f"{counted(summary['rollouts'], 'noise draw')}, fidelity {summary['fidelity']}, seed {summary['seed']}; "
-             f"planned under {summary['failure']['plan']}, executed under {summary['failure']['execute']} failures. "
+        *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
+        note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
+             f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
+             f"planned under {summary.failure.plan}, executed under {summary.failure.execute} failures. "
              "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
-        *_charts(scenarios, compared=compared),
+        *_charts(summary),
         *_world(content.world),
         *_over_trials(scenarios),
         *_from_promise(scenarios),
-        *_assumptions(scenarios),
+        *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
+        *_measured(scenarios),
         *_legs(content.legs),
         *_routes(content.routes),
         *_recordings(content.stems),
         *_again(summary, content.manifest),
     ]
-    write_page(path, str(summary["world"]), parts)
+    write_page(path, summary.world, parts)
 
 
-def _answer(summary: Mapping[str, Any]) -> list[str]:
+def _answer(summary: AnySummary) -> list[str]:
     lines = []
-    for scenario in [] if nothing_reached(summary) else summary["scenarios"]:
-        if "vss" in scenario:
-            doubtful = ", ".join(f"{robot} {per_cent(100 * p)}" for robot, p in scenario["availability"].items()
-                                 if p < 1)
-            known = f"availability: {doubtful}" if doubtful else "all available"
-            lines.append(f"<li><b>{text(scenario['name'])}</b> ({sentence(known)}): "
-                         f"{sentence(finding(scenario))}</li>")
-        elif scenario["comparisons"]:
-            lines.append(f"<li><b>{text(scenario['name'])}</b>: {text(ranked(scenario))}</li>")
-    unproved = "" if summary["reproducible"] else note(
+    if not summary.reach.nothing:
+        lines = [f"<li><b>{text(name)}</b>{line}</li>" for name, line in (
+            _findings(summary) if isinstance(summary, Summary) else _rankings(summary))]
+    unproved = "" if summary.reproducible else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
             *(note(said) for said in remarks(summary)), unproved, "</div>"]
 
 
-def _comparison(scenarios: Scenarios) -> list[str]:
+def _findings(summary: Summary) -> Iterator[tuple[str, str]]:
+    for scenario in summary.scenarios:
+        doubtful = ", ".join(f"{robot} {per_cent(100 * p)}" for robot, p in scenario.availability.items() if p < 1)
+        known = f"availability: {doubtful}" if doubtful else "all available"
+        yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}"
+
+
+def _rankings(summary: ComparisonSummary) -> Iterator[tuple[str, str]]:
+    for scenario in summary.scenarios:
+        if scenario.comparisons:
+            yield scenario.name, f": {text(ranked(scenario))}"
+
+
+def _comparison(summary: Summary) -> list[str]:
     head = ["scenario", "stochastic, executed", "deterministic, executed", "VSS, executed", "VSS [%]", "VSS, modelled",
             "EVPI"]
-    rows = [[s["name"], *(with_interval(s["plans"][name]["executed"]) for name in ("stochastic", "deterministic")),
-             vss_verdict(s), per_cent(s["vss"]["executed_pct"]), f"{s['vss']['modelled']:.1f}", optional(s["evpi"])]
-            for s in scenarios]
+    rows = [[s.name, *(with_interval(plan.executed) for plan in (s.stochastic, s.deterministic)), vss_verdict(s.vss),
+             per_cent(s.vss.executed_pct), f"{s.vss.modelled:.1f}", optional(s.evpi)] for s in summary.scenarios]
     return [table(head, rows, caption="Value of the stochastic solution (VSS): what the stochastic plan collects "
                                       "beyond the deterministic one, in the same trials")]
 
 
-def _ranking(scenarios: Scenarios) -> list[str]:
-    rows = [[s["name"], name, "no: fuel or limit" if infeasible(plan) else "yes", lost_robots(plan),
-             optional(plan["expected"]), with_interval(plan["executed"])]
-            for s in scenarios for name, plan in s["plans"].items()]
+def _ranking(summary: ComparisonSummary) -> list[str]:
+    rows = [[s.name, name, "yes" if plan.feasible else "no: fuel or limit", lost_robots(plan),
+             optional(plan.expected), with_interval(plan.executed)]
+            for s in summary.scenarios for name, plan in s.plans.items()]
     parts = [table(["scenario", "plan", "feasible", "robots lost", "expected", "executed"], rows, words=(0, 1, 2),
                    caption="What the plans are worth")]
-    pairs = [[s["name"], f"{c['a']} − {c['b']}", with_interval(c), adjusted(c)] for s in scenarios
-             for c in s["comparisons"]]
+    pairs = [[s.name, f"{c.a} − {c.b}", with_interval(c), adjusted(c)] for s in summary.scenarios
+             for c in s.comparisons]
     if pairs:
         parts.append(table(["scenario", "plans", "difference", "adjusted for the number of pairs"], pairs, words=(0, 1),
                            caption="Differences, trial by trial"))
     return parts
 
 
-def _charts(scenarios: Scenarios, *, compared: bool) -> list[str]:
+def _charts(summary: AnySummary) -> list[str]:
     with holding_back_ctrl_c():
         from sva_bench.report import charts  # matplotlib takes its time to load, and only a page needs it
 
-    plans = list(scenarios[0]["plans"])
-    shown = ["stochastic", "deterministic"] if compared else plans[:4]
+    scenarios, plans = summary.scenarios, list(summary.scenarios[0].plans)
     parts = [heading("The plans side by side"), "<div class=pair>",
              figure(charts.plans_compared(scenarios), "Mean over all trials, with its 95 % interval.")]
-    if compared:
-        rows = [(s["name"], s["vss"]["executed"]) for s in scenarios]
+    if isinstance(summary, Summary):
+        rows = [(s.name, s.vss.executed) for s in summary.scenarios]
         parts.append(figure(charts.differences(rows, "VSS, executed", "incentive"), "Stochastic less deterministic in "
                             "the same trials: right of zero, planning for failures pays."))
+    shown = ["stochastic", "deterministic"] if isinstance(summary, Summary) else plans[:4]
     robots = [figure(charts.incentive_by_robot(scenarios, plan, shown), f"What each robot collects by the {plan} plan.")
               for plan in shown]
     parts += ["</div>", heading("Incentive by robot and scenario"), "<div class=pair>", *robots, "</div>"]
-    names = list(scenarios[0]["availability"])
+    names = list(scenarios[0].availability)
     return [*parts, table(["scenario", "plan", *names], [
-        [s["name"], name, *(f"{plan['by_robot'][r]:.1f}" for r in names)] for s in scenarios
-        for name, plan in s["plans"].items()], words=(0, 1))]
+        [s.name, name, *(f"{plan.by_robot[r]:.1f}" for r in names)] for s in scenarios
+        for name, plan in s.plans.items()], words=(0, 1))]
 
 
 def _over_trials(scenarios: Scenarios) -> list[str]:
     with holding_back_ctrl_c():
         from sva_bench.report import charts
 
-    keys = ("least", "cvar10", "q05", "q25", "q50", "q75", "q95", "greatest")
-    rows = [[s["name"], name, *(f"{plan['distribution'][key]:.1f}" for key in keys)]
-            for s in scenarios for name, plan in s["plans"].items()]
     return [heading("Over trials"),
             figure(charts.distributions(scenarios), "Box: the middle half of the trials; whiskers: 5 to 95 %; "
                    "triangle: mean of the worst tenth (CVaR)."),
-            table(["scenario", "plan", "least", "worst tenth", "5 %", "25 %", "50 %", "75 %", "95 %", "greatest"], rows,
-                  words=(0, 1))]
+            _statistics(scenarios, "over trials")]
 
 
 def _from_promise(scenarios: Scenarios) -> list[str]:
-    rows = [[s["name"], name,
-             *(f"{x:+.1f}" if 0 < k < 6 else f"{x:.1f}" for k, x in enumerate(plan["ledger"].values())),
-             with_interval(plan["executed_controlled"])] for s in scenarios for name, plan in s["plans"].items()]
-    return [heading("From promise to execution"), table(
-        ["scenario", "plan", "promised", "assumption", "draws", "out of fuel", "late", "stuck", "executed",
-         "executed, luck of the draw taken out"], rows, words=(0, 1)),
-        note("Assumption: the plan's value under the failures executed, against what its maker believed. Draws: "
-             "failures as drawn, against their expectation. Then what each unhappy end cost.")]
+    return [heading("From promise to execution"), _statistics(scenarios, "promise"),
+            note("Assumption: the plan's value under the failures executed, against what its maker believed. Draws: "
+                 "failures as drawn, against their expectation. Then what each unhappy end cost.")]
 
 
-def _assumptions(scenarios: Scenarios) -> list[str]:
-    rows = assumption_rows(scenarios)
+def _measured(scenarios: Scenarios) -> list[str]:
+    return [heading("Measured trial by trial"), _statistics(scenarios, "measured")] if statistics("page", "measured") \
+        else []
+
+
+def _statistics(scenarios: Scenarios, section: Section) -> str:
+    """A table of statistics, a row for each scenario and plan."""
+    entries = statistics("page", section)
+    return table(["scenario", "plan", *(entry.heading for entry in entries)],
+                 [[s.name, name, *(cell(entry, plan) for entry in entries)] for s in scenarios
+                  for name, plan in s.plans.items()], words=(0, 1))
+
+
+def _assumptions(summary: Summary) -> list[str]:
+    rows = assumption_rows(summary.scenarios)
     if not rows:
         return []
     return [heading("The wrong assumption"), table(ASSUMPTION_HEAD, rows, words=(0, 1, 2, 3)),
@@ -161,28 +176,28 @@ def _assumptions(scenarios: Scenarios) -> list[str]:
 
 
 def _ends(scenarios: Scenarios) -> list[str]:
-    rows = []
-    for s in scenarios:
-        for name, plan in s["plans"].items():
-            for robot, shares in plan["end_shares"].items():
-                cells = [{"mean": 100 * shares[end]["share"], "ci95": shares[end]["ci95"] and
-                          [100 * x for x in shares[end]["ci95"]]} if end in shares else None for end in ENDS]
-                rows.append([s["name"], name, robot, *("" if c is None else with_interval(c) for c in cells)])
+    rows = [[s.name, name, robot, *(_in_per_cent(shares[end]) if end in shares else "" for end in ENDS)]
+            for s in scenarios for name, plan in s.plans.items() for robot, shares in plan.end_shares.items()]
     return [heading("How the robots ended"), table(
         ["scenario", "plan", "robot", *(f"{end.replace('_', ' ')} [%]" for end in ENDS)], rows, words=(0, 1, 2)),
         note("Failed: by draw. Out of fuel, late (home past its limit) and stuck: by what physics made of the plan. "
              "Where all trials ended alike, the interval says how often another end could still come up.")]
 
 
-def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
+def _in_per_cent(found: Share) -> str:
+    return with_interval(Estimate(mean=100 * found.share, ci95=found.ci95 and (
+        100 * found.ci95[0], 100 * found.ci95[1])))
+
+
+def _legs(legs: Legs) -> list[str]:
     with holding_back_ctrl_c():
         from sva_bench.report import charts
 
-    planned, driven = (np.asarray(legs[key], dtype=np.float64) for key in ("planned_s", "driven_s"))
+    planned, driven = legs.planned_s, legs.driven_s
     parts = [heading("Time and fuel, planned against driven")]
     if not (planned > 0).any():
         return [*parts, note("No leg was driven.")]
-    names = [str(robot) for robot in legs["robot"]]
+    names = list(legs.robot)
     rows = []
     for robot in dict.fromkeys(names):
         mine = np.array([name == robot for name in names]) & (planned > 0)
@@ -192,8 +207,9 @@ def _legs(legs: Mapping[str, Sequence[Any]]) -> list[str]:
                          f"{100 * (driven[mine].sum() / planned[mine].sum() - 1):+.2f}", f"{off.min():+.2f}",
                          f"{off.max():+.2f}"])
     late = np.argsort(-(driven - planned), kind="stable")[:_WORST_LEGS]
-    worst = [[*(str(legs[key][k]) for key in ("scenario", "planner", "robot", "rollout", "origin", "destination")),
-              f"{planned[k]:.2f}", f"{driven[k]:.2f}", f"{driven[k] - planned[k]:+.2f}"] for k in late.tolist()]
+    worst = [[legs.scenario[k], legs.planner[k], legs.robot[k], str(legs.rollout[k]), legs.origin[k],
+              legs.destination[k], f"{planned[k]:.2f}", f"{driven[k]:.2f}", f"{driven[k] - planned[k]:+.2f}"]
+             for k in late.tolist()]
     return [*parts,
             figure(charts.legs_driven(planned, driven, names), "Each point is a leg under one noise draw. Fuel is "
                    "measured in seconds of driving, so a leg's time is its fuel."),
@@ -225,10 +241,10 @@ def _recordings(stems: Mapping[tuple[str, str], str]) -> list[str]:
             "with <code>sva-bench view</code> and this folder.</p>"]
 
 
-def _again(summary: Mapping[str, Any], manifest: Mapping[str, Any]) -> list[str]:
-    packages = ", ".join(f"{name} {version}" for name, version in manifest["packages"].items())
+def _again(summary: AnySummary, manifest: Manifest) -> list[str]:
+    packages = ", ".join(f"{name} {version}" for name, version in manifest.packages.items())
     return [heading("How to get the same again"),
-            f"<pre><code>{text(shlex.join(manifest['command']))}</code></pre>",
-            note(f"sva-bench {manifest['version']}, seed {summary['seed']}, Python {manifest['machine']['python']}; "
+            f"<pre><code>{text(shlex.join(manifest.command))}</code></pre>",
+            note(f"sva-bench {manifest.version}, seed {summary.seed}, Python {manifest.machine.python}; "
                  f"{packages}. The resolved world and all options stand in manifest.json, the figures in summary.json, "
                  "every trial in outcomes.parquet.")]

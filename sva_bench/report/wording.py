@@ -2,51 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Protocol
 
-from sva_bench.analysis.reach import NOTHING, beyond_reach, infeasible_plans, nothing_reached, warned
+from sva_bench.analysis.catalogue import Statistic
+from sva_bench.analysis.over_maps import OverMaps, Percentage
+from sva_bench.analysis.reach import NOTHING, beyond_reach, infeasible_plans, warned
+from sva_bench.analysis.results import (
+    ComparedScenario,
+    Comparison,
+    Estimate,
+    PlanFigures,
+    ScenarioSummary,
+    VssFigures,
+)
+from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.files.printable import counted
 
 
-def answer(summary: Mapping[str, Any]) -> str:
+class WithInterval(Protocol):
+    """Anything that has a mean and its 95 % interval."""
+
+    @property
+    def mean(self) -> float:
+        """The mean."""
+
+    @property
+    def ci95(self) -> tuple[float, float] | None:
+        """Its interval, if there is one."""
+
+
+def answer(summary: AnySummary) -> str:
     """In one sentence: which plan is worth more, and by how much."""
-    scenarios = summary["scenarios"]
-    if not scenarios:
-        return "No scenario was executed."
-    if nothing_reached(summary):
+    if summary.reach.nothing:
         return f"There is nothing to compare, for {NOTHING}."
-    if not all("vss" in scenario for scenario in scenarios):
-        if len(scenarios[0]["plans"]) == 1:
-            return "One plan: there is nothing to compare it with."
-        clear = [f"{c['a']} against {c['b']} in {s['name']} ({c['mean']:+.1f})" for s in scenarios
-                 for c in s["comparisons"] if c["distinguishable"]]
-        if len(clear) > _MOST_NAMED:
-            clear[_MOST_NAMED:] = [f"{len(clear) - _MOST_NAMED} more"]
-        return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
-            "No difference between plans stands out of the noise."
-    differing = [s for s in scenarios if not s["vss"]["same_plan"]]
-    alike = [s["name"] for s in scenarios if s["vss"]["same_plan"]]
+    return _of_given_plans(summary) if isinstance(summary, ComparisonSummary) else _of_the_two_plans(summary)
+
+
+def _of_given_plans(summary: ComparisonSummary) -> str:
+    if len(summary.scenarios[0].plans) == 1:
+        return "One plan: there is nothing to compare it with."
+    clear = [f"{c.a} against {c.b} in {s.name} ({c.mean:+.1f})" for s in summary.scenarios
+             for c in s.comparisons if c.distinguishable]
+    if len(clear) > _MOST_NAMED:
+        clear[_MOST_NAMED:] = [f"{len(clear) - _MOST_NAMED} more"]
+    return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
+        "No difference between plans stands out of the noise."
+
+
+def _of_the_two_plans(summary: Summary) -> str:
+    differing = [s for s in summary.scenarios if not s.vss.same_plan]
+    alike = [s.name for s in summary.scenarios if s.vss.same_plan]
     if not differing:
         return "Planning for failures changes nothing here: both plans are the same" + (
             "." if len(alike) == 1 else " in every scenario.")
     same = f" In {listed(alike)} both plans are the same." if alike else ""
-    if all(s["vss"]["executed"]["ci95"] is None for s in differing):
+    if all(s.vss.executed.ci95 is None for s in differing):
         return f"Too few trials or noise draws for an interval: whether planning for failures pays can't be said.{same}"
-    pays = [s for s in differing if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] > 0]
-    costs = [s["name"] for s in differing if s["vss"]["distinguishable"] and s["vss"]["executed"]["mean"] < 0]
+    pays = [s for s in differing if s.vss.distinguishable and s.vss.executed.mean > 0]
+    costs = [s.name for s in differing if s.vss.distinguishable and s.vss.executed.mean < 0]
     loses = f" In {listed(costs)} it collects less." if costs else ""
     if not pays:
         return f"Planning for failures pays in no scenario, as far as these trials can tell.{loses}{same}"
-    named = listed([s["name"] + _share(s) for s in pays])
-    rest = [s["name"] for s in differing if not s["vss"]["distinguishable"]]
+    named = listed([s.name + _share(s.vss) for s in pays])
+    rest = [s.name for s in differing if not s.vss.distinguishable]
     other = f" In {listed(rest)} the two can't be told apart." if rest else ""
     return f"Planning for failures pays in {named}.{other}{loses}{same}"
 
 
-def _share(scenario: Mapping[str, Any]) -> str:
-    share = scenario["vss"]["executed_pct"]
-    return "" if share is None else f" (VSS {per_cent(share)})"
+def _share(vss: VssFigures) -> str:
+    return "" if vss.executed_pct is None else f" (VSS {per_cent(vss.executed_pct)})"
 
 
 _MOST_NAMED = 6
@@ -57,70 +82,80 @@ FEW_DRAWS = 16
 VSS_PCT = "VSS in %: how much more the stochastic plan collects than the deterministic one, in per cent of the former."
 
 
-def ranked(scenario: Mapping[str, Any]) -> str:
+def ranked(scenario: ComparedScenario) -> str:
     """The plans of a scenario from best to worst; those of one rank can't be told apart from what is above them.
 
     What breaks its limits, and robots that were lost, are said before the figure.
     """
-    return "; ".join(f"{row['rank']}. {row['plan']}{warned(scenario['plans'][row['plan']])} {row['mean']:.1f}"
-                     for row in scenario["ranking"])
+    return "; ".join(f"{row.rank}. {row.plan}{warned(scenario.plans[row.plan])} {row.mean:.1f}"
+                     for row in scenario.ranking)
 
 
-def adjusted(comparison: Mapping[str, Any]) -> str:
+def adjusted(comparison: Comparison) -> str:
     """A difference with the interval that is adjusted for the number of pairs."""
-    return verdict({**comparison, "ci95": comparison["ci95_adjusted"]})
+    return verdict(Estimate(mean=comparison.mean, ci95=comparison.ci95_adjusted),
+                   distinguishable=comparison.distinguishable, same=comparison.same_plan)
 
 
-def finding(scenario: Mapping[str, Any]) -> str:
+def finding(vss: VssFigures) -> str:
     """What a scenario comes to: how much more, how sure."""
-    vss = scenario["vss"]
-    if vss["same_plan"]:
+    if vss.same_plan:
         return "the same plan is best either way: no difference in any trial"
-    executed, interval = vss["executed"], vss["executed"]["ci95"]
+    mean, interval = vss.executed.mean, vss.executed.ci95
     if interval is None:
-        return f"{executed['mean']:+.1f} collected by planning for failures; no interval: more trials or noise draws " \
-               "would tell how sure that is"
-    if not vss["distinguishable"]:
+        return f"{mean:+.1f} collected by planning for failures; no interval: more trials or noise draws would tell " \
+               "how sure that is"
+    if not vss.distinguishable:
         same = interval[0] == interval[1] == 0
         return "no difference in any trial" if same else \
-            f"not distinguishable from zero: {executed['mean']:+.1f}, 95 % sure of {interval[0]:.1f} to " \
-            f"{interval[1]:.1f}"
-    share = "" if vss["executed_pct"] is None else f" ({per_cent(vss['executed_pct'])})"
-    better = "stochastic" if executed["mean"] > 0 else "deterministic"
+            f"not distinguishable from zero: {mean:+.1f}, 95 % sure of {interval[0]:.1f} to {interval[1]:.1f}"
+    share = "" if vss.executed_pct is None else f" ({per_cent(vss.executed_pct)})"
+    better = "stochastic" if mean > 0 else "deterministic"
     if interval[0] == interval[1]:
-        return f"the {better} plan collects {abs(executed['mean']):.1f} more{share}, in every trial"
-    return f"the {better} plan collects {abs(executed['mean']):.1f} more{share}, 95 % sure of " \
+        return f"the {better} plan collects {abs(mean):.1f} more{share}, in every trial"
+    return f"the {better} plan collects {abs(mean):.1f} more{share}, 95 % sure of " \
            f"{min(map(abs, interval)):.1f} to {max(map(abs, interval)):.1f}"
 
 
-def remarks(summary: Mapping[str, Any]) -> list[str]:
+def remarks(summary: AnySummary) -> list[str]:
     """What the answer leaves out: what its percentages are of, how little it rests on, and what else was asked for."""
-    said = [*beyond_reach(summary), *infeasible_plans(summary)]
-    compared = [s["vss"] for s in summary["scenarios"] if "vss" in s and not s["vss"]["same_plan"]]
-    if any(vss["executed_pct"] is not None for vss in compared):
+    said = beyond_reach(summary.reach)
+    if isinstance(summary, ComparisonSummary):
+        return [*said, *infeasible_plans(summary), *_few_draws(summary)]
+    compared = [s.vss for s in summary.scenarios if not s.vss.same_plan]
+    if any(vss.executed_pct is not None for vss in compared):
         said.append(VSS_PCT)
-    alike = all("vss" in s and s["vss"]["same_plan"] for s in summary["scenarios"])
-    if 1 < summary["rollouts"] < FEW_DRAWS and not alike:
-        said.append(f"Caution: the intervals rest on only {summary['rollouts']} noise draws, and are wide where robots "
-                    "run short of fuel or time; more draws (--rollouts) make them narrower.")
-    asked = summary.get("precision")
-    if asked is not None:
-        reached = "no interval" if asked["reached_pct"] is None else f"{asked['reached_pct']:.2g} %"
-        said.append(f"Precision asked for: VSS within {asked['asked_pct']:g} % of the stochastic plan's incentive; "
-                    f"reached: {reached} after {counted(summary['trials'], 'trial')} under "
-                    f"{counted(summary['rollouts'], 'noise draw')}"
-                    f"{'' if asked['met'] else ', the most that were allowed'}.")
-    known = [f"{s['name']} {verdict(s['evpi_executed'])}" for s in summary["scenarios"] if "evpi_executed" in s]
-    if known:
-        said.append("Knowing beforehand who is available, or planning anew at the base, would add, executed: "
-                    f"{'; '.join(known)}.")
-    return said
+    return [*said, *(_few_draws(summary) if compared else []), *_precision(summary), *_known_beforehand(summary)]
 
 
-def over_few_maps(rows: Sequence[Mapping[str, Any]]) -> str:
+def _few_draws(summary: AnySummary) -> list[str]:
+    if not 1 < summary.rollouts < FEW_DRAWS:
+        return []
+    return [f"Caution: the intervals rest on only {summary.rollouts} noise draws, and are wide where robots run short "
+            "of fuel or time; more draws (--rollouts) make them narrower."]
+
+
+def _precision(summary: Summary) -> list[str]:
+    asked = summary.precision
+    if asked is None:
+        return []
+    reached = "no interval" if asked.reached_pct is None else f"{asked.reached_pct:.2g} %"
+    return [f"Precision asked for: VSS within {asked.asked_pct:g} % of the stochastic plan's incentive; reached: "
+            f"{reached} after {counted(summary.trials, 'trial')} under {counted(summary.rollouts, 'noise draw')}"
+            f"{'' if asked.met else ', the most that were allowed'}."]
+
+
+def _known_beforehand(summary: Summary) -> list[str]:
+    known = [f"{s.name} {verdict(s.evpi_executed, distinguishable=s.evpi_executed.distinguishable)}"
+             for s in summary.scenarios if s.evpi_executed is not None]
+    return ["Knowing beforehand who is available, or planning anew at the base, would add, executed: "
+            f"{'; '.join(known)}."] if known else []
+
+
+def over_few_maps(rows: Sequence[OverMaps]) -> str:
     """A word of caution for the VSS over few maps; nothing where there are enough."""
-    fewest = min((row["maps"] for row in rows), default=FEW_MAPS)
-    if any(row["maps"] > 1 and row["vss"]["ci95"] is None for row in rows):
+    fewest = min((row.maps for row in rows), default=FEW_MAPS)
+    if any(row.maps > 1 and row.vss.ci95 is None for row in rows):
         return "Where all maps agree there is no interval: nothing tells how maps differ."
     if fewest >= FEW_MAPS:
         return ""
@@ -130,37 +165,52 @@ def over_few_maps(rows: Sequence[Mapping[str, Any]]) -> str:
         "in ten shows may not be among them."
 
 
-def assumption_rows(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+def assumption_rows(scenarios: Sequence[ScenarioSummary]) -> list[list[str]]:
     """Scenario, failures executed, plan, what it was made for, expected, executed, loss; one row a plan."""
-    return [[s["name"], row["executed_under"], row["planner"], row["planned_for"] or "no failures",
-             f"{row['expected']:.1f}", with_interval(row["executed"]), verdict(row["loss"])]
-            for s in scenarios for row in s.get("assumptions", ())]
+    return [[s.name, row.executed_under, row.planner, row.planned_for or "no failures", f"{row.expected:.1f}",
+             with_interval(row.executed),
+             verdict(row.loss, distinguishable=row.loss.distinguishable, same=row.loss.same_plan)]
+            for s in scenarios for row in s.assumptions or ()]
 
 
 ASSUMPTION_HEAD = ("scenario", "executed under", "plan", "made for", "expected", "executed", "loss")
 
 
-def verdict(difference: Mapping[str, Any]) -> str:
+def verdict(difference: WithInterval, *, distinguishable: bool, same: bool = False) -> str:
     """A difference with its interval, or that there is none to speak of: two equal plans, or within the noise."""
-    if difference.get("same_plan", False):
+    if same:
         return "the same plan"
-    if difference["ci95"] is None:
-        return f"{difference['mean']:.1f}, no interval"
-    return with_interval(difference) if difference["distinguishable"] else "not distinguishable from zero"
+    if difference.ci95 is None:
+        return f"{difference.mean:.1f}, no interval"
+    return with_interval(difference) if distinguishable else "not distinguishable from zero"
 
 
-def vss_verdict(scenario: Mapping[str, Any]) -> str:
+def vss_verdict(vss: VssFigures) -> str:
     """The executed VSS of a scenario with its interval, or that there is none to speak of."""
-    vss = scenario["vss"]
-    return verdict({**vss["executed"], "distinguishable": vss["distinguishable"], "same_plan": vss["same_plan"]})
+    return verdict(vss.executed, distinguishable=vss.distinguishable, same=vss.same_plan)
 
 
-def with_interval(estimate: Mapping[str, Any], digits: int = 1, unit: str = "") -> str:
-    """``39.0 [36.1, 41.9]``; ``9.5 (1 map)`` where it is over other maps than the rest of its row."""
-    interval = estimate["ci95"]
-    return f"{estimate['mean']:.{digits}f}{unit}" + (
-        "" if interval is None else f" [{interval[0]:.{digits}f}, {interval[1]:.{digits}f}]") + (
-        f" ({counted(estimate['maps'], 'map')})" if "maps" in estimate else "")
+def with_interval(estimate: WithInterval, digits: int = 1, unit: str = "") -> str:
+    """``39.0 [36.1, 41.9]``."""
+    interval = estimate.ci95
+    return f"{estimate.mean:.{digits}f}{unit}" + (
+        "" if interval is None else f" [{interval[0]:.{digits}f}, {interval[1]:.{digits}f}]")
+
+
+def percentage(share: Percentage) -> str:
+    """``9.5 (1 map)`` where it is over other maps than the rest of its row; nothing where no map has one."""
+    if share.mean is None:
+        return ""
+    over = "" if share.maps is None else f" ({counted(share.maps, 'map')})"
+    return with_interval(Estimate(mean=share.mean, ci95=share.ci95)) + over
+
+
+def cell(entry: Statistic, plan: PlanFigures) -> str:
+    """A statistic of a plan as tables show it; nothing where the plan has none."""
+    value = entry.of(plan)
+    if value is None:
+        return ""
+    return with_interval(value) if isinstance(value, Estimate) else f"{value:{'+' if entry.signed else ''}.1f}"
 
 
 def per_cent(figure: float | None) -> str:

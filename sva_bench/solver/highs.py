@@ -23,8 +23,8 @@ INTEGRALITY = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Outcome:
-    """What a run came to.
+class MipResult:
+    """What a solve of an integer program came to.
 
     Attributes:
         status: How it ended.
@@ -109,7 +109,7 @@ class Relaxation:
             activity=np.array(solution.row_value), duals=np.array(solution.row_dual))
 
 
-    def solve_integer(self, columns: IntArray, time_limit_s: float) -> Outcome:
+    def solve_integer(self, columns: IntArray, time_limit_s: float) -> MipResult:
         """The optimum over integer values of some columns, proved but for rounding; the relaxation is lost."""
         _set_whole(self._solver, columns)
         return _branch_and_bound(self._solver, gap=0.0, absolute_gap=1e-6, time_limit_s=time_limit_s, most_nodes=None,
@@ -119,7 +119,7 @@ class Relaxation:
 def maximise(
     model: LinearModel, rows: Rows, *, gap: float, absolute_gap: float, time_limit_s: float,
     start: FloatArray | None = None, most_nodes: int | None = None, heuristics: float = 0.0,
-) -> Outcome:
+) -> MipResult:
     """Solve a mixed-integer program by branch and bound; Ctrl-C ends it with what it has.
 
     Args:
@@ -153,7 +153,7 @@ def _set_whole(solver: Any, columns: IntArray) -> None:
 def _branch_and_bound(
     solver: Any, *, gap: float, absolute_gap: float, time_limit_s: float, most_nodes: int | None, heuristics: float,
     whole: bool,
-) -> Outcome:
+) -> MipResult:
     _option(solver, "mip_rel_gap", gap)
     _option(solver, "mip_abs_gap", absolute_gap)
     _option(solver, "mip_feasibility_tolerance", INTEGRALITY)
@@ -171,7 +171,7 @@ def _branch_and_bound(
     bound = float(info.mip_dual_bound if whole else info.objective_function_value)
     if not math.isfinite(bound) or status == "infeasible":
         bound = -math.inf if status == "infeasible" else math.inf
-    return Outcome(
+    return MipResult(
         status=status, values=np.array(solver.getSolution().col_value) if found else None,
         objective=float(info.objective_function_value) if found else -math.inf, bound=bound,
         nodes=max(int(info.mip_node_count), 0),

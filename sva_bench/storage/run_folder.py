@@ -1,28 +1,28 @@
-"""Run folders: manifest, tables, plans, summary. Written under a temporary name and renamed when complete."""
+"""Run folders: tables, plans, summary. Written under a temporary name and renamed when complete."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-import platform
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
 from sva_bench import __version__
+from sva_bench.arrays import FloatArray
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.files.atomic import draft_folder, remove_left_behind
 from sva_bench.files.pretty import pretty_json
-from sva_bench.files.versions import library_versions
+from sva_bench.files.records import Record, as_dict
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.workers.pool import usable_cores
 from sva_bench.world.model import MapSource
 
 _RUN_NAME = re.compile(r".+-seed\d+-[0-9a-f]{8}")
@@ -71,23 +71,10 @@ def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
     return f"{scenario}{'+' if foreign else '-'}{planner}"
 
 
-def manifest(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
-             seconds: Mapping[str, float]) -> dict[str, Any]:
-    """What was run, with what, where and how long: the only place for wall-clock times."""
-    return {
-        "format": "sva-bench/manifest@1", "version": __version__, "seed": seed, "options": dict(options),
-        "command": ["sva-bench", *sys.argv[1:]], "started": started,
-        "seconds": {phase: round(taken, 3) for phase, taken in seconds.items()},
-        "machine": {"platform": platform.platform(), "python": platform.python_version(),
-                    "cpus": usable_cores()},
-        "packages": library_versions(), "world": dict(world),
-    }
-
-
-def write_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write a JSON file that a person can read."""
+def write_record(path: Path, record: Record) -> None:
+    """Write a record as a JSON file that a person can read."""
     # A name that is no UTF-8 becomes an escape as JSON has it.
-    path.write_bytes(pretty_json(dict(data)).encode("utf-8", "backslashreplace"))
+    path.write_bytes(pretty_json(as_dict(record)).encode("utf-8", "backslashreplace"))
 
 
 def write_map(folder: Path, source: MapSource) -> None:
@@ -119,24 +106,38 @@ def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
 MAP = "map"
 """Folder in a run folder that holds the files that the world's map was read from, under their names there."""
 
-LEG_COLUMNS = tuple(LEGS.names)
 
 
-def leg_columns(executed: Sequence[Executed]) -> dict[str, list[Any]]:
-    """A row per leg that was driven."""
-    rows: dict[str, list[Any]] = {key: [] for key in LEG_COLUMNS}
-    for run in executed:
-        for leg in run.legs:
-            rows["scenario"].append(run.case.scenario.name)
-            rows["planner"].append(run.case.planner)
-            for key in LEG_COLUMNS[2:]:
-                rows[key].append(getattr(leg, key))
-    return rows
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Legs:
+    """The columns of ``legs.parquet``, whose units are told there; a row per leg that was driven."""
+
+    scenario: Sequence[str]
+    planner: Sequence[str]
+    rollout: Sequence[int]
+    robot: Sequence[str]
+    leg: Sequence[int]
+    origin: Sequence[str]
+    destination: Sequence[str]
+    planned_s: FloatArray
+    driven_s: FloatArray
 
 
-def write_legs(path: Path, rows: Mapping[str, Sequence[Any]]) -> None:
+def legs_of(executed: Sequence[Executed]) -> Legs:
+    """Every leg that was driven."""
+    rows = [(run.case, leg) for run in executed for leg in run.legs]
+    return Legs(
+        scenario=[case.scenario.name for case, _ in rows], planner=[case.planner for case, _ in rows],
+        rollout=[leg.rollout for _, leg in rows], robot=[leg.robot for _, leg in rows],
+        leg=[leg.leg for _, leg in rows], origin=[leg.origin for _, leg in rows],
+        destination=[leg.destination for _, leg in rows],
+        planned_s=np.array([leg.planned_s for _, leg in rows], dtype=np.float64),
+        driven_s=np.array([leg.driven_s for _, leg in rows], dtype=np.float64))
+
+
+def write_legs(path: Path, legs: Legs) -> None:
     """Write ``legs.parquet``."""
-    write_table(path, LEGS, [pa.table(dict(rows), schema=LEGS)])
+    write_table(path, LEGS, [pa.table(vars(legs), schema=LEGS)])
 
 
 def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[str], settings: Settings) -> None:

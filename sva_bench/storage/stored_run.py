@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,16 +13,19 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from sva_bench.analysis.catalogue import csv_cells, csv_columns
+from sva_bench.analysis.results import SUMMARY
+from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, summary_form
 from sva_bench.choices import ENDS
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.atomic import draft_file
-from sva_bench.files.documents import read_json
+from sva_bench.files.documents import Document, read_json, validate
 from sva_bench.files.printable import counted
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
-from sva_bench.storage.results_schema import ManifestFile, SummaryFile
-from sva_bench.storage.run_folder import LEG_COLUMNS, MAP, stem_of
+from sva_bench.storage.manifest import MANIFEST, Manifest
+from sva_bench.storage.run_folder import MAP, Legs, stem_of
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
 from sva_bench.storage.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
@@ -37,20 +41,20 @@ class Content:
     """What a report is made of: all of it stands in the run folder.
 
     Attributes:
-        summary: Content of ``summary.json``.
+        summary: The summary.
         routes: Route of each robot, by scenario and planner.
         stems: Names of a plan's files, by scenario and planner.
-        legs: Columns of ``legs.parquet``.
+        legs: The legs that were driven.
         world: The world, for its picture.
-        manifest: Content of ``manifest.json``.
+        manifest: What was run.
     """
 
-    summary: Mapping[str, Any]
+    summary: AnySummary
     routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]
     stems: Mapping[tuple[str, str], str]
-    legs: Mapping[str, Sequence[Any]]
+    legs: Legs
     world: World
-    manifest: Mapping[str, Any]
+    manifest: Manifest
 
 
 def run_folder_at(path: Path) -> Path:
@@ -107,7 +111,7 @@ def is_batch(folder: Path) -> bool:
 
 
 def write_csv(folder: Path) -> list[Path]:
-    """Write each table of a run folder as CSV too, for spreadsheets.
+    """Write each table of a run folder as CSV too, for spreadsheets, and the statistics of its plans.
 
     Raises:
         BadFile: If one can't be read.
@@ -119,7 +123,20 @@ def write_csv(folder: Path) -> list[Path]:
         with draft_file(path) as draft, _complete(folder):
             write_table_as_csv(folder / f"{name}.parquet", draft, schema)
         written.append(path)
-    return written
+    _, summary = _summary_in(folder)
+    path = folder / "statistics.csv"
+    with draft_file(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["scenario", "planner", *csv_columns()])
+        table.writerows([scenario.name, name, *csv_cells(plan)]
+                        for scenario in summary.scenarios for name, plan in scenario.plans.items())
+    return [*written, path]
+
+
+def _summary_in(folder: Path) -> tuple[Document, AnySummary]:
+    """The summary of a run folder, as read and as checked."""
+    document = read_json(folder / "summary.json", MOST_BYTES)
+    return document, validate(document, summary_form(document.data), SUMMARY)
 
 
 def read_content(folder: Path) -> Content:
@@ -133,8 +150,8 @@ def read_content(folder: Path) -> Content:
 
 
 def _content(folder: Path) -> Content:
-    document, summary = read_ours(folder / "summary.json", SummaryFile, "sva-bench/summary@1")
-    told, manifest = read_ours(folder / "manifest.json", ManifestFile, "sva-bench/manifest@1")
+    document, summary = _summary_in(folder)
+    told, manifest = read_ours(folder / "manifest.json", Manifest, MANIFEST)
     world = world_of(Part(told, ("world",), manifest.world), folder / MAP)
     first = summary.scenarios[0]
     for key, found, known in (
@@ -152,9 +169,9 @@ def _content(folder: Path) -> Content:
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
              "robot": frozenset(first.availability), "end": frozenset(ENDS), "fidelity": frozenset((summary.fidelity,))}
     _check_outcomes(folder / "outcomes.parquet", plans, summary.trials, len(first.availability), words)
-    foreign = "comparisons" in document.data["scenarios"][0]
-    stems = {(scenario, name): stem_of(scenario, name, foreign=foreign) for scenario, name in plans}
-    return Content(summary=document.data, routes=_routes(folder, world, stems), stems=stems, manifest=told.data,
+    stems = {(scenario, name): stem_of(scenario, name, foreign=isinstance(summary, ComparisonSummary))
+             for scenario, name in plans}
+    return Content(summary=summary, routes=_routes(folder, world, stems), stems=stems, manifest=manifest,
                    world=world, legs=_legs(folder / "legs.parquet", world, words))
 
 
@@ -168,20 +185,22 @@ def _routes(folder: Path, world: World, stems: Mapping[tuple[str, str], str]
     return {key: read_routes(folder / "plans" / f"{stem}.json", robots, sites) for key, stem in stems.items()}
 
 
-def _legs(path: Path, world: World, words: Mapping[str, frozenset[str]]) -> dict[str, Any]:
+def _legs(path: Path, world: World, words: Mapping[str, frozenset[str]]) -> Legs:
     sites = frozenset(site.name for site in world.sites)
     known = {**words, "origin": sites, "destination": sites}
-    parts: dict[str, list[Any]] = {name: [] for name in LEG_COLUMNS}
+    parts: dict[str, list[Any]] = {name: [] for name in LEGS.names}
     for piece in pieces_of(path, LEGS, most=MOST_LEGS, words=known):
         for name in ("planned_s", "driven_s"):
             ends = pc.min_max(piece.column(name)).as_py()
             if piece.num_rows and not 0 <= ends["min"] <= ends["max"] < 1e9:
                 raise BadFile(path, None, name, "expected times between 0 and 1e9 s; run the command in manifest.json "
                               "again")
-        for name in LEG_COLUMNS:
+        for name in LEGS.names:
             parts[name].append(_plainly(piece.column(name)))
-    return {name: np.concatenate(found) if name.endswith("_s") and found else [x for part in found for x in part]
-            for name, found in parts.items()}
+    columns: dict[str, Any] = {
+        name: np.concatenate(found or [np.zeros(0)]) if name.endswith("_s") else [x for part in found for x in part]
+        for name, found in parts.items()}
+    return Legs(**columns)
 
 
 def _plainly(column: pa.ChunkedArray) -> Any:

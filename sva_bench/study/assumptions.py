@@ -5,69 +5,76 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import Any
 
 from sva_bench.analysis.figures import difference_figure, value_figure
+from sva_bench.analysis.results import AssumptionRow, Loss
 from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import FailureProcess
-from sva_bench.execution.execute import Case, Drives, Settings, execute
+from sva_bench.execution.execute import Case, Drives, Executed, Settings, execute
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import PROCESSES
-from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
+from sva_bench.study.planning import PlansByProcess
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import World
+from sva_bench.world.model import Scenario, World
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PlansByProcess:
-    """The plans of a scenario.
+class _MadeFor:
+    """A plan, and the failure process that it was made for; ``None`` for the deterministic plan."""
 
-    Attributes:
-        instance: What they were made for.
-        stochastic: The best plan under each failure process.
-        deterministic: The plan that knows no failures.
-    """
+    process: FailureProcess | None
+    plan: Plan
 
-    instance: Instance
-    stochastic: Mapping[FailureProcess, Plan]
-    deterministic: Plan
+    @property
+    def planner(self) -> str:
+        """Who made it."""
+        return "deterministic" if self.process is None else "stochastic"
+
+    def case(self, scenario: Scenario) -> Case:
+        """To be executed."""
+        name = self.planner if self.process is None else f"{self.planner} for {self.process}"
+        return Case(scenario=scenario, planner=name, plan=self.plan,
+                    role="deterministic" if self.process is None else "stochastic")
 
 
 def cross_table(
     world: World, costs: Mapping[str, FuelCosts], plans: Mapping[str, PlansByProcess], settings: Settings,
     executor: Executor | None, drives: Drives,
-) -> dict[str, list[dict[str, Any]]]:
+) -> dict[str, list[AssumptionRow]]:
     """Every plan executed under every failure process, the same trials for all; rows by scenario.
 
     The loss of a plan is what the plan for the failures executed collects beyond it, trial by trial.
     """
-    rows: dict[str, list[dict[str, Any]]] = {scenario.name: [] for scenario in world.scenarios}
+    rows: dict[str, list[AssumptionRow]] = {scenario.name: [] for scenario in world.scenarios}
     for process in PROCESSES:
-        cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
-                 for name, _, plan in _named(plans[scenario.name])]
+        cases = [made.case(scenario) for scenario in world.scenarios for made in _all_of(plans[scenario.name])]
         executed = iter(execute(replace(world, execute_failure=process), costs, cases, settings, executor, None,
                                 drives))
         for scenario in world.scenarios:
             mine = plans[scenario.name]
-            runs = {name: next(executed) for name, _, _ in _named(mine)}
-            right = runs[f"stochastic for {process}"]
-            truth = replace(mine.instance, failure=process)
-            best = expected_value(truth, mine.stochastic[process])
-            for name, made_for, plan in _named(mine):
-                run, noisy = runs[name], not world.noise.silent
-                loss = estimate(difference_figure(right, run, noisy=noisy))
-                expected = expected_value(truth, plan)
-                rows[scenario.name].append({
-                    "executed_under": process, "planner": name.split()[0], "planned_for": made_for,
-                    "expected": expected + 0.0, "executed": estimate(value_figure(run, noisy=noisy)).as_dict(),
-                    "loss_modelled": best - expected + 0.0,
-                    "loss": {**loss.as_dict(), "distinguishable": loss.distinguishable,
-                             "same_plan": plan.drives_like(mine.stochastic[process])}})
+            runs = [(made, next(executed)) for made in _all_of(mine)]
+            right = next(run for made, run in runs if made.process == process)
+            rows[scenario.name] += [_row(process, mine, made, run, right, noisy=not world.noise.silent)
+                                    for made, run in runs]
     return rows
 
 
-def _named(plans: PlansByProcess) -> list[tuple[str, str | None, Plan]]:
-    """Name, failures planned for, and plan."""
-    return [*((f"stochastic for {process}", process, plan) for process, plan in plans.stochastic.items()),
-            ("deterministic", None, plans.deterministic)]
+def _row(process: FailureProcess, plans: PlansByProcess, made: _MadeFor, run: Executed, right: Executed, *,
+         noisy: bool) -> AssumptionRow:
+    """What a plan is worth under a failure process, beside the plan for that process, executed as ``right``."""
+    truth, best = replace(plans.instance, failure=process), plans.stochastic[process]
+    expected = expected_value(truth, made.plan)
+    loss = estimate(difference_figure(right, run, noisy=noisy))
+    return AssumptionRow(
+        executed_under=process, planner=made.planner, planned_for=made.process, expected=expected + 0.0,
+        executed=estimate(value_figure(run, noisy=noisy)),
+        loss_modelled=expected_value(truth, best) - expected + 0.0,
+        loss=Loss(mean=loss.mean, ci95=loss.ci95, distinguishable=loss.excludes_zero,
+                  same_plan=made.plan.drives_like(best)))
+
+
+def _all_of(plans: PlansByProcess) -> list[_MadeFor]:
+    """All plans of a scenario."""
+    return [*(_MadeFor(process=process, plan=plan) for process, plan in plans.stochastic.items()),
+            _MadeFor(process=None, plan=plans.deterministic)]

@@ -5,28 +5,27 @@ Apart from the planning, since a check of a world needs neither solvers nor phys
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 
 from sva_bench.analysis.reach import reached
+from sva_bench.analysis.summaries import Reach
 from sva_bench.choices import PathPlanner
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.routes.refuelling import quickest, road_of
 from sva_bench.study.given_plans import instance_name
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.travel.times import plan_travel_times
+from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import Scenario, World
 
 NOMINAL = "nominal"
 """The scenario of the availabilities under ``robots:``."""
 
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
 
 
-def plan_costs(world: World, planner: PathPlanner, progress: Progress) -> dict[str, FuelCosts]:
+def plan_costs(world: World, planner: PathPlanner, progress: OnProgress) -> dict[str, FuelCosts]:
     """Fuel costs of each robot model in the world, by its name."""
     models = {robot.model.name: robot.model for robot in world.robots}
     costs = {}
@@ -68,7 +67,7 @@ def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list
     return lost
 
 
-def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
+def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> Reach:
     """What robots cannot reach within fuel and limit, as every summary says it."""
     return reached(out_of_reach(world, costs), [robot.name for robot in world.robots],
                    [poi.name for poi in world.pois])

@@ -8,9 +8,7 @@ from typing import Any
 from sva_bench.analysis.precision import Precision
 from sva_bench.choices import Fidelity, PathPlanner
 from sva_bench.execution.execute import Settings
-from sva_bench.solver.two_stage import (
-    SolveLimits,
-)
+from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.world.model import World
 
 
@@ -49,7 +47,6 @@ class Options:
         return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
                 "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
                 "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
-
 
 
 def settings_of(world: World, options: Options) -> Settings:

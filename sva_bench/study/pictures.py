@@ -10,15 +10,16 @@ import numpy as np
 
 from sva_bench.mission.plan import Plan
 from sva_bench.report.drawing import Kind, Leg, Overlays, draw_world
-from sva_bench.study.costs import Progress, plan_costs
+from sva_bench.study.costs import plan_costs
 from sva_bench.study.planning import check_plans
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import roadmap_edges
+from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 
 
 def picture_of(
-    world: World, kind: Kind, *, roadmap: bool, paths: bool, progress: Progress,
+    world: World, kind: Kind, *, roadmap: bool, paths: bool, progress: OnProgress,
     plan: Plan | None = None, plan_file: Path | None = None,
 ) -> bytes:
     """A picture of a world, with what is planned in it on request.

@@ -11,28 +11,67 @@ import numpy as np
 
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
+from sva_bench.execution.execute import Case, Executed
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.failures import MODEL, PROCESSES
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, unless_interrupted
+from sva_bench.solver.outcomes import possible
 from sva_bench.solver.two_stage import (
+    MOST_SUBSETS,
     Knowledge,
+    SolveLimits,
     knowledge_of,
     plan_deterministic,
     plan_nominal,
     plan_stochastic,
     wait_and_see,
 )
-from sva_bench.study.assumptions import PlansByProcess
-from sva_bench.study.costs import Progress, instance_of, nominal_scenario
+from sva_bench.study.costs import instance_of, nominal_scenario
 from sva_bench.study.given_plans import InfeasiblePlan
-from sva_bench.study.informed import InformedPlans, plan_informed
 from sva_bench.study.options import Options
-from sva_bench.study.summing import model_is_executed
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import World
+from sva_bench.workers.progress import OnProgress
+from sva_bench.world.model import Scenario, World
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class InformedPlans:
+    """What somebody would plan who knew beforehand who is available.
+
+    Attributes:
+        plans: The plan for each set of available robots.
+        expected: Their expected value, over who turns out to be available: wait and see.
+        bound: Upper bound on it.
+    """
+
+    plans: Mapping[frozenset[str], Plan]
+    expected: float
+    bound: float
+
+    def promised(self, executed: Executed) -> Executed:
+        """The informed planner's trials, with what its plans promise together in place of what the first one does."""
+        stopped = [plan.status for plan in self.plans.values() if plan.status != "optimal"]
+        together = replace(executed.case.plan, value=self.expected, bound=self.bound,
+                           status=stopped[0] if stopped else "optimal")
+        return replace(executed, case=replace(executed.case, plan=together))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlansByProcess:
+    """The plans of a scenario for each failure process.
+
+    Attributes:
+        instance: What they were made for.
+        stochastic: The best plan under each failure process.
+        deterministic: The plan that knows no failures.
+    """
+
+    instance: Instance
+    stochastic: Mapping[FailureProcess, Plan]
+    deterministic: Plan
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,8 +107,13 @@ class Planned:
         return [self.stochastic, self.deterministic, *(self.informed.plans.values() if self.informed else ())]
 
 
+def model_is_executed(world: World) -> bool:
+    """Whether failures are planned for and executed as in the two-stage model."""
+    return world.plan_failure == world.execute_failure == "mission"
+
+
 def plan_scenarios(
-    world: World, costs: Mapping[str, FuelCosts], options: Options, progress: Progress
+    world: World, costs: Mapping[str, FuelCosts], options: Options, progress: OnProgress
 ) -> dict[str, Planned]:
     """Both plans of each scenario. Scenarios share what doesn't depend on availabilities.
 
@@ -119,6 +163,37 @@ def _other_processes(world: World, options: Options) -> list[FailureProcess]:
     """Failure processes beside the model's that plans are made for, the one that is executed first."""
     asked = [world.execute_failure, world.plan_failure, *(PROCESSES if options.assumptions else ())]
     return [name for name in dict.fromkeys(asked) if name != MODEL]
+
+
+def two_cases(scenario: Scenario, planned: Planned) -> list[Case]:
+    """Both plans of a scenario, to be executed."""
+    return [Case(scenario=scenario, planner="stochastic", plan=planned.stochastic, role="stochastic"),
+            Case(scenario=scenario, planner="deterministic", plan=planned.deterministic, role="deterministic")]
+
+
+def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, force: bool) -> InformedPlans:
+    """The best plan for every set of robots that can be available.
+
+    Args:
+        instance: The instance; failures are those of ``mission``.
+        limits: When each solve may stop.
+        known: What solves of the same instance with other availabilities found.
+        force: Solve however many sets there are.
+
+    Raises:
+        BadInput: If there are more than 16, and that isn't forced.
+    """
+    sets = possible(instance)
+    if len(sets) > MOST_SUBSETS and not force:
+        raise BadInput(f"{instance.name}: {len(sets)} sets of robots can be available, and the informed planner solves "
+                       f"for each; beyond {MOST_SUBSETS} it has to be told so with --evpi")
+    plans = {}
+    for available in sets:
+        sure = replace(instance, joint=None, failure=MODEL, vehicles=tuple(
+            replace(v, availability=1.0 if v.name in available else 0.0) for v in instance.vehicles))
+        plans[available] = unless_interrupted(plan_stochastic(sure, limits, known=known))
+    return InformedPlans(plans=plans, expected=sum(sets[s] * (plan.value or 0.0) for s, plan in plans.items()),
+                         bound=sum(sets[s] * (plan.bound or 0.0) for s, plan in plans.items()))
 
 
 def check_plans(

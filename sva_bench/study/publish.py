@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from sva_bench.analysis.summaries import AnySummary
 from sva_bench.execution.execute import Executed
 from sva_bench.files.atomic import draft_file
 from sva_bench.mission.instance import Instance
@@ -17,23 +18,23 @@ from sva_bench.mission.instance_file import write_instance
 from sva_bench.mission.plan_file import write_plan
 from sva_bench.recording.rerun import record
 from sva_bench.report.run_page import write_report
+from sva_bench.storage.manifest import manifest_of
 from sva_bench.storage.run_folder import (
-    leg_columns,
-    manifest,
+    legs_of,
     run_folder,
     run_name,
     stem_of,
-    write_json,
     write_legs,
     write_map,
     write_outcomes,
+    write_record,
     write_travel_times,
 )
 from sva_bench.storage.stored_run import Content, read_content, run_folder_at
-from sva_bench.study.costs import Progress
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.summing import by_case
 from sva_bench.travel.fuel import FuelCosts
+from sva_bench.workers.progress import OnProgress
 from sva_bench.world.load import world_as_dict
 from sva_bench.world.model import World
 
@@ -43,12 +44,12 @@ class Run:
     """A finished run: where it is, and its summary."""
 
     folder: Path
-    summary: Mapping[str, Any]
+    summary: AnySummary
 
 
 def publish(
     world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
-    executed: list[Executed], summary: Mapping[str, Any], out: Path, clock: Stopwatch, progress: Progress,
+    executed: list[Executed], summary: AnySummary, out: Path, clock: Stopwatch, progress: OnProgress,
     identity: Mapping[str, Any] | None = None,
 ) -> Run:
     """Write the run folder; ``identity`` is what results of plans from elsewhere depend on beside the rest."""
@@ -72,13 +73,13 @@ def publish(
                 record(folder / "recordings" / f"{stem}.rrd", world, done.traces,
                        title=f"{world.name}, {scenario}, {planner}")
                 progress("recording", number + 1, len(executed))
-        legs = leg_columns(executed)
+        legs = legs_of(executed)
         write_legs(folder / "legs.parquet", legs)
         write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
                        settings_of(world, options))
-        write_json(folder / "summary.json", summary)
-        told = manifest(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
-        write_json(folder / "manifest.json", told)
+        write_record(folder / "summary.json", summary)
+        told = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
+        write_record(folder / "manifest.json", told)
         write_report(folder / "report.html", Content(
             summary=summary, routes={k: v.case.plan.routes for k, v in by_case(executed).items()}, stems=stems,
             legs=legs, world=world, manifest=told))
@@ -98,7 +99,7 @@ def report_again(folder: Path) -> Path:
     return path
 
 
-def _digests(world: World) -> dict[str, Any]:
+def _digests(world: World) -> dict[str, Mapping[str, str]]:
     """Digests of the files that a world names, by name; nothing if it names none."""
     return {} if world.map_source is None else {"files": world.map_source.digests()}
 

@@ -1,70 +1,60 @@
-"""From plans and trials to the content of ``summary.json``."""
+"""From plans and trials to summaries."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
-from sva_bench.analysis.summary import Judged, ScenarioResult, scenario_summary
+from sva_bench.analysis.results import Promise, ScenarioFacts
+from sva_bench.analysis.summaries import Failures, Head, Reach, Summary, Travel
+from sva_bench.analysis.summary import Judged, ScenarioTrials, promise_of, scenario_summary
+from sva_bench.choices import Role
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.mission.certify import expected_value
-from sva_bench.mission.failures import MODEL
-from sva_bench.study.informed import INFORMED
+from sva_bench.mission.plan import Plan
+from sva_bench.study.options import Options
+from sva_bench.study.planning import Planned, model_is_executed
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import World
-
-if TYPE_CHECKING:
-    from sva_bench.study.options import Options
-    from sva_bench.study.planning import Planned
-
-WORST = "deterministic, worst of its ties"
-
-
-def model_is_executed(world: World) -> bool:
-    """Whether failures are planned for and executed as in the two-stage model."""
-    return world.plan_failure == world.execute_failure == MODEL
+from sva_bench.world.model import Scenario, World
 
 
 def summarise(
-    world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts],
-    planned: Mapping[str, Planned], executed: list[Executed],
-) -> dict[str, Any]:
-    """The content of ``summary.json``."""
-    runs = by_case(executed)
-    robots = [robot.name for robot in world.robots]
+    world: World, options: Options, head: Head, planned: Mapping[str, Planned], executed: Sequence[Executed],
+    reach: Reach,
+) -> Summary:
+    """The summary of a run, whose plans are ours."""
+    runs: dict[tuple[str, Role], Executed] = {(run.case.scenario.name, run.case.role): run for run in executed}
     scenarios = []
     for scenario in world.scenarios:
         plans = planned[scenario.name]
-        known = known_ahead(world, plans)
-        judged = {name: Judged(expected=known[name], executed=runs[scenario.name, name])
-                  for name in ("stochastic", "deterministic")}
-        scenarios.append(scenario_summary(ScenarioResult(
-            stochastic=judged["stochastic"], deterministic=judged["deterministic"],
-            modelled_range=known["modelled_range"], vss_mean_value=known["vss_mean_value"],
-            worst=runs.get((scenario.name, WORST)), ws=known["ws"], evpi=known["evpi"],
-            value_of_process=known["value_of_process"],
-            informed=None if plans.informed is None else Judged(
+        trials = ScenarioTrials(
+            stochastic=runs[scenario.name, "stochastic"], deterministic=runs[scenario.name, "deterministic"],
+            worst=runs.get((scenario.name, "worst_tie")), informed=None if plans.informed is None else Judged(
                 expected=plans.informed.expected,
-                executed=plans.informed.promised(runs[scenario.name, INFORMED])),
-        ), robots, noisy=not world.noise.silent))
-    summary = head(world, options, settings, costs) | {"reproducible": proved(planned), "scenarios": scenarios}
-    return summary if options.precision is None else summary | {"precision": options.precision.as_dict(summary)}
+                executed=plans.informed.promised(runs[scenario.name, "informed"])))
+        scenarios.append(scenario_summary(facts_of(world, scenario, plans), trials, noisy=not world.noise.silent))
+    return Summary(**vars(head), scenarios=tuple(scenarios), reach=reach,
+                   precision=None if options.precision is None else options.precision.reached(scenarios))
 
 
-def known_ahead(world: World, plans: Planned) -> dict[str, Any]:
-    """What is known of a scenario's plans before any trial: each one's value in closed form, and of both together."""
+def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:
+    """What is known of a scenario before any trial: each plan's value in closed form, and of both together."""
     mission = model_is_executed(world)
     truth = replace(plans.instance, failure=world.execute_failure)
-    return {
-        "stochastic": expected_value(truth, plans.stochastic),
-        "deterministic": expected_value(truth, plans.deterministic),
-        "modelled_range": plans.vss_range if mission else None,
+
+    def promise(plan: Plan) -> Promise:
+        return promise_of(plan, expected_value(truth, plan))
+
+    least, most = plans.vss_range
+    return ScenarioFacts(
+        name=scenario.name, availability={robot.name: scenario.availability[robot.name] for robot in world.robots},
+        plans={"stochastic": promise(plans.stochastic), "deterministic": promise(plans.deterministic)},
+        modelled_range=(least + 0.0, most + 0.0) if mission else None,
+        same_plan=plans.stochastic.drives_like(plans.deterministic),
         # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
-        "vss_mean_value": 0.0 if mission else None,
-        "ws": plans.ws if mission else None, "evpi": plans.evpi if mission else None,
-        "value_of_process": plans.value_of_process,
-    }
+        vss_mean_value=0.0 if mission else None,
+        ws=plans.ws if mission else None, evpi=plans.evpi if mission else None,
+        value_of_process=plans.value_of_process)
 
 
 def proved(planned: Mapping[str, Planned]) -> bool:
@@ -72,19 +62,18 @@ def proved(planned: Mapping[str, Planned]) -> bool:
     return all(plan.status == "optimal" for p in planned.values() for plan in p.all_plans())
 
 
-def head(world: World, options: Options, settings: Settings, costs: Mapping[str, FuelCosts]) -> dict[str, Any]:
+def head_of(world: World, settings: Settings, costs: Mapping[str, FuelCosts], *, reproducible: bool) -> Head:
     """What every summary says first."""
     pairs = sum(cost.pairs for cost in costs.values())
     changed = sum(cost.changed_pct * cost.pairs for cost in costs.values())
-    return {
-        "format": "sva-bench/summary@1", "world": world.name, "seed": options.seed, "trials": settings.trials,
-        "rollouts": settings.rollouts, "fidelity": settings.fidelity,
-        "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
-        "travel": {"pairs": pairs, "triangle_violations_pct": round(changed / pairs, 6) if pairs else 0.0,
-                   "max_excess_pct": round(max((c.max_excess_pct for c in costs.values()), default=0.0), 6)},
-    }
+    return Head(
+        world=world.name, seed=settings.seed, trials=settings.trials, rollouts=settings.rollouts,
+        fidelity=settings.fidelity, failure=Failures(plan=world.plan_failure, execute=world.execute_failure),
+        travel=Travel(pairs=pairs, triangle_violations_pct=round(changed / pairs, 6) if pairs else 0.0,
+                      max_excess_pct=round(max((c.max_excess_pct for c in costs.values()), default=0.0), 6)),
+        reproducible=reproducible)
 
 
-def by_case(executed: list[Executed]) -> dict[tuple[str, str], Executed]:
+def by_case(executed: Sequence[Executed]) -> dict[tuple[str, str], Executed]:
     """What was executed, by scenario and planner: joined into one word, two cases could be one."""
     return {(run.case.scenario.name, run.case.planner): run for run in executed}

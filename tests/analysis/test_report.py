@@ -7,7 +7,8 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -16,17 +17,20 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sva_bench.analysis.statistics import Estimate
-from sva_bench.batch.aggregates import aggregate, maps
+from sva_bench.analysis.over_maps import BatchSummary, Percentage, UnitSummary
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.summaries import Summary
+from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.report import charts
 from sva_bench.report.batch_page import _over_maps as over_maps_said
 from sva_bench.report.batch_page import write_batch_report
-from sva_bench.report.wording import answer, finding, over_few_maps, remarks, vss_verdict, with_interval
+from sva_bench.report.wording import answer, finding, over_few_maps, percentage, remarks, vss_verdict, with_interval
 from sva_bench.storage.stored_run import write_csv
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run, report_again
 from sva_bench.study.run import run
+from tests.results_for_tests import over_maps
 from tests.worlds_for_tests import world_of
 
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
@@ -43,6 +47,29 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Run:
 @pytest.fixture
 def folder(finished: Run, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished.folder, tmp_path / "run"))
+
+
+def results_of(finished: Run) -> Summary:
+    assert isinstance(finished.summary, Summary)
+    return finished.summary
+
+
+def units_of(finished: Run, world: str = "small", seed: int = 0, variant: str = "") -> UnitSummary:
+    """A finished run as if it were of a batch."""
+    found = results_of(finished)
+    return UnitSummary(
+        world=world, seed=seed, variant=variant, trials=found.trials, rollouts=found.rollouts, fidelity=found.fidelity,
+        failure=found.failure, travel=found.travel, reproducible=True, reach=found.reach, scenarios=found.scenarios)
+
+
+def batch_of(units: Sequence[UnitSummary]) -> BatchSummary:
+    def different(words: Iterable[Any]) -> tuple[Any, ...]:
+        return tuple(dict.fromkeys(words))
+
+    return BatchSummary(
+        trials=40, fidelity="kinematic", worlds=different(u.world for u in units), seeds=different(
+            u.seed for u in units), variants=different(u.variant for u in units), units=tuple(units), failed=(),
+        maps=map_rows(units, over_trials(units)), aggregate=aggregate(units))
 
 
 class Page(HTMLParser):
@@ -80,10 +107,10 @@ def test_a_page_loads_nothing_and_every_reference_in_it_is_met(finished: Run) ->
 def test_page_terminal_and_summary_say_the_same(finished: Run) -> None:
     text = html.unescape((finished.folder / "report.html").read_text()).replace("\u00a0", " ")
     assert answer(finished.summary) in text
-    for scenario in finished.summary["scenarios"]:
-        assert finding(scenario) in text
-        for plan in scenario["plans"].values():
-            assert with_interval(plan["executed"]) in text
+    for scenario in results_of(finished).scenarios:
+        assert finding(scenario.vss) in text
+        for plan in scenario.plans.values():
+            assert with_interval(plan.executed) in text
 
 
 _PROBE = """<script>window.onerror=m=>{document.title='error '+m};window.onload=()=>{
@@ -188,34 +215,28 @@ def test_tables_say_their_units_and_open_as_csv(folder: Path) -> None:
     assert units["fuel_used_s"] == b"s of driving"
     assert units["incentive"] == b"incentive of the world file"
     assert units["scenario"] is None
-    assert [path.name for path in write_csv(folder)] == ["legs.csv", "outcomes.csv", "travel_times.csv"]
+    assert [path.name for path in write_csv(folder)] == [
+        "legs.csv", "outcomes.csv", "travel_times.csv", "statistics.csv"]
     lines = (folder / "outcomes.csv").read_text().splitlines()
     assert lines[0].split(",")[:3] == ['"scenario"', '"planner"', '"trial"']
     assert len(lines) == 1 + 2 * 2 * 40 * 2  # scenarios, plans, trials, robots
 
 
-def over_trials(units: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str, str], Estimate]:
+def over_trials(units: Sequence[UnitSummary]) -> dict[tuple[str, str, str], Estimate]:
     """The executed VSS of each map, as its last seed has it."""
-    return {(unit["variant"], s["name"], unit["world"]): Estimate(
-            mean=s["vss"]["executed"]["mean"], interval=(0.0, 9.0)) for unit in units for s in unit["scenarios"]}
+    return {(unit.variant, s.name, unit.world): Estimate(mean=s.vss.executed.mean, ci95=(0.0, 9.0))
+            for unit in units for s in unit.scenarios}
 
 
 def test_a_batchs_verdict_and_figure_rest_on_the_same_interval() -> None:
     # Large maps with a surely positive VSS, and a small one that makes its percentage anybody's guess.
-    def row(interval: list[float], share: list[float]) -> dict[str, Any]:
-        return {"scenario": "S3", "variant": "", "maps": 5, "vss": {"mean": sum(interval) / 2, "ci95": interval},
-                "vss_pct": {"mean": sum(share) / 2, "ci95": share}}
-
-    assert over_maps_said([row([2.0, 8.0], [-1.0, 9.0])]) == (
+    assert over_maps_said([over_maps(5, (2.0, 8.0), (-1.0, 9.0))]) == (
         "Over these maps planning for failures pays in S3 (VSS 5.0 [2.0, 8.0]).")
-    assert "no scenario shows a value" in over_maps_said([row([-2.0, 8.0], [1.0, 9.0])])
+    assert "no scenario shows a value" in over_maps_said([over_maps(5, (-2.0, 8.0), (1.0, 9.0))])
 
 
 def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> None:
-    units = [{**finished.summary, "variant": ""}]
-    write_batch_report(tmp_path / "report.html", {
-        "trials": 40, "fidelity": "kinematic", "worlds": ["small"], "seeds": [0], "variants": [""], "units": units,
-        "failed": [], "maps": maps(units, over_trials(units)), "aggregate": aggregate(units)})
+    write_batch_report(tmp_path / "report.html", batch_of([units_of(finished)]))
     text = (tmp_path / "report.html").read_text()
     assert "over 1 map<" in text
     assert "<svg" in text
@@ -232,11 +253,9 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
         return str(draw(groups, title, unit))
 
     monkeypatch.setattr(charts, "boxes_of", watched)
-    units = [{**finished.summary, "variant": variant, "world": name, "seed": seed} for variant in ("x=1", "x=2")
-             for name in ("a", "b") for seed in (0, 1, 2)]
-    write_batch_report(tmp_path / "report.html", {
-        "trials": 40, "fidelity": "kinematic", "worlds": ["a", "b"], "seeds": [0, 1, 2], "variants": ["x=1", "x=2"],
-        "units": units, "failed": [], "maps": maps(units, over_trials(units)), "aggregate": aggregate(units)})
+    write_batch_report(tmp_path / "report.html", batch_of([
+        units_of(finished, name, seed, variant) for variant in ("x=1", "x=2") for name in ("a", "b")
+        for seed in (0, 1, 2)]))
     text = (tmp_path / "report.html").read_text()
     assert ">variant<" in text
     assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
@@ -246,25 +265,26 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
 
 
 def test_two_equal_plans_are_called_the_same_and_not_a_matter_of_luck(finished: Run) -> None:
-    half, safe = sorted(finished.summary["scenarios"], key=lambda s: str(s["name"]))
-    assert (half["vss"]["same_plan"], safe["vss"]["same_plan"]) == (False, True)
-    assert safe["vss"]["verdict"] == vss_verdict(safe) == "the same plan"
-    assert "same plan" in finding(safe)
+    half, safe = sorted(results_of(finished).scenarios, key=lambda s: s.name)
+    assert (half.vss.same_plan, safe.vss.same_plan) == (False, True)
+    assert safe.vss.verdict == vss_verdict(safe.vss) == "the same plan"
+    assert "same plan" in finding(safe.vss)
     assert answer(finished.summary).endswith("In safe both plans are the same.")
-    alone = {**finished.summary, "scenarios": [safe]}
+    alone = replace(results_of(finished), scenarios=(safe,))
     assert answer(alone) == "Planning for failures changes nothing here: both plans are the same."
     assert remarks(alone) == []
 
 
 def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished: Run) -> None:
     assert any("only 4 noise draws" in said for said in remarks(finished.summary))
-    assert not any("noise draws" in said for said in remarks({**finished.summary, "rollouts": 16}))
-    sure = {"vss": {"mean": 1.0, "ci95": [0.0, 2.0]}}
-    assert over_few_maps([{"maps": 10, **sure}]) == ""
-    assert "Over 9 maps only" in over_few_maps([{"maps": 10, **sure}, {"maps": 9, **sure}])
-    assert "all maps agree" in over_few_maps([{"maps": 2, "vss": {"mean": 1.0, "ci95": None}}])
+    assert not any("noise draws" in said for said in remarks(replace(finished.summary, rollouts=16)))
+    ten, nine = over_maps(10, (0.0, 2.0)), over_maps(9, (0.0, 2.0))
+    assert over_few_maps([ten]) == ""
+    assert "Over 9 maps only" in over_few_maps([ten, nine])
+    assert "all maps agree" in over_few_maps([over_maps(2, None)])
 
 
 def test_a_percentage_over_fewer_maps_says_over_how_many() -> None:
-    assert with_interval({"mean": 9.5, "ci95": None, "maps": 1}) == "9.5 (1 map)"
-    assert with_interval({"mean": 9.5, "ci95": [1.0, 18.0], "maps": 2}, unit=" %") == "9.5 % [1.0, 18.0] (2 maps)"
+    assert percentage(Percentage(mean=9.5, ci95=None, maps=1)) == "9.5 (1 map)"
+    assert percentage(Percentage(mean=9.5, ci95=(1.0, 18.0), maps=2)) == "9.5 [1.0, 18.0] (2 maps)"
+    assert percentage(Percentage(mean=None, ci95=None, maps=0)) == ""

@@ -13,8 +13,8 @@ from scipy.stats import beta
 from scipy.stats import t as student_t
 
 from sva_bench.analysis.moments import Bounds, Figure, figure_of
+from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.statistics import (
-    Estimate,
     bounded_mean,
     controlled,
     distribution,
@@ -24,12 +24,13 @@ from sva_bench.analysis.statistics import (
 )
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import FailureProcess
+from sva_bench.files.records import as_dict
 from sva_bench.mission.failures import NEVER, draw_failures, route_value
 
 
 def interval_of(found: Estimate) -> tuple[float, float]:
-    assert found.interval is not None
-    return found.interval
+    assert found.ci95 is not None
+    return found.ci95
 
 
 def drawn_only(values: FloatArray, bounds: Bounds) -> Figure:
@@ -85,21 +86,21 @@ def test_failures_and_noise_each_widen_the_interval_by_hand() -> None:
 @pytest.mark.parametrize(("trials", "draws"), [(1, 1), (5, 1)])
 def test_one_sample_carries_no_interval(trials: int, draws: int) -> None:
     found = estimate(taken_only(np.arange(float(trials)), 10.0, draws))
-    assert found.interval is None
-    assert not found.distinguishable
-    assert found.as_dict() == {"mean": -(trials - 1) / 2 + 0.0, "ci95": None}
-    assert controlled(taken_only(np.arange(float(trials)), 10.0, draws), 0.0).interval is None
+    assert found.ci95 is None
+    assert not found.excludes_zero
+    assert as_dict(found) == {"mean": -(trials - 1) / 2 + 0.0, "ci95": None}
+    assert controlled(taken_only(np.arange(float(trials)), 10.0, draws), 0.0).ci95 is None
 
 
 def test_an_interval_that_leaves_zero_out_is_distinguishable() -> None:
-    assert Estimate(mean=1.0, interval=(0.1, 1.9)).distinguishable
-    assert Estimate(mean=-1.0, interval=(-1.9, -0.1)).distinguishable
-    assert not Estimate(mean=1.0, interval=(0.0, 2.0)).distinguishable
-    assert not Estimate(mean=1.0, interval=(-0.1, 2.1)).distinguishable
+    assert Estimate(mean=1.0, ci95=(0.1, 1.9)).excludes_zero
+    assert Estimate(mean=-1.0, ci95=(-1.9, -0.1)).excludes_zero
+    assert not Estimate(mean=1.0, ci95=(0.0, 2.0)).excludes_zero
+    assert not Estimate(mean=1.0, ci95=(-0.1, 2.1)).excludes_zero
 
 
 def test_no_figure_is_written_as_minus_zero() -> None:
-    assert str(Estimate(mean=-0.0, interval=(-0.0, -0.0)).as_dict()) == "{'mean': 0.0, 'ci95': [0.0, 0.0]}"
+    assert str(as_dict(Estimate(mean=-0.0, ci95=(-0.0, -0.0)))) == "{'mean': 0.0, 'ci95': [0.0, 0.0]}"
 
 
 observations = st.integers(1, 40).flatmap(lambda n: arrays(np.float64, n, elements=st.floats(0, 1)))
@@ -179,7 +180,7 @@ def test_a_sample_of_maps_has_at_least_students_interval_by_hand() -> None:
 
 @pytest.mark.parametrize("figures", [[7.0], [0.0, 0.0, 0.0]])
 def test_one_map_or_maps_that_agree_leave_open_how_maps_differ(figures: list[float]) -> None:
-    assert sample_mean(figures).interval is None
+    assert sample_mean(figures).ci95 is None
 
 
 def test_an_empty_sample_is_refused() -> None:
@@ -192,8 +193,8 @@ def test_the_worst_tenth_by_hand() -> None:
     assert tail_mean(np.arange(15.0, 0, -1), 0.1) == pytest.approx(2 / 1.5)
     assert tail_mean(np.array([7.0]), 0.1) == 7.0
     found = distribution(np.arange(1.0, 101))
-    assert found == {"least": 1.0, "q05": 5.0, "q25": 25.0, "q50": 50.0, "q75": 75.0, "q95": 95.0, "greatest": 100.0,
-                     "cvar10": pytest.approx(5.5)}
+    assert as_dict(found) == {"least": 1.0, "q05": 5.0, "q25": 25.0, "q50": 50.0, "q75": 75.0, "q95": 95.0,
+                              "greatest": 100.0, "cvar10": pytest.approx(5.5)}
 
 
 @pytest.mark.parametrize("process", ["mission", "per_leg"])

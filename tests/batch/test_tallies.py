@@ -9,8 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sva_bench.analysis.moments import Figure, figure_from, figure_of, joined, pooled
+from sva_bench.analysis.moments import Figure, figure_of, joined, pooled
 from sva_bench.analysis.statistics import estimate
+from sva_bench.batch.schema import StoredFigure
+from sva_bench.batch.tallies import figure_from, stored_figure
+from sva_bench.files.records import as_dict, from_dict
 
 
 def part(drawn: list[float], taken: list[float], rollout: list[int]) -> Figure:
@@ -53,11 +56,12 @@ def test_a_joined_estimate_is_that_of_the_trials_themselves(
 
     def figure(chosen: slice) -> Figure:
         made = figure_of(drawn[chosen], (0.0, 1e3), taken[chosen], (0.0, 1e3), rollout[chosen], noisy=noisy)
-        return figure_from(json.loads(json.dumps(made.as_dict())))  # as shards keep it
+        text = json.dumps(as_dict(stored_figure(made)))  # as shards keep it
+        return figure_from(from_dict(StoredFigure, json.loads(text)))
 
     got, want = estimate(joined(figure(slice(cut)), figure(slice(cut, None)))), estimate(figure(slice(None)))
     # Sums of up to 60 figures of up to 1e3, in another order: 1e-9 is a thousand times their rounding.
     np.testing.assert_allclose(got.mean, want.mean, atol=1e-9)
-    assert got.interval is not None
-    assert want.interval is not None
-    np.testing.assert_allclose(got.interval, want.interval, atol=1e-5)
+    assert got.ci95 is not None
+    assert want.ci95 is not None
+    np.testing.assert_allclose(got.ci95, want.ci95, atol=1e-5)

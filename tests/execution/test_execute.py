@@ -185,8 +185,8 @@ def test_the_executed_mean_is_the_closed_form(small: Planned, process: FailurePr
     half = 4 * totals.std() / np.sqrt(len(totals))
     assert totals.mean() == pytest.approx(expected, abs=half)
     found = estimate(value_figure(done, noisy=False))
-    assert found.interval is not None
-    assert found.interval[0] < expected < found.interval[1]  # holds for this seed
+    assert found.ci95 is not None
+    assert found.ci95[0] < expected < found.ci95[1]  # holds for this seed
 
 
 def test_a_joint_distribution_is_executed_as_drawn(small: Planned) -> None:

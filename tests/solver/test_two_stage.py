@@ -30,7 +30,7 @@ from sva_bench.solver import solve as solving
 from sva_bench.solver.columns import column_generation
 from sva_bench.solver.flow import branch_and_cut
 from sva_bench.solver.flow.expected import euler_walk
-from sva_bench.solver.highs import Outcome, maximise
+from sva_bench.solver.highs import MipResult, maximise
 from sva_bench.solver.knowledge import SolveLimits
 from sva_bench.solver.preprocess import is_metric, scope_of
 from sva_bench.solver.routes.heuristic import Found
@@ -282,7 +282,7 @@ def test_ctrl_c_keeps_the_best_plan_so_far(
 
 
 def test_ctrl_c_during_branch_and_bound_ends_it_with_what_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*arguments: Any, **options: Any) -> Outcome:
+    def interrupted(*arguments: Any, **options: Any) -> MipResult:
         Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
         return maximise(*arguments, **options)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.solver.highs import Outcome, Relaxation, Relaxed
+from sva_bench.solver.highs import MipResult, Relaxation, Relaxed
 from sva_bench.solver.program import LinearModel, RowBuilder
 from sva_bench.solver.risk import Risk
 
@@ -211,7 +211,7 @@ class Master:
         return float(duals.visit.sum() + duals.floor @ self.floors + duals.cut.sum()
                      + counts @ np.maximum(best, 0.0))
 
-    def solve_integer(self, time_limit_s: float) -> Outcome:
+    def solve_integer(self, time_limit_s: float) -> MipResult:
         """The best integer choice of columns; the program is lost by it."""
         return self._program.solve_integer(np.arange(self.others, self.others + len(self.entries)), time_limit_s)
 

@@ -16,7 +16,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.cuts import violated_by_fractions, violated_by_integers
-from sva_bench.solver.highs import Outcome, Relaxation, maximise
+from sva_bench.solver.highs import MipResult, Relaxation, maximise
 from sva_bench.solver.knowledge import Cut, adopt, without_idle_stops
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.program import LinearModel, Rows
@@ -143,7 +143,7 @@ def _branch(flow: FlowModel, problem: Problem, model: LinearModel, size: float, 
         _log.debug("branch: bound %.6g, value %.6g, %d cuts broken", progress.bound, progress.value, len(broken))
 
 
-def _integers(flow: FlowModel, problem: Problem, outcome: Outcome) -> list[Cut]:
+def _integers(flow: FlowModel, problem: Problem, outcome: MipResult) -> list[Cut]:
     """Take up an integer solution, as far as it is connected with the base; the cuts that it breaks."""
     if outcome.values is None:
         return []

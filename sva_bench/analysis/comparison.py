@@ -1,0 +1,58 @@
+"""Plans from anywhere, compared pair by pair and ranked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from sva_bench.analysis.figures import difference_figure
+from sva_bench.analysis.results import ComparedScenario, Comparison, GivenPlanResult, Ranked
+from sva_bench.analysis.statistics import estimate
+from sva_bench.analysis.summary import Judged, plan_result, totals, verdict_of
+from sva_bench.choices import ENDS
+from sva_bench.execution.execute import Executed
+
+
+def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy: bool) -> ComparedScenario:
+    """One scenario in which plans from anywhere were executed: every pair compared, trial by trial.
+
+    A pair is distinguishable where the interval that is adjusted for the number of pairs leaves zero out.
+    """
+    scenario = plans[0].executed.case.scenario
+    pairs = list(combinations([judged.executed for judged in plans], 2))
+    comparisons = [_comparison(a, b, len(pairs), noisy=noisy) for a, b in pairs]
+    return ComparedScenario(
+        name=scenario.name, availability={name: scenario.availability[name] for name in robots},
+        plans={judged.executed.case.planner: GivenPlanResult(
+            **vars(plan_result(judged.promise, judged.executed, noisy=noisy)), feasible=judged.feasible,
+            lost=lost(judged.executed)) for judged in plans},
+        comparisons=tuple(comparisons),
+        ranking=ranking({p.executed.case.planner: float(np.mean(totals(p.executed))) for p in plans}, comparisons))
+
+
+def _comparison(a: Executed, b: Executed, pairs: int, *, noisy: bool) -> Comparison:
+    beyond = difference_figure(a, b, noisy=noisy)
+    alone, together = estimate(beyond), estimate(beyond, comparisons=pairs)
+    names = a.case.planner, b.case.planner
+    same = a.case.plan.drives_like(b.case.plan)
+    return Comparison(a=names[0], b=names[1], mean=alone.mean, ci95=alone.ci95, ci95_adjusted=together.ci95,
+                      distinguishable=together.excludes_zero, same_plan=same,
+                      verdict=verdict_of(together, *names, same=same))
+
+
+def lost(run: Executed) -> int:
+    """How many robot missions of all trials ended along the route: by failing, out of fuel or stuck."""
+    along = (run.end == ENDS.index("failed")) & (run.stops_reached > 0)
+    return int((along | (run.end == ENDS.index("out_of_fuel")) | (run.end == ENDS.index("stuck"))).sum())
+
+
+def ranking(means: Mapping[str, float], comparisons: Sequence[Comparison]) -> tuple[Ranked, ...]:
+    """Plans from best to worst; a plan's rank is one more than the number of plans that are distinguishably better."""
+    better = dict.fromkeys(means, 0)
+    for pair in comparisons:
+        if pair.distinguishable:
+            better[pair.b if pair.mean > 0 else pair.a] += 1
+    return tuple(Ranked(rank=better[name] + 1, plan=name, mean=mean + 0.0)
+                 for name, mean in sorted(means.items(), key=lambda item: (better[item[0]], -item[1])))

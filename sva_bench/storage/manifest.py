@@ -1,0 +1,74 @@
+"""``manifest.json`` of a run: what was run, with what, where and how long."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field
+
+from sva_bench import __version__
+from sva_bench.analysis.results import Amount, Words
+from sva_bench.files.fields import Seed, WholeNumber
+from sva_bench.files.records import Record
+from sva_bench.files.versions import library_versions
+from sva_bench.workers.pool import usable_cores
+
+MANIFEST: Literal["sva-bench/manifest@1"] = "sva-bench/manifest@1"
+
+
+def _is_text(value: object) -> object:
+    if not isinstance(value, str):
+        raise ValueError("expected a word")
+    return value
+
+
+AnyText = Annotated[Any, AfterValidator(_is_text)]
+"""Of the command line, which may hold what is no UTF-8."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine(Record):
+    """Where it was run."""
+
+    platform: Words
+    python: Words
+    cpus: WholeNumber
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest(Record):
+    """What was run; the only place for wall-clock times.
+
+    Attributes:
+        version, packages: Of the program, and of what results depend on.
+        seed, options: All that it was told.
+        command, started, seconds: As it was called, when, and how long each phase took.
+        machine: Where it was run.
+        world: The resolved world, a document of its own; it is checked as any world is.
+    """
+
+    format: Literal["sva-bench/manifest@1"] = MANIFEST
+    version: Words
+    seed: Seed
+    options: Mapping[str, Any]
+    command: Annotated[tuple[AnyText, ...], Field(max_length=10_000)]
+    started: Words
+    seconds: Mapping[str, Amount]
+    machine: Machine
+    packages: Mapping[Words, Words]
+    world: Mapping[str, Any]
+
+
+def manifest_of(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
+                seconds: Mapping[str, float]) -> Manifest:
+    """The manifest of a run of this process."""
+    return Manifest(
+        version=__version__, seed=seed, options=options, command=("sva-bench", *sys.argv[1:]), started=started,
+        seconds={phase: round(taken, 3) for phase, taken in seconds.items()},
+        machine=Machine(platform=platform.platform(), python=platform.python_version(),
+                        cpus=usable_cores()),
+        packages=library_versions(), world=world)

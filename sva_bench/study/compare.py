@@ -1,0 +1,65 @@
+"""Plans from anywhere, executed in one world and compared pair by pair."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import replace
+from pathlib import Path
+
+from sva_bench.analysis.comparison import comparison_summary
+from sva_bench.analysis.summaries import ComparisonSummary
+from sva_bench.analysis.summary import Judged
+from sva_bench.execution.execute import Case, Executed, execute
+from sva_bench.mission.certify import certify, expected_value
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.plan import Plan
+from sva_bench.study.costs import instance_of, reach_of
+from sva_bench.study.options import Options, settings_of
+from sva_bench.study.planning import unlimited
+from sva_bench.study.publish import Run, Stopwatch, publish
+from sva_bench.study.run import refuse_too_many_rows
+from sva_bench.study.summing import by_case, head_of
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.workers.progress import OnProgress
+from sva_bench.world.model import World
+
+
+def execute_plans(
+    world: World, plans: Mapping[str, Plan], options: Options, out: Path, executor: Executor | None,
+    progress: OnProgress, costs: Mapping[str, FuelCosts],
+) -> Run:
+    """Execute plans from anywhere and compare them, pair by pair.
+
+    Args:
+        world: The world.
+        plans: The plans by the name they go by; feasible, or meant to be seen failing.
+        options: Seed, trials, rollouts, fidelity; what solvers are told is not used.
+        out, executor, progress: As for ``run``.
+        costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
+    """
+    refuse_too_many_rows(world, options.trials, len(plans))
+    clock = Stopwatch()
+    settings = settings_of(world, options)
+    cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
+             for name, plan in plans.items()]
+    with clock.phase("execution"):
+        executed = execute(world, costs, cases, settings, executor,
+                           lambda done, of: progress("driving routes", done, of))
+    runs, instances = by_case(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
+    robots = [robot.name for robot in world.robots]
+    summary = ComparisonSummary(
+        **vars(head_of(world, settings, costs, reproducible=True)), reach=reach_of(world, costs),
+        scenarios=tuple(comparison_summary(
+            [_judged(world, instances[s.name], plan, runs[s.name, name]) for name, plan in plans.items()], robots,
+            noisy=not world.noise.silent) for s in world.scenarios))
+    return publish(world, options, costs, instances, executed, summary, out, clock, progress,
+                   identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
+                                       for name, plan in plans.items()}})
+
+
+def _judged(world: World, instance: Instance, plan: Plan, run: Executed) -> Judged:
+    """A plan's trials beside its value if fuel and limits allow its routes: it may be here to be seen failing."""
+    truth = unlimited(replace(instance, failure=world.execute_failure))
+    return Judged(expected=expected_value(truth, plan), executed=run,
+                  feasible=certify(instance, replace(plan, value=None)).feasible)
