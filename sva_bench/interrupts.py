@@ -169,9 +169,19 @@ def _on_ctrl_c(signum: int, frame: FrameType | None) -> None:
     if not (_blocks[-1] or (len(_blocks) > 1 and _blocks[-2] and _compiling(frame))):
         return
     _remind()
-    in_llvm = frame is not None and "llvmlite" in frame.f_code.co_filename  # its callbacks swallow it: once more soon
-    if not (in_llvm or _on_its_way()):
+    if not (_swallowed(frame) or _on_its_way()):  # else once more soon
         raise KeyboardInterrupt
+
+
+def _swallowed(frame: FrameType | None) -> bool:
+    """Whether what is raised here goes no further: in a callback of llvmlite, or where an object is being deleted."""
+    if frame is not None and "llvmlite" in frame.f_code.co_filename:
+        return True
+    while frame is not None:
+        if frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _on_its_way() -> bool:

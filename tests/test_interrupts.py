@@ -228,3 +228,29 @@ def test_a_signal_at_the_very_end_does_not_change_the_exit_code() -> None:
     done = subprocess.run([sys.executable, "-c", AT_THE_END], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("sva-bench ")
+
+
+class Deleted:
+    """What presses Ctrl-C while it is deleted, where Python prints what is raised and goes on."""
+
+    def __del__(self) -> None:
+        self.close()
+
+    def close(self) -> None:
+        press()
+        time.sleep(0.2)  # it is pressed again meanwhile
+
+
+def test_ctrl_c_while_an_object_is_deleted_is_heard_afterwards_and_nothing_is_printed(
+    monkeypatch: pytest.MonkeyPatch
+) -> None:
+    swallowed: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", swallowed.append)
+
+    def delete_and_wait() -> None:
+        Deleted()
+        time.sleep(5)
+
+    with pytest.raises(KeyboardInterrupt), as_ctrl_c():
+        delete_and_wait()
+    assert swallowed == []
