@@ -29,6 +29,11 @@ Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]
+EngineName = Literal["ideal", "bullet"]
+PolicyName = Literal["none"]
+"""What a team does about news."""
+News = Literal["never"]
+"""When a team learns of a failure."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
 EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]

@@ -18,7 +18,9 @@ from sva_bench.analysis.statistics import estimate, sample_mean
 from sva_bench.analysis.summary import totals
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
-from sva_bench.execution.execute import Case, Drives, Settings, execute
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import execute
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.instance import Instance
@@ -134,7 +136,7 @@ def simulation(
         own = replace(settings, rollouts=1 if world.noise.silent else settings.rollouts)
         cases = [Case(scenario=scenario, planner=name, plan=getattr(planned[scenario.name], name))
                  for scenario in world.scenarios for name in ("stochastic", "deterministic")]
-        drives: Drives = {}
+        drives = Drives()
         found: dict[str, dict[str, Any]] = {s.name: {"world": world.name, "scenario": s.name} for s in world.scenarios}
         processes: tuple[FailureProcess, ...] = ("per_leg", "mission")
         for process in processes:

@@ -130,7 +130,9 @@ def leg_columns(executed: Sequence[Executed]) -> dict[str, list[Any]]:
         for leg in run.legs:
             rows["scenario"].append(run.case.scenario.name)
             rows["planner"].append(run.case.planner)
-            for key in LEG_COLUMNS[2:]:
+            rows["policy"].append(run.case.policy)
+            rows["news"].append(run.case.news)
+            for key in LEG_COLUMNS[4:]:
                 rows[key].append(getattr(leg, key))
     return rows
 

@@ -10,7 +10,9 @@ from typing import Any
 from sva_bench.analysis.figures import difference_figure, value_figure
 from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import FailureProcess
-from sva_bench.execution.execute import Case, Drives, Settings, execute
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import execute
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan

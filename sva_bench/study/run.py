@@ -10,7 +10,9 @@ from typing import Any
 
 from sva_bench.analysis.summary import Judged, comparison_summary
 from sva_bench.errors import BadInput
-from sva_bench.execution.execute import Case, Drives, Executed, execute
+from sva_bench.execution.case import Case
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import Executed, execute
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.plan import Plan
 from sva_bench.study.assumptions import cross_table
@@ -63,7 +65,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
                   if (worst := planned[scenario.name].worst) is not None]
     cases += [case for scenario in world.scenarios if (known := planned[scenario.name].informed) is not None
               for case in cases_of(scenario, known)]
-    drives: Drives = {}
+    drives = Drives()
     reach = reach_of(world, costs)
     while True:
         settings = settings_of(world, options)

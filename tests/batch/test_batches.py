@@ -33,15 +33,15 @@ SABOTAGE = """
 import sys
 if "sva_bench.workers.far_end" in sys.orig_argv:
     import ctypes, time
-    from sva_bench.execution.engines.bullet import Simulator
-    start = Simulator.__init__
-    def sabotaged(self, obstacles, *others):
+    from sva_bench.execution import drives
+    near = drives.solids_near
+    def sabotaged(obstacles, *others):
         if len(obstacles.cylinders) == 2:
             ctypes.string_at(0)
         if len(obstacles.cylinders) == 3:
             time.sleep(600)
-        start(self, obstacles, *others)
-    Simulator.__init__ = sabotaged
+        return near(obstacles, *others)
+    drives.solids_near = sabotaged
 """
 
 
