@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from sva_bench.choices import ENDS
+from sva_bench.choices import ENDS, NEWS, POLICY_NAMES
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.atomic import draft_file
 from sva_bench.files.documents import read_json
@@ -122,7 +122,8 @@ def read_content(folder: Path) -> Content:
             raise document.error(("scenarios", number, "availability"), "not that of the world in manifest.json")
     plans = {(s.name, name): plan.executed.mean for s in summary.scenarios for name, plan in s.plans.items()}
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
-             "robot": frozenset(first.availability), "end": frozenset(ENDS), "fidelity": frozenset((summary.fidelity,))}
+             "robot": frozenset(first.availability), "end": frozenset(ENDS), "policy": frozenset(POLICY_NAMES),
+             "news": frozenset(NEWS), "fidelity": frozenset((summary.fidelity,))}
     _check_outcomes(folder / "outcomes.parquet", plans, summary.trials, len(first.availability), words)
     foreign = "comparisons" in document.data["scenarios"][0]
     stems = {(scenario, name): stem_of(scenario, name, foreign=foreign) for scenario, name in plans}
