@@ -20,15 +20,11 @@ from sva_bench.analysis.figures import difference_figure, end_figures, value_fig
 from sva_bench.analysis.statistics import Estimate, controlled, estimate
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End, FailureProcess
-from sva_bench.execution.execute import (
-    Case,
-    Drives,
-    Settings,
-    drive_route,
-    drives_ahead,
-    settle_trials,
-)
-from sva_bench.execution.outcome import Assignment, settle
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.drives import RouteKey, drive_tasks
+from sva_bench.execution.execute import drives_ahead, settle_trials
+from sva_bench.execution.outcome import Assignment, Driven
+from sva_bench.execution.rules import settle
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.plan import Route
@@ -57,7 +53,7 @@ class Population:
     world: World
     cases: tuple[Case, ...]
     expected: Mapping[tuple[str, str], float]
-    drives: Drives
+    drives: Mapping[RouteKey, Driven]
     draws: int
 
 
@@ -73,9 +69,9 @@ def population(world: World, draws: int) -> Population:
             truth = replace(plans.instance, failure=world.execute_failure)
             expected[scenario.name, name] = expected_value(truth, plan)
     settings = Settings(seed=10_000, trials=draws, rollouts=draws, fidelity="kinematic", recorded=False)
-    tasks = drives_ahead(world, costs, tuple(cases), settings)
+    ahead = drives_ahead(world, costs, tuple(cases), settings)
     return Population(world=world, cases=tuple(cases), expected=expected, draws=draws,
-                      drives={key: drive_route(task) for key, task in tasks.items()})
+                      drives=ahead.routes([drive_tasks(chunk.tasks) for chunk in ahead.chunks]))
 
 
 class Truths:

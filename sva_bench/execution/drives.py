@@ -34,14 +34,14 @@ from sva_bench.world.model import Site, World
 
 TRACE_HZ = 20.0
 _CHUNK: Mapping[Fidelity, int] = {"kinematic": 16, "rollout": 8, "physics": 1}
-"""Noise draws under which a worker drives a course at a time: a tenth of a second's work, so handing it out is small."""
+"""Noise draws under which a worker drives a course at a time: a tenth of a second's work; handing it out is small."""
 
 Hop = tuple[Stretch, ...]
 Leg = tuple[Hop, ...]
 """A leg of a route: the hops of the chain that its repaired cost stands for."""
 
 RouteKey = tuple[str, Route, int, int]
-"""Robot, stops driven, rollout, and the trial under ``physics``, else 0: what a route driven depends on in one world."""
+"""Robot, stops driven, rollout, and the trial under ``physics``, else 0: what a driven route depends on in a world."""
 
 HopKey = tuple[str, Disturbance, str, str]
 """Robot model, disturbance, origin and destination: what a hop depends on in one world."""
@@ -173,7 +173,7 @@ def _drive_legs(task: DriveTask, drive: HopDriver, poses: list[Pose]) -> Driven:
             break
     return Driven(
         leg_s=np.array(times), stuck=not arrived, contacts=np.array(contacts, dtype=np.int64),
-        leg_of=np.repeat(np.arange(len(at), dtype=np.float64), np.array([len(clock) for clock, _ in at], dtype=np.int64)),
+        leg_of=np.concatenate([np.empty(0), *(np.full(len(clock), float(leg)) for leg, (clock, _) in enumerate(at))]),
         clock_s=np.concatenate([np.empty(0), *(clock for clock, _ in at)]),
         pose=np.concatenate([np.empty((0, 3)), *(pose for _, pose in at)]))
 

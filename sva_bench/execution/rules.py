@@ -1,8 +1,8 @@
 """The rules of a mission, event by event: a robot departs, drives, runs dry or gets stuck, arrives, stops, comes home.
 
-They are here and nowhere else. ``settle`` plays one robot that keeps its orders; ``play`` a team whose policy may change
-what is left of them whenever a robot stands at a stop, its stop time over (an epoch). Nothing here knows an engine: what
-a leg takes is given.
+They are here and nowhere else. ``settle`` plays one robot that keeps its orders; ``play`` a team whose policy may
+change what is left of them whenever a robot stands at a stop, its stop time over (an epoch). Nothing here knows an
+engine: what a leg takes is given.
 """
 
 from __future__ import annotations
@@ -163,8 +163,8 @@ def play(
 ) -> list[Outcome]:
     """Play a team's mission: at each epoch the policy says what is left of each robot's orders.
 
-    Epochs come by time, at equal times by the robot's position. Legs are atomic: a robot is at its next epoch as soon as
-    it has departed, and its remaining orders begin from there. A robot at home has no more epochs.
+    Epochs come by time, at equal times by the robot's position. Legs are atomic: a robot is at its next epoch as soon
+    as it has departed, and its remaining orders begin from there. A robot at home has no more epochs.
 
     Args:
         orders: Orders that each robot begins with, length (robots,).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import get_args
 
 import numpy as np
@@ -101,7 +102,7 @@ def legs_of(number: int, origin: str, destination: str) -> LegDriven:
 
 
 def driven(number: int, route: tuple[str, ...]) -> Driven:
-    times = [TIMES[leg] + number for leg in zip(route, route[1:], strict=False)]
+    times = [TIMES[leg] + number for leg in pairwise(route)]
     return Driven(leg_s=np.array(times), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
 
 

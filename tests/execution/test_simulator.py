@@ -150,7 +150,7 @@ def test_the_bounds_are_walls() -> None:
     for end in ((3.4, 1.5), (-0.4, 1.5), (1.5, 3.4), (1.5, -0.4)):
         driven = ahead(empty, (1.5, 1.5), end)
         assert driven.stuck
-        # At full speed it is 11 mm further after a step of physics, and only then a wall is felt; a step later it is out.
+        # At full speed it is 11 mm further after a step of physics, and only then feels a wall; a step later it is out.
         assert points_clearance(empty, driven.pose[:, :2]).min() > TURTLEBOT.radius_m - 0.013
         assert points_clearance(empty, driven.pose[-1:, :2])[0] > TURTLEBOT.radius_m - 0.001
         assert driven.contacts[0] >= 1
