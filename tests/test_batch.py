@@ -172,7 +172,7 @@ def test_a_plan_that_cannot_be_driven_is_refused_even_if_infeasible_ones_are_all
 
 
 @pytest.mark.parametrize("process", [pytest.param("mission", marks=pytest.mark.long), "per_leg"])
-def test_physics_trial_by_trial_equals_rollouts_cut_off(process: str, tmp_path: Path) -> None:
+def test_physics_trial_by_trial_is_what_composed_rollouts_cut_off_come_to(process: str, tmp_path: Path) -> None:
     tables = []
     for fidelity in ("rollout", "physics"):
         done = sva_bench("run", world_file(tmp_path), "--trials", 6, "--rollouts", 2, "--fidelity", fidelity,
@@ -180,4 +180,7 @@ def test_physics_trial_by_trial_equals_rollouts_cut_off(process: str, tmp_path: 
         assert done.returncode == 0, done.stderr
         (run,) = (tmp_path / fidelity).iterdir()
         tables.append(pq.read_table(run / "outcomes.parquet").drop_columns(["fidelity"]))
-    assert tables[0].equals(tables[1])  # to the last bit: robots are independent
+    times = ["end_time_s", "fuel_used_s"]
+    assert tables[0].drop_columns(times).equals(tables[1].drop_columns(times))
+    for name in times:  # composed routes are within 0.3 % of whole ones, legs within 2 %
+        np.testing.assert_allclose(tables[0][name], tables[1][name], rtol=0.01, atol=0.05)
