@@ -53,6 +53,7 @@ class Fake:
         self._held.append((key, job))
 
     def answers(self, timeout_s: float) -> Sequence[tuple[str, Answer]]:
+        assert timeout_s > 0
         key, job = self._held.pop()
         return [(key, self._answer(job))]
 
@@ -80,7 +81,8 @@ def conduct(folder: Path, engine: Fake, strands: Sequence[Sums]) -> list[tuple[s
 def summing(found: list[Any], steps: Sequence[Sequence[Add]]) -> Sums:
     """A strand that asks for the jobs of each step, and keeps what it is given."""
     for step in steps:
-        found.append((yield list(step)))
+        results = yield list(step)
+        found += [results]
 
 
 def test_results_come_in_the_order_asked_for_and_step_by_step(tmp_path: Path) -> None:

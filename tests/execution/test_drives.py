@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.choices import Fidelity
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.drives import Courses, Drives, composed, drive_all
+from sva_bench.execution.drives import Courses, Drives, RouteKey, composed, drive_all
 from sva_bench.execution.execute import Executed, execute
 from sva_bench.execution.noise import Disturbance, draw_disturbance
 from sva_bench.execution.outcome import Driven
@@ -120,7 +120,7 @@ def test_a_repaired_leg_is_driven_as_its_hops(small: Planned) -> None:
 def test_what_workers_are_handed_has_one_course_and_follows_the_number_of_the_noise_draw(small: Planned) -> None:
     def keys_of(rollouts: int) -> list[tuple[object, ...]]:
         courses = Courses(small.world, small.costs, settings_of("rollout", rollouts))
-        wanted = {("uv1", THERE, k, 0): False for k in range(rollouts)}
+        wanted: dict[RouteKey, bool] = {("uv1", THERE, k, 0): False for k in range(rollouts)}
         return [chunk.keys for chunk in courses.chunks(wanted, Drives())]
 
     few, many = keys_of(8), keys_of(16)
