@@ -21,15 +21,11 @@ from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.statistics import controlled, estimate
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End, FailureProcess
-from sva_bench.execution.execute import (
-    Case,
-    Drives,
-    Settings,
-    drive_route,
-    drives_ahead,
-    settle_trials,
-)
-from sva_bench.execution.outcome import Assignment, settle
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.drives import RouteKey, drive_tasks
+from sva_bench.execution.execute import drives_ahead, settle_trials
+from sva_bench.execution.outcome import Assignment, Driven
+from sva_bench.execution.rules import settle
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.plan import Route
@@ -59,7 +55,7 @@ class Population:
     world: World
     cases: tuple[Case, ...]
     expected: Mapping[tuple[str, str], float]
-    drives: Drives
+    drives: Mapping[RouteKey, Driven]
     draws: int
 
 
@@ -75,9 +71,9 @@ def population(world: World, draws: int) -> Population:
             truth = replace(plans.instance, failure=world.execute_failure)
             expected[scenario.name, name] = expected_value(truth, plan)
     settings = Settings(seed=10_000, trials=draws, rollouts=draws, fidelity="kinematic", recorded=False)
-    tasks = drives_ahead(world, costs, tuple(cases), settings)
+    ahead = drives_ahead(world, costs, tuple(cases), settings)
     return Population(world=world, cases=tuple(cases), expected=expected, draws=draws,
-                      drives={key: drive_route(task) for key, task in tasks.items()})
+                      drives=ahead.routes([drive_tasks(chunk.tasks) for chunk in ahead.chunks]))
 
 
 class Truths:

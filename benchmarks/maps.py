@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.execute import DriveTask, drive_route
+from sva_bench.execution.drives import DriveTask, drive_route
 from sva_bench.geometry.buckets import open_heading
 from sva_bench.geometry.cells import Cells, bounds_of, boxes_of, connected_region, distance_field
 from sva_bench.geometry.obstacles import Obstacles
@@ -92,7 +92,7 @@ def measure(size: int) -> None:
         task = DriveTask(
             obstacles=world.obstacles, model=model, start=(base.x_m, base.y_m, base.heading_rad),
             legs=((costs.times.course("base", longest),), (costs.times.course(longest, "base"),)),
-            wheel_gains=(1.0, 1.0), fidelity="rollout", traced=False)
+            fidelity="rollout", traced=False)
         begun = time.process_time()
         driven = drive_route(task)
         ratios.append(driven.leg_s.sum() / (time.process_time() - begun))

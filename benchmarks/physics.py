@@ -10,7 +10,7 @@ import time
 from itertools import pairwise
 from pathlib import Path
 
-from sva_bench.execution.execute import DriveTask, drive_route
+from sva_bench.execution.drives import DriveTask, drive_route
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.load import load_world
 
@@ -26,7 +26,7 @@ def main() -> None:
     base = world.sites[0]
     task = DriveTask(
         obstacles=world.obstacles, model=model, start=(base.x_m, base.y_m, base.heading_rad),
-        legs=tuple((times.course(a, b),) for a, b in pairwise(ROUTE)), wheel_gains=(1.0, 1.0),
+        legs=tuple((times.course(a, b),) for a, b in pairwise(ROUTE)),
         fidelity="rollout", traced=False)
     drive_route(task)  # compiles
     ratios = []

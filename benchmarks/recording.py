@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sva_bench.execution.outcome import Assignment, Driven, Trace, settle, trace_of
+from sva_bench.execution.outcome import Assignment, Driven, Trace, trace_of
+from sva_bench.execution.rules import settle
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.recording.rerun import record
 from sva_bench.robot.model import BUILT_IN

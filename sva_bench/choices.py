@@ -40,6 +40,13 @@ Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]
+EngineName = Literal["ideal", "bullet"]
+PolicyName = Literal["none"]
+"""What a team does about news."""
+POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
+News = Literal["never"]
+"""When a team learns of a failure."""
+NEWS: tuple[News, ...] = get_args(News)
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
 Role = Literal["stochastic", "deterministic", "informed", "informed_part", "worst_tie", "given"]

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.execution.execute import drive_route
+from sva_bench.execution.drives import drive_route
 from sva_bench.robot.model import BUILT_IN
 from tests.execution.test_simulator import random_tour
 from tests.worlds_for_tests import SMALL
@@ -32,7 +32,8 @@ COLUMNS = {
         "scenario": "82a9d95a66f4", "planner": "71ff4b4b22ca", "trial": "ac7cbb35791d", "rollout": "3da3058e23b4",
         "robot": "2c20deae8ef0", "available": "4cd08a814a67", "incentive": "3291f21fb9eb",
         "pois_reached": "693240f6d26c", "stops_reached": "21fc1ebe1349", "end": "3fa3f34f4c5b",
-        "end_time_s": "c22993b71f64", "fuel_used_s": "2476f38eebf5"},
+        "end_time_s": "c22993b71f64", "fuel_used_s": "2476f38eebf5", "lost": "8f8d96e13973", "value": "3291f21fb9eb",
+        "policy": "6583bce6148f", "news": "3df978043c5e", "waited_s": "2d4f631f7ac1", "contacts": "e2236e604753"},
 }
 
 
@@ -67,10 +68,10 @@ def test_rows_are_those_of_every_other_python(table: str, folder: Path) -> None:
 
 # Leg times [s], which are counted in steps, and the last pose [m, m, rad].
 DRIVES = {
-    ("turtlebot2", 4): ([542 / 60, 855 / 60, 553 / 60, 750 / 60], [2.3777057848, 0.7419886771, 0.7083913042]),
-    ("turtlebot2", 9): ([749 / 60, 595 / 60, 626 / 60, 440 / 60], [2.7245074959, 5.5220025717, -0.1100172150]),
-    ("turtlebot3_burger", 1): ([466 / 60, 1130 / 60, 631 / 60, 752 / 60], [7.0989432682, 2.6602612857, 2.0977657473]),
-    ("turtlebot3_waffle", 2): ([465 / 60, 764 / 60, 1849 / 60, 1446 / 60], [3.4351615389, 3.5056648721, -2.7051567893]),
+    ("turtlebot2", 4): ([542 / 60, 856 / 60, 554 / 60, 748 / 60], [2.3776952881, 0.7420446181, 0.7061962646]),
+    ("turtlebot2", 9): ([749 / 60, 595 / 60, 626 / 60, 440 / 60], [2.7245088882, 5.5219178307, -0.1122346162]),
+    ("turtlebot3_burger", 1): ([468 / 60, 1132 / 60, 633 / 60, 753 / 60], [7.0989902664, 2.6601253815, 2.097229638]),
+    ("turtlebot3_waffle", 2): ([465 / 60, 768 / 60, 1853 / 60, 1447 / 60], [3.4349797093, 3.5058461064, -2.7076054723]),
 }
 
 

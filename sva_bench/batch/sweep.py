@@ -246,7 +246,7 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
 
 def _options_of(sweep: Sweep) -> Options:
     return Options(
-        trials=sweep.trials or 1000, rollouts=sweep.rollouts or 8, fidelity=sweep.fidelity or "rollout",
+        trials=sweep.trials or 1000, rollouts=sweep.rollouts or 32, fidelity=sweep.fidelity or "rollout",
         limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap),
         evpi=bool(sweep.evpi))
 

@@ -60,7 +60,7 @@ def over(
                                                show_default="1000")] = None,
     rollouts: Annotated[int | None, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod "
                                                  "ROLLOUTS.", show_default="8")] = None,
-    fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per route and "
+    fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per leg and "
                                                       "noise draw; or every trial in physics.",
                                                       show_default="rollout")] = None,
     planner: Annotated[list[str] | None, typer.Option(

@@ -51,7 +51,7 @@ Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of failures 
 Trials = Annotated[int, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.")]
 Rollouts = Annotated[int, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod ROLLOUTS.")]
 FidelityOption = Annotated[Fidelity, typer.Option(
-    help="The kinematic twin alone; physics once per route and noise draw; or every trial in physics.")]
+    help="The kinematic twin alone; physics once per leg and noise draw; or every trial in physics.")]
 ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",
                                                          show_default="all")]
 PlanFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that plans are made for.",

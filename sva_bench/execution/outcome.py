@@ -1,16 +1,14 @@
-"""What comes of a driven route: who got how far, when, and with what. Pure functions of driven times."""
+"""What a robot is told to do, what it drove, and what came of it: the types, and the trace of a mission."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from sva_bench.arrays import FloatArray, frozen
+from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.choices import End, EventKind
-from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
 
 
@@ -25,6 +23,7 @@ class Driven:
         leg_of: Leg that each pose belongs to, shape (poses,); empty unless traced.
         clock_s: Driving time at each pose since its leg began [s], shape (poses,).
         pose: x, y [m], yaw [rad] over time, shape (poses, 3).
+        contacts: How many times the hull came to touch an obstacle on each leg, shape (legs,); none unless given.
     """
 
     leg_s: FloatArray
@@ -32,9 +31,13 @@ class Driven:
     leg_of: FloatArray
     clock_s: FloatArray
     pose: FloatArray
+    contacts: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         n = len(self.clock_s)
+        if not len(self.contacts):
+            object.__setattr__(self, "contacts", np.zeros(len(self.leg_s), dtype=np.int64))
+        object.__setattr__(self, "contacts", frozen_int(self.contacts, (len(self.leg_s),)))
         object.__setattr__(self, "leg_s", frozen(self.leg_s, (None,)))
         object.__setattr__(self, "leg_of", frozen(self.leg_of, (n,)))
         object.__setattr__(self, "clock_s", frozen(self.clock_s, (n,)))
@@ -85,81 +88,26 @@ class Outcome:
     Attributes:
         available: Whether it was never drawn to fail.
         incentive: What it collected.
+        lost: Whether it failed on its way, ran out of fuel or got stuck: it doesn't come home.
         pois_reached: POIs it reached, those too late to earn anything included.
         stops_reached: Stops it reached, the base at the end included.
         end: How it ended.
         end_time_s: When [s on the mission clock].
         fuel_used_s: Fuel of the whole mission [s of driving].
+        contacts: How many times its hull came to touch an obstacle; on a leg that it ran dry on, all of that leg.
         events: What happened, in order.
     """
 
     available: bool
     incentive: float
+    lost: bool
     pois_reached: int
     stops_reached: int
     end: End
     end_time_s: float
     fuel_used_s: float
+    contacts: int
     events: tuple[Event, ...]
-
-
-def settle(orders: Assignment, driven: Driven, fails_before: int = NEVER) -> Outcome:
-    """What comes of a driven route under the rules of the mission.
-
-    A POI is collected when its stop is over, if that is within the mission limit. A late robot drives on and earns
-    nothing more. Fuel burns while driving; the tank is filled at each station's stop.
-
-    Args:
-        orders: Route and rules.
-        driven: Driving time of its legs, at least of those before a failure.
-        fails_before: 0: fails before leaving the base; k: on leaving its last stop for the k-th POI; ``NEVER``.
-    """
-    available = fails_before == NEVER
-    if not orders.route:
-        return Outcome(available=available, incentive=0.0, pois_reached=0, stops_reached=0, end="home", end_time_s=0.0,
-                       fuel_used_s=0.0, events=())
-    base = orders.route[0]
-    if fails_before == 0:
-        return Outcome(available=False, incentive=0.0, pois_reached=0, stops_reached=0, end="failed", end_time_s=0.0,
-                       fuel_used_s=0.0, events=(Event(time_s=0.0, kind="failed", site=base),))
-    clock = fuel = incentive = 0.0
-    tank = orders.fuel_capacity_s
-    pois = stops = 0
-    late = False
-    events = [Event(time_s=0.0, kind="departed", site=base)]
-
-    def ended(end: End, where: str) -> Outcome:
-        events.append(Event(time_s=clock, kind=end, site=where))
-        return Outcome(available=available, incentive=incentive, pois_reached=pois, stops_reached=stops, end=end,
-                       end_time_s=clock, fuel_used_s=fuel, events=tuple(events))
-
-    times = driven.leg_s.tolist()
-    for leg, (origin, site) in enumerate(pairwise(orders.route)):
-        if orders.is_poi(site) and pois + 1 == fails_before:
-            return ended("failed", origin)
-        time_s = times[leg]
-        drives = min(time_s, max(tank, 0.0)) if time_s > tank + TOLERANCE_S else time_s
-        clock, fuel, tank = clock + drives, fuel + drives, tank - drives
-        if drives < time_s:
-            return ended("out_of_fuel", site)
-        if driven.stuck and leg == len(times) - 1:
-            return ended("stuck", site)
-        stops += 1
-        events.append(Event(time_s=clock, kind="arrived", site=site))
-        clock += orders.stop_s[site]
-        if clock > orders.mission_limit_s + TOLERANCE_S and not late:
-            late = True
-            events.append(Event(time_s=clock, kind="late", site=site))
-        if site in orders.stations:
-            tank = orders.fuel_capacity_s
-            events.append(Event(time_s=clock, kind="refuelled", site=site))
-        elif orders.is_poi(site):
-            pois += 1
-            if not late:
-                earned = orders.incentives.get(site, 0.0)
-                incentive += earned
-                events.append(Event(time_s=clock, kind="collected", site=site, incentive=earned))
-    return ended("late" if late else "home", base)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

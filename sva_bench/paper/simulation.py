@@ -12,7 +12,9 @@ from sva_bench.analysis.statistics import estimate, sample_mean
 from sva_bench.analysis.summary import totals
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
-from sva_bench.execution.execute import Drives, Executed, Settings, execute
+from sva_bench.execution.case import Settings
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import Executed, execute
 from sva_bench.files.printable import counted
 from sva_bench.report.wording import verdict, with_interval
 from sva_bench.study.costs import NOMINAL, plan_costs
@@ -66,7 +68,7 @@ def simulation(
                                  progress)
         own = replace(settings, rollouts=1 if world.noise.silent else settings.rollouts)
         cases = [case for scenario in world.scenarios for case in two_cases(scenario, planned[scenario.name])]
-        drives: Drives = {}
+        drives = Drives()
         found: dict[str, dict[FailureProcess, Simulated]] = {s.name: {} for s in world.scenarios}
         for process in _PROCESSES:
             runs = iter(execute(replace(world, execute_failure=process), costs, cases, own, executor,

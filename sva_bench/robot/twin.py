@@ -24,6 +24,25 @@ def patience_steps(stretch: Stretch, model: RobotModel) -> int:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
+def advance(pose: FloatArray, left: float, right: float, track: float, dt: float) -> None:
+    """Move an ideal unicycle for one control step; changes ``pose`` in place.
+
+    Args:
+        pose: x, y [m], yaw [rad].
+        left, right: Speed of the left and the right wheel along the floor [m/s].
+        track: Distance between the wheels [m].
+        dt: Length of the step [s].
+    """
+    speed, rate = 0.5 * (left + right), (right - left) / track
+    # Exact motion along an arc, written so that it has no singularity at rate 0.
+    half = 0.5 * rate * dt
+    chord = speed * dt * (1.0 - half * half / 6.0 if abs(half) < 1e-4 else math.sin(half) / half)
+    pose[0] += chord * math.cos(pose[2] + half)
+    pose[1] += chord * math.sin(pose[2] + half)
+    pose[2] += rate * dt
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _drive(
     path: FloatArray, arc: FloatArray, heading: float, limits: FloatArray, state: FloatArray, pose: FloatArray,
     gain_left: float, gain_right: float, track: float, dt: float, first: int, steps: int, until: float,
@@ -41,13 +60,7 @@ def _drive(
             return step
         left = (speed - 0.5 * track * rate) * gain_left
         right = (speed + 0.5 * track * rate) * gain_right
-        speed, rate = 0.5 * (left + right), (right - left) / track
-        # Exact motion along an arc, written so that it has no singularity at rate 0.
-        half = 0.5 * rate * dt
-        chord = speed * dt * (1.0 - half * half / 6.0 if abs(half) < 1e-4 else math.sin(half) / half)
-        pose[0] += chord * math.cos(pose[2] + half)
-        pose[1] += chord * math.sin(pose[2] + half)
-        pose[2] += rate * dt
+        advance(pose, left, right, track, dt)
         if step < len(trace):
             trace[step, 0], trace[step, 1], trace[step, 2] = pose[0], pose[1], pose[2]
     return steps

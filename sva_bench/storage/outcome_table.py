@@ -19,12 +19,15 @@ def outcome_table(run: Executed, robots: Sequence[str], settings: Settings) -> p
     return pa.table({
         "scenario": constant(run.case.scenario.name, trials * count),
         "planner": constant(run.case.planner, trials * count),
+        "policy": constant(run.case.policy, trials * count), "news": constant(run.case.news, trials * count),
         "trial": np.repeat(settings.first + np.arange(trials), count), "rollout": np.repeat(run.rollout, count),
         "robot": _words(np.tile(np.arange(count, dtype=np.int32), trials), robots),
         "available": run.available.ravel(), "incentive": run.incentive.ravel(),
+        "lost": run.lost.ravel(), "value": run.value.ravel(),
         "pois_reached": run.pois_reached.ravel(), "stops_reached": run.stops_reached.ravel(),
         "end": _words(run.end.ravel().astype(np.int8), ENDS), "end_time_s": run.end_time_s.ravel(),
-        "fuel_used_s": run.fuel_used_s.ravel(), "fidelity": constant(settings.fidelity, trials * count),
+        "fuel_used_s": run.fuel_used_s.ravel(), "waited_s": run.waited_s.ravel(),
+        "contacts": run.contacts.ravel(), "fidelity": constant(settings.fidelity, trials * count),
     }).cast(OUTCOMES)
 
 

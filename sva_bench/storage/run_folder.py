@@ -114,6 +114,8 @@ class Legs:
 
     scenario: Sequence[str]
     planner: Sequence[str]
+    policy: Sequence[str]
+    news: Sequence[str]
     rollout: Sequence[int]
     robot: Sequence[str]
     leg: Sequence[int]
@@ -121,6 +123,7 @@ class Legs:
     destination: Sequence[str]
     planned_s: FloatArray
     driven_s: FloatArray
+    waited_s: FloatArray
 
 
 def legs_of(executed: Sequence[Executed]) -> Legs:
@@ -128,11 +131,13 @@ def legs_of(executed: Sequence[Executed]) -> Legs:
     rows = [(run.case, leg) for run in executed for leg in run.legs]
     return Legs(
         scenario=[case.scenario.name for case, _ in rows], planner=[case.planner for case, _ in rows],
+        policy=[case.policy for case, _ in rows], news=[case.news for case, _ in rows],
         rollout=[leg.rollout for _, leg in rows], robot=[leg.robot for _, leg in rows],
         leg=[leg.leg for _, leg in rows], origin=[leg.origin for _, leg in rows],
         destination=[leg.destination for _, leg in rows],
         planned_s=np.array([leg.planned_s for _, leg in rows], dtype=np.float64),
-        driven_s=np.array([leg.driven_s for _, leg in rows], dtype=np.float64))
+        driven_s=np.array([leg.driven_s for _, leg in rows], dtype=np.float64),
+        waited_s=np.array([leg.waited_s for _, leg in rows], dtype=np.float64))
 
 
 def write_legs(path: Path, legs: Legs) -> None:

@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
 from sva_bench.analysis.results import SUMMARY
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, summary_form
-from sva_bench.choices import ENDS
+from sva_bench.choices import ENDS, NEWS, POLICY_NAMES
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.atomic import draft_file
 from sva_bench.files.documents import Document, read_json, validate
@@ -167,7 +167,8 @@ def _content(folder: Path) -> Content:
             raise document.error(("scenarios", number, "availability"), "not that of the world in manifest.json")
     plans = {(s.name, name): plan.executed.mean for s in summary.scenarios for name, plan in s.plans.items()}
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
-             "robot": frozenset(first.availability), "end": frozenset(ENDS), "fidelity": frozenset((summary.fidelity,))}
+             "robot": frozenset(first.availability), "end": frozenset(ENDS), "policy": frozenset(POLICY_NAMES),
+             "news": frozenset(NEWS), "fidelity": frozenset((summary.fidelity,))}
     _check_outcomes(folder / "outcomes.parquet", plans, summary.trials, len(first.availability), words)
     stems = {(scenario, name): stem_of(scenario, name, foreign=isinstance(summary, ComparisonSummary))
              for scenario, name in plans}

@@ -10,7 +10,9 @@ from sva_bench.analysis.figures import difference_figure, value_figure
 from sva_bench.analysis.results import AssumptionRow, Loss
 from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import FailureProcess
-from sva_bench.execution.execute import Case, Drives, Executed, Settings, execute
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import Executed, execute
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import PROCESSES
 from sva_bench.mission.plan import Plan

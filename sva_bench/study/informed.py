@@ -44,6 +44,7 @@ def put_together(parts: Mapping[frozenset[str], Executed]) -> Executed:
     return Executed(
         case=Case(scenario=first.case.scenario, planner=INFORMED, plan=first.case.plan, role="informed"),
         robots=first.robots, rollout=first.rollout, available=available, incentive=pick("incentive"),
+        lost=pick("lost").astype(np.bool_), contacts=pick("contacts").astype(np.int64),
         pois_reached=pick("pois_reached").astype(np.int64), stops_reached=pick("stops_reached").astype(np.int64),
         end=ends, end_time_s=pick("end_time_s"),
         fuel_used_s=pick("fuel_used_s"), planned_incentive=planned, drawn_incentive=pick("drawn_incentive"),

@@ -31,7 +31,7 @@ class Options:
 
     seed: int = 0
     trials: int = 1000
-    rollouts: int = 8
+    rollouts: int = 32
     fidelity: Fidelity = "rollout"
     planner: PathPlanner = "prmstar"
     limits: SolveLimits = field(default_factory=SolveLimits)

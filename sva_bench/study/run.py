@@ -9,7 +9,9 @@ from pathlib import Path
 
 from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
-from sva_bench.execution.execute import Case, Drives, Executed, execute
+from sva_bench.execution.case import Case
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import Executed, execute
 from sva_bench.files.printable import counted
 from sva_bench.study.assumptions import cross_table
 from sva_bench.study.costs import plan_costs, reach_of
@@ -57,7 +59,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
     with clock.phase("planning"):
         planned = plan_scenarios(world, costs, options, progress)
     cases = [case for scenario in world.scenarios for case in _cases_of(world, scenario, planned[scenario.name])]
-    drives: Drives = {}
+    drives = Drives()
     reach = reach_of(world, costs)
     while True:
         settings = settings_of(world, options)

@@ -218,7 +218,7 @@ def test_tables_say_their_units_and_open_as_csv(folder: Path) -> None:
     assert [path.name for path in write_csv(folder)] == [
         "legs.csv", "outcomes.csv", "travel_times.csv", "statistics.csv"]
     lines = (folder / "outcomes.csv").read_text().splitlines()
-    assert lines[0].split(",")[:3] == ['"scenario"', '"planner"', '"trial"']
+    assert lines[0].split(",")[:5] == ['"scenario"', '"planner"', '"policy"', '"news"', '"trial"']
     assert len(lines) == 1 + 2 * 2 * 40 * 2  # scenarios, plans, trials, robots
 
 

@@ -45,7 +45,8 @@ def executed(incentive: list[list[float]], ends: list[list[End]], planned: list[
         case=Case(scenario=SCENARIO, planner=planner, plan=plan), robots=ROBOTS,
         rollout=np.arange(len(earned)) % rollouts, available=end != ENDS.index("failed"), incentive=earned,
         pois_reached=zeros, stops_reached=zeros, end=end, end_time_s=np.zeros(earned.shape),
-        fuel_used_s=np.zeros(earned.shape), planned_incentive=np.array(planned),
+        fuel_used_s=np.zeros(earned.shape), lost=np.isin(end, [ENDS.index("out_of_fuel"), ENDS.index("stuck")]),
+        contacts=zeros, planned_incentive=np.array(planned),
         drawn_incentive=np.where(end == ENDS.index("failed"), 0.0, np.array(planned)),
         margins=tuple(route_of(m, f"{planner}-p{m}", worth, rollouts, near=near) for m, worth in enumerate(planned)),
         legs=(), traces=())

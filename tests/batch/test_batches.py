@@ -36,15 +36,15 @@ SABOTAGE = """
 import sys
 if "sva_bench.workers.far_end" in sys.orig_argv:
     import ctypes, time
-    from sva_bench.execution.engines.bullet import Simulator
-    start = Simulator.__init__
-    def sabotaged(self, obstacles, *others):
+    from sva_bench.execution import drives
+    near = drives.solids_near
+    def sabotaged(obstacles, *others):
         if len(obstacles.cylinders) == 2:
             ctypes.string_at(0)
         if len(obstacles.cylinders) == 3:
             time.sleep(600)
-        start(self, obstacles, *others)
-    Simulator.__init__ = sabotaged
+        return near(obstacles, *others)
+    drives.solids_near = sabotaged
 """
 
 
@@ -220,8 +220,9 @@ def test_shards_have_the_columns_of_a_run_and_their_world_seed_and_variant(tmp_p
     assert len(shards) == 4
     table = pq.read_table(shards[0])
     assert table.column_names == [
-        "scenario", "planner", "trial", "rollout", "robot", "available", "incentive", "pois_reached", "stops_reached",
-        "end", "end_time_s", "fuel_used_s", "fidelity", "world", "seed", "variant"]
+        "scenario", "planner", "policy", "news", "trial", "rollout", "robot", "available", "incentive", "lost", "value",
+        "pois_reached", "stops_reached", "end", "end_time_s", "fuel_used_s", "waited_s", "contacts", "fidelity",
+        "world", "seed", "variant"]
     assert set(table["seed"].to_pylist()) < {3, 4}
     assert table.schema.field("end_time_s").metadata == {b"unit": b"s"}
     with (tmp_path / "out" / "maps.csv").open(newline="", encoding="utf-8") as file:

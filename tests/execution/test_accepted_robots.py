@@ -12,7 +12,7 @@ import pytest
 
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadFile
-from sva_bench.execution.execute import DriveTask, drive_route
+from sva_bench.execution.drives import DriveTask, drive_route
 from sva_bench.files.documents import parse_yaml
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.follower import CONTROL_HZ, stretches
@@ -82,7 +82,7 @@ def strays_of(model: RobotModel, rng: np.random.Generator) -> list[str]:
     """Legs on which physics and twin are apart by more than 1 %, and more than the two control steps of rounding."""
     legs = tuple((stretches(path, heading),) for path, heading in course(model, rng))
     real, ideal = (drive_route(DriveTask(
-        obstacles=OPEN, model=model, start=(0.0, 0.0, 0.0), legs=legs, wheel_gains=(1.0, 1.0), fidelity=fidelity,
+        obstacles=OPEN, model=model, start=(0.0, 0.0, 0.0), legs=legs, fidelity=fidelity,
         traced=False)) for fidelity in ("rollout", "kinematic"))
     if real.stuck or ideal.stuck:
         return [f"{model}: stuck on leg {min(len(real.leg_s), len(ideal.leg_s))}"]
@@ -158,5 +158,5 @@ def test_a_robot_that_turns_for_longer_than_the_check_for_stuck_ones_takes_is_no
         path = np.array([[0.0, 0.0], [2 * math.cos(turn), 2 * math.sin(turn)]])
         driven = drive_route(DriveTask(
             obstacles=OPEN, model=slow, start=(0.0, 0.0, 0.0), legs=((stretches(path, float(turn)),),),
-            wheel_gains=(1.0, 1.0), fidelity="rollout", traced=False))
+            fidelity="rollout", traced=False))
         assert not driven.stuck

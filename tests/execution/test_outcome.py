@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, settle, trace_of
+from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, trace_of
+from sva_bench.execution.rules import settle
 from sva_bench.mission.failures import NEVER
 
 LEGS = (10.0, 8.0, 6.0, 12.0)

@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from sva_bench.execution.outcome import Assignment, Driven, Trace, settle, trace_of
+from sva_bench.execution.outcome import Assignment, Driven, Trace, trace_of
+from sva_bench.execution.rules import settle
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import NEVER
 from sva_bench.robot.model import BUILT_IN

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.execution.execute import DriveTask, drive_route
+from sva_bench.execution.drives import DriveTask, drive_route
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.travel.fuel import fuel_costs, repair_metric
 from sva_bench.travel.roadmap import plan_paths
@@ -169,7 +169,7 @@ robots: {uv1: {model: turtlebot2, incentives: {}}}
         start = next(site for site in world.sites if site.name == chain[0])
         task = DriveTask(
             obstacles=world.obstacles, model=TURTLEBOT, start=(start.x_m, start.y_m, start.heading_rad),
-            legs=(tuple(times.course(a, b) for a, b in itertools.pairwise(chain)),), wheel_gains=(1.0, 1.0),
+            legs=(tuple(times.course(a, b) for a, b in itertools.pairwise(chain)),),
             fidelity="rollout", traced=False)
         driven = drive_route(task)
         assert not driven.stuck

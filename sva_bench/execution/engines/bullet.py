@@ -1,4 +1,4 @@
-"""Physics: one robot driving one route in PyBullet. The only importer of pybullet."""
+"""Physics: a robot among obstacles in PyBullet. The only importer of pybullet."""
 
 from __future__ import annotations
 
@@ -8,18 +8,15 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 from types import TracebackType
+from typing import Self
 
-import numpy as np
-
-from sva_bench.arrays import FloatArray
+from sva_bench.execution.noise import Disturbance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c
-from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
+from sva_bench.robot.follower import CONTROL_HZ
 from sva_bench.robot.model import CASTERS_AT, RobotModel
-from sva_bench.robot.twin import patience_steps
 
 
 @contextlib.contextmanager
@@ -46,69 +43,97 @@ def _quiet() -> Iterator[None]:
 with _quiet():  # prints a banner on import
     import pybullet
 
-PHYSICS_HZ = 120.0
-_SUBSTEPS = round(PHYSICS_HZ / CONTROL_HZ)
+PHYSICS_HZ, _FINE_HZ = 60.0, 120.0  # 960 Hz and a residual of 1e-7 give leg times within 0.2 % of these
 _ITERATIONS, _FINE_ITERATIONS = 50, 200  # at most: at the usual residual, and at a finer one
-_RESIDUAL = 1e-4  # ends the iterations early: 1.6 times faster; leg times keep within 0.6 % of the twin
+_RESIDUAL = 1e-4  # ends the iterations early
 _WHEEL_RAD_S, _WHEEL_RAD_S2 = 5.0, 7.0  # slower or more slowly accelerated wheels don't bear that residual [rad2/s2]
+_FAST_RAD_S = 30.0  # wheels that turn faster don't bear 60 Hz: up to 1.5 % of a leg's time
+_CONTACT_STEPS = 3  # control steps from one look at contacts to the next: 50 ms
+_DISTANCE = 8  # where a contact point of PyBullet has its distance
 _WALL_M = 0.2  # thickness of the walls about the bounds; nothing is seen of it
 _HEIGHT_M = 0.5  # of all obstacles; taller than any robot's hull
 _CASTER_GAP_M = 0.001  # casters touch the floor only when the hull tilts, so the weight rests on the driven wheels
 _WHEEL_FRICTION = 1.0  # rubber on a hard floor
 _USUAL_RAD_S = 100.0  # to which PyBullet holds joints, unless told otherwise: small wheels of a fast robot turn faster
 _MOTOR_G = 3.0  # motor torque, in multiples of what accelerates the robot as its limits allow
-_STUCK_CHECK_S = 10.0  # a robot that hardly moves or turns for so long is stuck
-_STUCK_M, _STUCK_RAD = 0.02, 0.05
-_STUCK_DRIVING = 0.5  # share of the time between two checks spent on the way from which on only progress counts
+_free: list[int] = []  # clients of this process that no engine uses
 
 
-class Simulator:
-    """A world of obstacles with one robot in it: one physics client.
+class Bullet:
+    """A world of obstacles with one robot in it, in PyBullet.
 
-    Robots that don't meet have a client each; filtering collisions between them would not be the same.
-    Use it as a context manager; each drive wants a fresh one, for only that is reproducible bit by bit.
+    Robots that don't meet have a client each; filtering collisions between them would not be the same. The world is
+    built anew for each engine, for only that is reproducible bit by bit; clients are used again, for a client that was
+    reset is as good as a new one, which takes five times as long.
     """
 
-    def __init__(
-        self, obstacles: Obstacles, model: RobotModel, pose: tuple[float, float, float],
-        wheel_gains: tuple[float, float] = (1.0, 1.0),
-    ) -> None:
-        self._model, self._gains = model, wheel_gains
-        residual = _residual(model)
-        self._client = pybullet.connect(pybullet.DIRECT)
+    def __init__(self, obstacles: Obstacles, model: RobotModel, pose: tuple[float, float, float],
+                 disturbance: Disturbance) -> None:
+        self._model = model
+        self._left = disturbance.wheel_gains[0] / model.wheel_radius_m
+        self._right = disturbance.wheel_gains[1] / model.wheel_radius_m
+        self._steps, self._touches, self.contacts = 0, False, 0
+        torque = motor_torque(model)
+        self._forces = (torque, torque)
+        self._client = _free.pop() if _free else pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet gave no physics client")
         try:
-            pybullet.setPhysicsEngineParameter(
-                fixedTimeStep=1.0 / CONTROL_HZ, numSubSteps=_SUBSTEPS, deterministicOverlappingPairs=1,
-                numSolverIterations=_ITERATIONS if residual == _RESIDUAL else _FINE_ITERATIONS,
-                solverResidualThreshold=residual, physicsClientId=self._client)
+            pybullet.setPhysicsEngineParameter(**_accuracy(model), physicsClientId=self._client)
             pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
             with deferring_ctrl_c(), _quiet():  # or it might come while both outputs lead nowhere
-                self._build_world(obstacles)
+                self._solids = self._build_world(obstacles)
             self._body = self._build_robot(pose)
         except BaseException:
             pybullet.disconnect(physicsClientId=self._client)
             raise
 
-    def __enter__(self) -> Simulator:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        pybullet.disconnect(physicsClientId=self._client)
+        if error is not None:  # whatever state it is in
+            pybullet.disconnect(physicsClientId=self._client)
+            return
+        pybullet.resetSimulation(physicsClientId=self._client)
+        _free.append(self._client)
 
-    def _build_world(self, obstacles: Obstacles) -> None:
+    def pose(self) -> tuple[float, float, float]:
+        """x, y [m], yaw [rad]."""
+        (x, y, _), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
+        return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+
+    def step(self, left_m_s: float, right_m_s: float) -> None:
+        """Advance by one control step."""
+        pybullet.setJointMotorControlArray(
+            self._body, (0, 1), pybullet.VELOCITY_CONTROL, forces=self._forces, physicsClientId=self._client,
+            targetVelocities=(left_m_s * self._left, right_m_s * self._right))
+        pybullet.stepSimulation(physicsClientId=self._client)
+        self._steps += 1
+        if self._steps % _CONTACT_STEPS == 0:
+            self._count_contacts()
+
+    def _count_contacts(self) -> None:
+        near = pybullet.getContactPoints(self._body, self._solids, physicsClientId=self._client)
+        touches = any(point[_DISTANCE] <= 0 for point in near)
+        self.contacts += touches and not self._touches
+        self._touches = touches
+
+    def _build_world(self, obstacles: Obstacles) -> int:
         floor = pybullet.createMultiBody(
             0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client),
             physicsClientId=self._client)
-        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=self._client)
+        # Casters that hover over the floor are no contacts to solve for: they'd take a sixth of the time.
+        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=_CASTER_GAP_M / 2,
+                                physicsClientId=self._client)
         # One compound body for all obstacles: its own tree finds the few that are near. Only a URDF may hold more
         # than 16 shapes: createCollisionShapeArray drops the others without a word.
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, "obstacles.urdf")
-            path.write_text(obstacles_urdf(obstacles), encoding="utf-8")
-            pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self._client)
+        with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as file:
+            file.write(obstacles_urdf(obstacles))
+            file.flush()
+            solids: int = pybullet.loadURDF(file.name, useFixedBase=True, physicsClientId=self._client)
+        return solids
 
     def _build_robot(self, pose: tuple[float, float, float]) -> int:
         model, client = self._model, self._client
@@ -135,60 +160,15 @@ class Simulator:
         pybullet.changeDynamics(body, -1, lateralFriction=0.0, **smooth)  # casters and hull slide
         for link in (0, 1):
             pybullet.changeDynamics(body, link, lateralFriction=_WHEEL_FRICTION, jointDamping=0.0, **smooth)
-            fastest = (model.followed_speed_m_s + model.max_turn_rad_s * model.track_m / 2) / wheel
+            fastest = fastest_wheel_rad_s(model)
             if 2 * fastest > _USUAL_RAD_S:
                 pybullet.changeDynamics(body, link, maxJointVelocity=2 * fastest, physicsClientId=client)
         return body
 
-    def pose(self) -> tuple[float, float, float]:
-        """x, y [m], yaw [rad]."""
-        (x, y, _), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
-        return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
 
-    def drive(self, course: Sequence[Stretch], poses: list[tuple[float, float, float]] | None = None
-              ) -> tuple[float, bool]:
-        """Drive the stretches of one hop.
-
-        Args:
-            course: The stretches.
-            poses: Receives the pose after each control step; ``None`` keeps none.
-
-        Returns:
-            Driving time [s], and whether the robot arrived; False if it got stuck.
-        """
-        model, client, body = self._model, self._client, self._body
-        limits, dt, radius, half = model.limits, 1.0 / CONTROL_HZ, model.wheel_radius_m, model.track_m / 2
-        torque = motor_torque(model)
-        left_gain, right_gain = self._gains
-        check = round(_STUCK_CHECK_S * CONTROL_HZ)
-        total = 0
-        for stretch in course:
-            state, since_yaw, since_s, driving = new_state(), self.pose()[2], 0.0, 0
-            for step in range(1, patience_steps(stretch, model) + 1):
-                x, y, yaw = self.pose()
-                speed, rate = control(stretch.path, stretch.arc, stretch.heading_rad, limits, state, x, y, yaw, dt)
-                if state[0] == ARRIVED:
-                    break
-                pybullet.setJointMotorControlArray(
-                    body, (0, 1), pybullet.VELOCITY_CONTROL, forces=(torque, torque), physicsClientId=client,
-                    targetVelocities=((speed - half * rate) * left_gain / radius,
-                                      (speed + half * rate) * right_gain / radius))
-                pybullet.stepSimulation(physicsClientId=client)
-                total += 1
-                driving += state[0] == DRIVE
-                if poses is not None:
-                    poses.append(self.pose())
-                if step % check == 0:
-                    # On the way only progress along the path counts: a robot that pushes a wall sways and slides.
-                    # One that has turned for nearly all of the time has not had any to make progress.
-                    turned = abs(math.remainder(yaw - since_yaw, 2 * math.pi)) >= _STUCK_RAD
-                    on_the_way = state[0] == DRIVE and driving >= _STUCK_DRIVING * check
-                    if state[1] - since_s < _STUCK_M and (on_the_way or not turned):
-                        return total * dt, False
-                    since_yaw, since_s, driving = yaw, float(state[1]), 0
-            else:
-                return total * dt, False
-        return total * dt, True
+def fastest_wheel_rad_s(model: RobotModel) -> float:
+    """Fastest that a wheel turns, driving and turning at a time."""
+    return (model.followed_speed_m_s + model.max_turn_rad_s * model.track_m / 2) / model.wheel_radius_m
 
 
 def motor_torque(model: RobotModel) -> float:
@@ -198,12 +178,18 @@ def motor_torque(model: RobotModel) -> float:
     return _MOTOR_G * model.mass_kg * force * model.wheel_radius_m
 
 
-def _residual(model: RobotModel) -> float:
-    """Residual at which the solver's iterations may end: less where wheels are so slow that it would show."""
+def _accuracy(model: RobotModel) -> dict[str, float]:
+    """Steps and solver of the physics: finer for wheels that are so slow, or so fast, that it would show."""
     turning = model.track_m / 2
     speed = min(model.followed_speed_m_s, model.max_turn_rad_s * turning) / model.wheel_radius_m
     acceleration = min(model.acceleration_m_s2, model.turn_acceleration_rad_s2 * turning) / model.wheel_radius_m
-    return _RESIDUAL * min(speed / _WHEEL_RAD_S, acceleration / _WHEEL_RAD_S2, 1.0) ** 2
+    slowness = min(speed / _WHEEL_RAD_S, acceleration / _WHEEL_RAD_S2, 1.0)
+    fast = fastest_wheel_rad_s(model) > _FAST_RAD_S
+    return {"fixedTimeStep": 1.0 / CONTROL_HZ,
+            "numSubSteps": round((_FINE_HZ if fast or slowness < 1 else PHYSICS_HZ) / CONTROL_HZ),
+            "numSolverIterations": _ITERATIONS if slowness == 1 else _FINE_ITERATIONS,
+            "solverResidualThreshold": _RESIDUAL * slowness**2, "enableConeFriction": 0,
+            "deterministicOverlappingPairs": 1}
 
 
 def obstacles_urdf(obstacles: Obstacles) -> str:
@@ -224,10 +210,3 @@ def obstacles_urdf(obstacles: Obstacles) -> str:
 
 def _upright(yaw: float) -> tuple[float, float, float, float]:
     return 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)
-
-
-def downsampled(poses: Sequence[tuple[float, float, float]], keep_hz: float) -> tuple[FloatArray, FloatArray]:
-    """Times since the first control step [s] and poses at a lower rate, the last always among them."""
-    every = max(round(CONTROL_HZ / keep_hz), 1)
-    kept = sorted({*range(every - 1, len(poses), every), len(poses) - 1}) if poses else []
-    return np.array([(k + 1) / CONTROL_HZ for k in kept]), np.array([poses[k] for k in kept]).reshape(-1, 3)

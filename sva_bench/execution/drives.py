@@ -1,0 +1,355 @@
+"""Drives: what robots drive, made once for all trials that share it, here or by workers, and put together to routes.
+
+Under ``rollout`` the unit is a hop from site to site: driven once for each model, disturbance and pair of sites, from
+rest in the origin's own pose, and composed into the routes of all plans. A robot stops at each site that it comes
+through, also at those between the ends of a repaired leg, so a hop is what begins and ends alike wherever it stands.
+Under ``kinematic`` and ``physics`` the unit is a whole route: by the twin, and for each trial by itself in physics, as
+the check of what is composed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.choices import Fidelity
+from sva_bench.execution.case import Settings
+from sva_bench.execution.corridor import solids_near, strayed
+from sva_bench.execution.engines.engine import ENGINE_OF, ENGINES, Pose
+from sva_bench.execution.following import downsampled, follow
+from sva_bench.execution.noise import UNDISTURBED, Disturbance, draw_disturbance
+from sva_bench.execution.outcome import Driven
+from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.mission.plan import Route
+from sva_bench.robot.follower import Stretch
+from sva_bench.robot.model import RobotModel
+from sva_bench.robot.twin import drive as drive_twin
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import Site, World
+
+TRACE_HZ = 20.0
+_CHUNK: Mapping[Fidelity, int] = {"kinematic": 16, "rollout": 8, "physics": 1}
+"""Noise draws under which a worker drives a course at a time: a tenth of a second's work; handing it out is small."""
+
+Hop = tuple[Stretch, ...]
+Leg = tuple[Hop, ...]
+"""A leg of a route: the hops of the chain that its repaired cost stands for."""
+
+RouteKey = tuple[str, Route, int, int]
+"""Robot, stops driven, rollout, and the trial under ``physics``, else 0: what a driven route depends on in a world."""
+
+HopKey = tuple[str, Disturbance, str, str]
+"""Robot model, disturbance, origin and destination: what a hop depends on in one world."""
+
+
+@dataclass(eq=False, kw_only=True)
+class Drives:
+    """What was driven already, of the same world, seed and fidelity; it grows.
+
+    Attributes:
+        hops: Hops in physics, by what they depend on.
+        routes: Routes, driven whole or composed.
+    """
+
+    hops: dict[HopKey, Driven] = field(default_factory=dict)
+    routes: dict[RouteKey, Driven] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DriveTask:
+    """One robot's course under one disturbance: all that a worker needs.
+
+    Attributes:
+        obstacles: What it can hit.
+        model: The robot.
+        start: Where it stands at rest: x, y [m], yaw [rad].
+        legs: What it drives.
+        fidelity: By the twin or in physics.
+        traced: Whether poses are kept.
+        disturbance: How it differs from its model.
+    """
+
+    obstacles: Obstacles
+    model: RobotModel
+    start: Pose
+    legs: tuple[Leg, ...]
+    fidelity: Fidelity
+    traced: bool
+    disturbance: Disturbance = UNDISTURBED
+
+    @property
+    def course(self) -> FloatArray:
+        """Vertices of all its legs [m], shape (n, 2)."""
+        return np.concatenate([np.array([self.start[:2]]), *(s.path for leg in self.legs for hop in leg for s in hop)])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Chunk:
+    """One course under some disturbances: what a worker is handed at a time.
+
+    Attributes:
+        keys: What each drive is of, length k.
+        tasks: The drives; they differ in the disturbance, and in whether they are traced. Length k.
+        what: For a person.
+    """
+
+    keys: tuple[RouteKey | HopKey, ...]
+    tasks: tuple[DriveTask, ...]
+    what: str
+
+
+def drive_route(task: DriveTask) -> Driven:
+    """Drive a course, in physics or by the twin."""
+    return drive_tasks((task,))[0]
+
+
+def drive_tasks(tasks: Sequence[DriveTask]) -> tuple[Driven, ...]:
+    """Drive one course under some disturbances, in physics among the obstacles near it.
+
+    A robot that leaves the corridor might have met what was left out: its drive is made again among all obstacles.
+
+    Args:
+        tasks: The drives; they have their course, model and obstacles in common.
+    """
+    first = tasks[0]
+    if first.fidelity == "kinematic":
+        return tuple(_drive_legs(task, _twin_driver(task), []) for task in tasks)
+    course = first.course
+    near = solids_near(first.obstacles, course, first.model.radius_m)
+    driven = []
+    for task in tasks:
+        poses: list[Pose] = []
+        result = _in_engine(replace(task, obstacles=near), poses)
+        driven.append(_in_engine(task, []) if strayed(poses, course) else result)
+    return tuple(driven)
+
+
+HopDriver = Callable[[Hop, list[Pose]], tuple[float, bool, int]]
+"""Drives a hop and adds its poses to a list: driving time [s], whether it arrived, contacts with obstacles."""
+
+
+def _twin_driver(task: DriveTask) -> HopDriver:
+    pose = np.array(task.start)
+
+    def drive(hop: Hop, poses: list[Pose]) -> tuple[float, bool, int]:
+        time_s, trace = drive_twin(task.model, hop, pose, task.disturbance.wheel_gains, traced=task.traced)
+        poses.extend((x, y, yaw) for x, y, yaw in trace.tolist())
+        return (time_s, True, 0) if np.isfinite(time_s) else (0.0, False, 0)
+
+    return drive
+
+
+def _in_engine(task: DriveTask, poses: list[Pose]) -> Driven:
+    with ENGINES[ENGINE_OF[task.fidelity]](task.obstacles, task.model, task.start, task.disturbance) as engine:
+
+        def drive(hop: Hop, kept: list[Pose]) -> tuple[float, bool, int]:
+            before = engine.contacts
+            time_s, arrived = follow(engine, task.model, hop, kept)
+            return time_s, arrived, engine.contacts - before
+
+        return _drive_legs(task, drive, poses)
+
+
+def _drive_legs(task: DriveTask, drive: HopDriver, poses: list[Pose]) -> Driven:
+    """Drive leg by leg until the end or until the robot is stuck; ``poses`` receives each of them."""
+    times, contacts, at = [], [], []
+    arrived = True
+    for leg in task.legs:
+        total, touched, begun = 0.0, 0, len(poses)
+        for hop in leg:
+            time_s, arrived, touches = drive(hop, poses)
+            total, touched = total + time_s, touched + touches
+            if not arrived:
+                break
+        times.append(total)
+        contacts.append(touched)
+        at.append(downsampled(poses[begun:] if task.traced else [], TRACE_HZ))
+        if not arrived:
+            break
+    return Driven(
+        leg_s=np.array(times), stuck=not arrived, contacts=np.array(contacts, dtype=np.int64),
+        leg_of=np.concatenate([np.empty(0), *(np.full(len(clock), float(leg)) for leg, (clock, _) in enumerate(at))]),
+        clock_s=np.concatenate([np.empty(0), *(clock for clock, _ in at)]),
+        pose=np.concatenate([np.empty((0, 3)), *(pose for _, pose in at)]))
+
+
+class Courses:
+    """The drives behind the routes of a world: which they are, and how routes are put together from them."""
+
+    def __init__(self, world: World, costs: Mapping[str, FuelCosts], settings: Settings) -> None:
+        self._world, self._costs, self._settings = world, costs, settings
+        self._numbers = {robot.name: number for number, robot in enumerate(world.robots)}
+        self._sites = {site.name: site for site in world.sites}
+        # A worker needs the boxes alone; the twin drives through everything.
+        self._solids = _NOWHERE if settings.fidelity == "kinematic" else replace(world.obstacles, cells=None)
+        self._hops: dict[tuple[str, str, str], Hop] = {}
+
+    def chunks(self, wanted: Mapping[RouteKey, bool], known: Drives) -> list[Chunk]:
+        """What has to be driven for some routes.
+
+        Args:
+            wanted: The routes, and whether each is traced.
+            known: What was driven already.
+        """
+        size = _CHUNK[self._settings.fidelity]
+        groups: dict[tuple[object, ...], list[tuple[RouteKey | HopKey, DriveTask]]] = {}
+        if self._settings.fidelity == "rollout":
+            for hop, (rollout, traced) in self._lacking(wanted, known).items():
+                model, disturbance, origin, destination = hop
+                task = self._task(model, origin, ((self._hop(model, origin, destination),),), disturbance, traced)
+                groups.setdefault((model, origin, destination, rollout // size), []).append((hop, task))
+        else:
+            for key, traced in wanted.items():
+                if key not in known.routes:
+                    robot, route, rollout, trial = key
+                    model = self._model(robot)
+                    task = self._task(model, route[0], self._legs(model, route), self._disturbance(key), traced)
+                    groups.setdefault((robot, route, rollout // size, trial), []).append((key, task))
+        return [Chunk(keys=tuple(key for key, _ in group), tasks=tuple(task for _, task in group),
+                      what=_what(group[0][0])) for group in groups.values()]
+
+    def compose(self, wanted: Iterable[RouteKey], drives: Drives) -> None:
+        """Put routes together from their hops, where they were not driven whole; ``drives`` receives them."""
+        for key in wanted:
+            if key not in drives.routes:
+                disturbance, model = self._disturbance(key), self._model(key[0])
+                drives.routes[key] = composed([[drives.hops[model, disturbance, a, b] for a, b in leg]
+                                               for leg in self._hops_of(model, key[1])])
+
+    def _lacking(self, wanted: Mapping[RouteKey, bool], known: Drives) -> dict[HopKey, tuple[int, bool]]:
+        """Hops that are not driven yet, or not traced: the first rollout that wants each, and whether it is traced."""
+        lacking: dict[HopKey, tuple[int, bool]] = {}
+        for key, traced in wanted.items():
+            if key in known.routes:
+                continue
+            disturbance, model = self._disturbance(key), self._model(key[0])
+            for leg in self._hops_of(model, key[1]):
+                for origin, destination in leg:
+                    hop = model, disturbance, origin, destination
+                    rollout, before = lacking.get(hop, (key[2], False))
+                    if hop not in known.hops or (traced and not len(known.hops[hop].pose)):
+                        lacking[hop] = rollout, before or traced
+        return lacking
+
+    def _task(self, model: str, origin: str, legs: tuple[Leg, ...], disturbance: Disturbance, traced: bool
+              ) -> DriveTask:
+        site = self._sites[origin]
+        return DriveTask(obstacles=self._solids, model=self._costs[model].times.model, start=_pose(site), legs=legs,
+                         fidelity=self._settings.fidelity, traced=traced, disturbance=disturbance)
+
+    def _model(self, robot: str) -> str:
+        return self._world.robots[self._numbers[robot]].model.name
+
+    def _disturbance(self, key: RouteKey) -> Disturbance:
+        return draw_disturbance(self._world.noise, self._settings.seed, key[2], self._numbers[key[0]])
+
+    def _hops_of(self, model: str, route: Route) -> list[list[tuple[str, str]]]:
+        """Ends of each hop of each leg."""
+        return [list(pairwise(self._costs[model].chain(*leg))) for leg in pairwise(route)]
+
+    def _legs(self, model: str, route: Route) -> tuple[Leg, ...]:
+        return tuple(tuple(self._hop(model, a, b) for a, b in leg) for leg in self._hops_of(model, route))
+
+    def _hop(self, model: str, origin: str, destination: str) -> Hop:
+        key = model, origin, destination
+        if key not in self._hops:
+            self._hops[key] = self._costs[model].times.course(origin, destination)
+        return self._hops[key]
+
+
+_NOWHERE = Obstacles(bounds_m=np.zeros(4), boxes=np.empty((0, 5)), cylinders=np.empty((0, 3)))
+
+
+def _pose(site: Site) -> Pose:
+    return site.x_m, site.y_m, site.heading_rad
+
+
+def _what(key: RouteKey | HopKey) -> str:
+    """For a person: what is driven."""
+    if isinstance(key[1], Disturbance):
+        return f"drive of {key[0]} from {key[2]} to {key[3]}"
+    return f"drive of {key[0]} under noise draw {key[2]}"
+
+
+def composed(legs: Sequence[Sequence[Driven]]) -> Driven:
+    """A route from the hops of its legs, each driven by itself; it ends where the robot gets stuck.
+
+    Poses jump at stops by what a robot ends off its site: a centimetre and a hundredth of a radian.
+    """
+    times, contacts = [], []
+    leg_of, clock, poses = [np.empty(0)], [np.empty(0)], [np.empty((0, 3))]
+    stuck = False
+    for number, hops in enumerate(legs):
+        total, touched = 0.0, 0
+        for hop in hops:
+            leg_of.append(np.full(len(hop.clock_s), float(number)))
+            clock.append(total + hop.clock_s)
+            poses.append(hop.pose)
+            total, touched, stuck = total + float(hop.leg_s[0]), touched + int(hop.contacts[0]), hop.stuck
+            if stuck:
+                break
+        times.append(total)
+        contacts.append(touched)
+        if stuck:
+            break
+    return Driven(leg_s=np.array(times), stuck=stuck, contacts=np.array(contacts, dtype=np.int64),
+                  leg_of=np.concatenate(leg_of), clock_s=np.concatenate(clock), pose=np.concatenate(poses))
+
+
+def receive(drives: Drives, chunk: Chunk, driven: Sequence[Driven]) -> None:
+    """Add what came of a chunk to what was driven."""
+    for key, result in zip(chunk.keys, driven, strict=True):
+        if isinstance(key[1], Disturbance):
+            drives.hops[key] = result
+        else:
+            drives.routes[key] = result
+
+
+def drive_all(
+    chunks: Sequence[Chunk], drives: Drives, executor: Executor | None,
+    progress: Callable[[int, int], None] | None,
+) -> None:
+    """Make drives, here or by workers; ``drives`` receives them.
+
+    Args:
+        chunks: What to drive.
+        drives: What was driven already.
+        executor: Where drives run; ``None`` = here.
+        progress: Called with the number of drives done and of all.
+    """
+    count, of = 0, sum(len(chunk.tasks) for chunk in chunks)
+
+    def done(more: int) -> None:
+        nonlocal count
+        count += more
+        if progress:
+            progress(count, of)
+
+    if executor is None:
+        for chunk in chunks:
+            driven = []
+            for task in chunk.tasks:
+                driven.append(drive_route(task))
+                done(1)
+            receive(drives, chunk, driven)
+        return
+    # The longest first, so that no worker is left with one at the end.
+    order = sorted(chunks, key=_length_m, reverse=True)
+    futures = {executor.submit(drive_tasks, chunk.tasks): chunk for chunk in order}
+    try:
+        for future in as_completed(futures):
+            receive(drives, futures[future], future.result())
+            done(len(futures[future].tasks))
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _length_m(chunk: Chunk) -> float:
+    """Way of all drives of a chunk."""
+    return len(chunk.tasks) * sum(float(s.arc[-1]) for leg in chunk.tasks[0].legs for hop in leg for s in hop)

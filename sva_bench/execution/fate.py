@@ -1,0 +1,64 @@
+"""Fate: everything that chance decides about trials, drawn ahead and the same for whatever is compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sva_bench.arrays import IntArray, frozen_int
+from sva_bench.execution.case import Settings
+from sva_bench.execution.noise import Disturbance, draw_disturbance
+from sva_bench.mission.failures import NEVER, FailureDraw, Reliability, process_of
+from sva_bench.world.model import Robot, Scenario, World
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fate:
+    """What chance decides about a range of trials of one case.
+
+    Attributes:
+        fails: Number of the POI before which each robot fails, shape (trials, robots). 0: before it leaves the base;
+            ``NEVER``: it doesn't fail, or not within its route.
+        rollout: Noise draw of each trial, shape (trials,).
+        disturbances: How each robot differs from its model, by noise draw and the robot's position in its team.
+    """
+
+    fails: IntArray
+    rollout: IntArray
+    disturbances: Mapping[tuple[int, int], Disturbance]
+
+    def __post_init__(self) -> None:
+        trials = len(self.rollout)
+        object.__setattr__(self, "fails", frozen_int(self.fails, (trials, None)))
+        object.__setattr__(self, "rollout", frozen_int(self.rollout, (trials,)))
+
+
+def draw_fate(world: World, scenario: Scenario, pois: Sequence[int], settings: Settings) -> Fate:
+    """Draw the fate of the trials in ``settings``: failures by trial, noise by rollout, each robot by itself.
+
+    Args:
+        world: The world: its robots, its noise, and the failure process executed.
+        scenario: Availabilities.
+        pois: Number of POIs on the route of each robot, length (robots,).
+        settings: Seed, and which trials and rollouts.
+    """
+    rollout = (settings.first + np.arange(settings.trials)) % settings.rollouts
+    return Fate(
+        fails=_failures(world, scenario, np.array(pois, dtype=np.int64), settings), rollout=rollout,
+        disturbances={(k, robot): draw_disturbance(world.noise, settings.seed, k, robot)
+                      for k in np.unique(rollout).tolist() for robot in range(len(world.robots))})
+
+
+def _failures(world: World, scenario: Scenario, pois: IntArray, settings: Settings) -> IntArray:
+    fails = process_of(world.execute_failure).draw(FailureDraw(
+        seed=settings.seed, vehicles=tuple(robot.name for robot in world.robots), trials=settings.trials,
+        first=settings.first, pois=int(pois.max(initial=0)), joint=scenario.joint,
+        reliability=tuple(reliability_of(robot, scenario) for robot in world.robots))).before_poi
+    return np.where(fails > pois, NEVER, fails)  # draws for a longer route of another robot mean nothing to this one
+
+
+def reliability_of(robot: Robot, scenario: Scenario) -> Reliability:
+    """What a failure process has to know of a robot under a scenario."""
+    return Reliability(availability=scenario.availability[robot.name], mission_limit_s=robot.mission_limit_s)

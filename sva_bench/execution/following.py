@@ -1,0 +1,82 @@
+"""The follower's loop over an engine: one hop from stop to stop, and when a robot counts as stuck."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.execution.engines.engine import Engine, Pose
+from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
+from sva_bench.robot.model import RobotModel
+from sva_bench.robot.twin import patience_steps
+
+_STUCK_CHECK_S = 10.0  # a robot that hardly moves or turns for so long is stuck
+_STUCK_M, _STUCK_RAD = 0.02, 0.05
+_STUCK_DRIVING = 0.5  # share of the time between two checks spent on the way from which on only progress counts
+
+
+def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: list[Pose] | None = None
+           ) -> tuple[float, bool]:
+    """Drive the stretches of one hop.
+
+    Args:
+        engine: The robot in its world.
+        model: Its figures, which the follower goes by.
+        hop: The stretches.
+        poses: Receives the pose after each control step; ``None`` keeps none.
+
+    Returns:
+        Driving time [s], and whether the robot arrived; False if it got stuck.
+    """
+    limits, dt, half = model.limits, 1.0 / CONTROL_HZ, 0.5 * model.track_m
+    check = round(_STUCK_CHECK_S * CONTROL_HZ)
+    where, step = engine.pose, engine.step
+    total = 0
+    pose = where()
+    for stretch in hop:
+        path, arc, heading = stretch.path, stretch.arc, stretch.heading_rad
+        state, since_yaw, since_s, driving = new_state(), pose[2], 0.0, 0
+        for number in range(1, patience_steps(stretch, model) + 1):
+            x, y, yaw = pose
+            speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
+            phase = state[0]
+            if phase == ARRIVED:
+                break
+            step(speed - half * rate, speed + half * rate)
+            total += 1
+            driving += phase == DRIVE
+            pose = where()
+            if poses is not None:
+                poses.append(pose)
+            if number % check == 0:
+                progress_m, turned_rad = float(state[1]) - since_s, math.remainder(yaw - since_yaw, 2 * math.pi)
+                if is_stuck(progress_m, turned_rad, phase == DRIVE and driving >= _STUCK_DRIVING * check):
+                    return total * dt, False
+                since_yaw, since_s, driving = yaw, float(state[1]), 0
+        else:
+            return total * dt, False
+    return total * dt, True
+
+
+def is_stuck(progress_m: float, turned_rad: float, on_the_way: bool) -> bool:
+    """Whether a robot is stuck, by what it did in the ten seconds since the last check.
+
+    On the way only progress along the path counts: a robot that pushes a wall sways and slides. One that has turned for
+    nearly all of the time has not had any to make progress.
+
+    Args:
+        progress_m: How far it got along its path.
+        turned_rad: How far it turned, either way round.
+        on_the_way: Whether it is on its way along the path, and was for at least half of the time.
+    """
+    return progress_m < _STUCK_M and (on_the_way or abs(turned_rad) < _STUCK_RAD)
+
+
+def downsampled(poses: Sequence[Pose], keep_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Times since the first control step [s] and poses at a lower rate, the last always among them."""
+    every = max(round(CONTROL_HZ / keep_hz), 1)
+    kept = sorted({*range(every - 1, len(poses), every), len(poses) - 1}) if poses else []
+    return np.array([(k + 1) / CONTROL_HZ for k in kept]), np.array([poses[k] for k in kept]).reshape(-1, 3)

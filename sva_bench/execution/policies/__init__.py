@@ -1,0 +1,1 @@
+"""Policies: what a team does about news."""

@@ -1,0 +1,202 @@
+"""The rules of a mission, event by event: a robot departs, drives, runs dry or gets stuck, arrives, stops, comes home.
+
+They are here and nowhere else. ``settle`` plays one robot that keeps its orders; ``play`` a team whose policy may
+change what is left of them whenever a robot stands at a stop, its stop time over (an epoch). Nothing here knows an
+engine: what a leg takes is given.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from sva_bench.choices import End, EventKind
+from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome
+from sva_bench.execution.policies.policy import Policy, RobotState, TeamState
+from sva_bench.mission.failures import NEVER
+from sva_bench.mission.instance import TOLERANCE_S
+
+
+class LegDriven(NamedTuple):
+    """One leg as it was driven.
+
+    Attributes:
+        time_s: Driving time [s]; until it gave up, if it got stuck.
+        stuck: Whether the robot got stuck on it.
+        contacts: How many times the hull came to touch an obstacle.
+    """
+
+    time_s: float
+    stuck: bool = False
+    contacts: int = 0
+
+
+class RobotMission:
+    """One robot's mission as far as it has been played; it changes by ``depart`` and ``drive`` in turn.
+
+    Attributes:
+        orders: Its rules, and the route it began with.
+        ahead: Sites that it is to go to yet.
+        site: Where it stands, or where it was going when it ended.
+        clock_s: Mission clock [s]; at a stop, when the stop is over.
+        fuel_s: Fuel burnt [s of driving].
+        tank_s: Fuel left in the tank [s of driving].
+        end: How it ended; ``None`` as long as it goes on.
+    """
+
+    def __init__(self, orders: Assignment, fails_before: int = NEVER) -> None:
+        self.orders, self._fails_before = orders, fails_before
+        self.clock_s = self.fuel_s = self.incentive = 0.0
+        self.tank_s = orders.fuel_capacity_s
+        self.pois = self.stops = self.contacts = 0
+        self.end: End | None = None
+        self._late = self._lost = False
+        self._events: list[Event] = []
+        self.site = orders.route[0] if orders.route else ""
+        self.ahead = orders.route[1:]
+        if not self.ahead:
+            self.end = "home"  # an empty route ends home, whatever its draw
+        elif fails_before == 0:
+            self._ends("failed", self.site)
+        else:
+            self._tell("departed", self.site)
+
+    def depart(self) -> str | None:
+        """Set off for the next stop, at an epoch: the stop, or ``None`` if the mission is over.
+
+        A robot drawn to fail does so on leaving its last stop for the POI in question.
+        """
+        if self.end is not None:
+            return None
+        if self.orders.is_poi(self.ahead[0]) and self.pois + 1 == self._fails_before:
+            self._ends("failed", self.site, lost=True)
+            return None
+        return self.ahead[0]
+
+    def drive(self, leg: LegDriven) -> None:
+        """Drive the leg to the next stop and serve the stop; fuel burns while driving, and only then."""
+        to = self.ahead[0]
+        runs_dry = leg.time_s > self.tank_s + TOLERANCE_S
+        burnt = min(leg.time_s, max(self.tank_s, 0.0)) if runs_dry else leg.time_s
+        self.clock_s, self.fuel_s, self.tank_s = self.clock_s + burnt, self.fuel_s + burnt, self.tank_s - burnt
+        self.contacts += leg.contacts
+        if burnt < leg.time_s:
+            self._ends("out_of_fuel", to, lost=True)
+        elif leg.stuck:
+            self._ends("stuck", to, lost=True)
+        else:
+            self._arrive(to)
+
+    def _arrive(self, site: str) -> None:
+        """Reach a stop, spend its time, and then refuel, collect, or be home."""
+        self.site, self.ahead = site, self.ahead[1:]
+        self.stops += 1
+        self._tell("arrived", site)
+        self.clock_s += self.orders.stop_s[site]
+        # Only what is over within the mission limit counts; a late robot drives on and earns nothing more.
+        if self.clock_s > self.orders.mission_limit_s + TOLERANCE_S and not self._late:
+            self._late = True
+            self._tell("late", site)
+        if site in self.orders.stations:
+            self.tank_s = self.orders.fuel_capacity_s
+            self._tell("refuelled", site)
+        elif self.orders.is_poi(site):
+            self._collect(site)
+        if not self.ahead:
+            self._ends("late" if self._late else "home", site)
+
+    def _collect(self, site: str) -> None:
+        self.pois += 1
+        if not self._late:
+            earned = self.orders.incentives.get(site, 0.0)
+            self.incentive += earned
+            self._tell("collected", site, earned)
+
+    def _tell(self, kind: EventKind, site: str, incentive: float = 0.0) -> None:
+        self._events.append(Event(time_s=self.clock_s, kind=kind, site=site, incentive=incentive))
+
+    def _ends(self, end: End, site: str, *, lost: bool = False) -> None:
+        self.end, self._lost = end, lost
+        self._tell(end, site)
+
+    def outcome(self) -> Outcome:
+        """What came of it.
+
+        Raises:
+            ValueError: If it is not over.
+        """
+        if self.end is None:
+            raise ValueError(f"the mission of {self.orders.robot} is not over")
+        return Outcome(
+            available=self._fails_before == NEVER, incentive=self.incentive, lost=self._lost, pois_reached=self.pois,
+            stops_reached=self.stops, end=self.end, end_time_s=self.clock_s, fuel_used_s=self.fuel_s,
+            contacts=self.contacts, events=tuple(self._events))
+
+    def state(self) -> RobotState:
+        """What a policy may know of it."""
+        return RobotState(
+            robot=self.orders.robot, site=self.site, ready_s=self.clock_s,
+            burnt_s=self.orders.fuel_capacity_s - self.tank_s, remaining=self.ahead, end=self.end)
+
+
+def settle(orders: Assignment, driven: Driven, fails_before: int = NEVER) -> Outcome:
+    """What comes of a driven route: one robot, which keeps its orders.
+
+    Args:
+        orders: Route and rules.
+        driven: Driving time of its legs, at least of those before a failure.
+        fails_before: 0: fails before leaving the base; k: on leaving its last stop for the k-th POI; ``NEVER``.
+    """
+    mission = RobotMission(orders, fails_before)
+    times, contacts, last = driven.leg_s.tolist(), driven.contacts.tolist(), len(driven.leg_s) - 1
+    leg = 0
+    while mission.depart() is not None:
+        mission.drive(LegDriven(times[leg], driven.stuck and leg == last, contacts[leg]))
+        leg += 1
+    return mission.outcome()
+
+
+def play(
+    orders: Sequence[Assignment], fails_before: Sequence[int], legs: Callable[[int, str, str], LegDriven],
+    policy: Policy,
+) -> list[Outcome]:
+    """Play a team's mission: at each epoch the policy says what is left of each robot's orders.
+
+    Epochs come by time, at equal times by the robot's position. Legs are atomic: a robot is at its next epoch as soon
+    as it has departed, and its remaining orders begin from there. A robot at home has no more epochs.
+
+    Args:
+        orders: Orders that each robot begins with, length (robots,).
+        fails_before: As for ``settle``, length (robots,).
+        legs: What the leg of a robot from one site to another takes, by the robot's position.
+        policy: The policy.
+
+    Raises:
+        ValueError: If the policy leaves a robot with orders that don't end at the base.
+    """
+    missions = [RobotMission(own, fails) for own, fails in zip(orders, fails_before, strict=True)]
+    numbers = {own.robot: number for number, own in enumerate(orders)}
+    epochs = [(0.0, number) for number, mission in enumerate(missions) if mission.end is None]
+    while epochs:
+        now, number = heapq.heappop(epochs)
+        remaining = policy(TeamState(time_s=now, at_epoch=number, robots=tuple(m.state() for m in missions)))
+        for robot, stops in remaining.items():
+            _give_orders(missions[numbers[robot]], tuple(stops))
+        mission = missions[number]
+        origin, to = mission.site, mission.depart()
+        if to is None:
+            continue
+        mission.drive(legs(number, origin, to))
+        if mission.end is None:
+            heapq.heappush(epochs, (mission.clock_s, number))
+    return [mission.outcome() for mission in missions]
+
+
+def _give_orders(mission: RobotMission, stops: tuple[str, ...]) -> None:
+    """Replace what is left of a robot's orders; one whose mission is over takes none."""
+    if mission.end is not None or stops == mission.ahead:
+        return
+    if not stops or stops[-1] != mission.orders.route[0]:
+        raise ValueError(f"the remaining orders of {mission.orders.robot} don't end at the base: {stops}")
+    mission.ahead = stops

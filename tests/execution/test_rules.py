@@ -1,0 +1,175 @@
+"""The rules of one mission, each by hand, and teams whose policy may change their orders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import get_args
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sva_bench.choices import PolicyName
+from sva_bench.execution.outcome import Assignment, Driven, Outcome
+from sva_bench.execution.policies.policy import TeamState
+from sva_bench.execution.policies.registry import POLICIES
+from sva_bench.execution.rules import LegDriven, RobotMission, play, settle
+from sva_bench.mission.failures import NEVER
+
+ROUTE = ("base", "p1", "r1", "p2", "base")
+TIMES = {("base", "p1"): 10.0, ("p1", "r1"): 8.0, ("r1", "p2"): 6.0, ("p2", "base"): 12.0, ("p1", "p2"): 5.0,
+         ("base", "p2"): 7.0, ("p1", "base"): 9.0}
+
+
+def orders(robot: str = "uv1", route: tuple[str, ...] = ROUTE, *, fuel: float = 20.0, limit: float = 50.0
+           ) -> Assignment:
+    return Assignment(robot=robot, route=route, stations=frozenset({"r1"}), incentives={"p1": 5.0, "p2": 7.0},
+                      stop_s={"base": 0.0, "p1": 1.0, "r1": 4.0, "p2": 2.0}, fuel_capacity_s=fuel,
+                      mission_limit_s=limit)
+
+
+def begun(*legs: float, fuel: float = 20.0, limit: float = 50.0, fails: int = NEVER) -> RobotMission:
+    """A mission after some legs."""
+    mission = RobotMission(orders(fuel=fuel, limit=limit), fails)
+    for time_s in legs:
+        assert mission.depart() is not None
+        mission.drive(LegDriven(time_s))
+    return mission
+
+
+def test_a_robot_departs_for_the_next_stop_of_its_orders() -> None:
+    mission = begun()
+    assert mission.depart() == "p1"
+    assert (mission.site, mission.clock_s, mission.ahead) == ("base", 0.0, ("p1", "r1", "p2", "base"))
+
+
+def test_it_arrives_and_its_stop_takes_time_but_no_fuel() -> None:
+    mission = begun(10.0)
+    assert (mission.site, mission.clock_s, mission.fuel_s, mission.tank_s) == ("p1", 11.0, 10.0, 10.0)
+
+
+def test_it_collects_when_its_stop_is_over_within_the_limit() -> None:
+    assert begun(10.0, limit=11.0).incentive == 5.0
+    assert begun(10.0, limit=10.9).incentive == 0.0
+
+
+def test_it_refuels_at_a_station() -> None:
+    assert begun(10.0, 8.0).tank_s == 20.0
+
+
+def test_it_fails_on_leaving_for_the_poi_in_question_and_is_lost() -> None:
+    mission = begun(10.0, 8.0, fails=2)  # uv1 leaves p1 for the station, which is no POI
+    assert mission.depart() is None
+    outcome = mission.outcome()
+    assert (outcome.end, outcome.lost, outcome.available, outcome.incentive) == ("failed", True, False, 5.0)
+
+
+def test_a_robot_that_fails_at_the_base_never_left_and_is_not_lost() -> None:
+    outcome = begun(fails=0).outcome()
+    assert (outcome.end, outcome.lost) == ("failed", False)
+
+
+def test_it_runs_dry_on_the_way_and_is_lost() -> None:
+    outcome = begun(10.0, 8.0, fuel=15.0).outcome()
+    assert (outcome.end, outcome.lost, outcome.end_time_s, outcome.fuel_used_s) == ("out_of_fuel", True, 16.0, 15.0)
+
+
+def test_it_gets_stuck_and_is_lost() -> None:
+    mission = begun(10.0)
+    mission.drive(LegDriven(4.0, stuck=True, contacts=3))
+    outcome = mission.outcome()
+    assert (outcome.end, outcome.lost, outcome.end_time_s, outcome.contacts) == ("stuck", True, 15.0, 3)
+
+
+def test_it_comes_home_late_or_in_time_and_is_not_lost() -> None:
+    for limit, end in ((43.0, "home"), (42.0, "late")):
+        outcome = begun(10.0, 8.0, 6.0, 12.0, limit=limit).outcome()
+        assert (outcome.end, outcome.lost, outcome.end_time_s) == (end, False, 43.0)
+
+
+def test_a_mission_that_goes_on_has_no_outcome() -> None:
+    with pytest.raises(ValueError, match="not over"):
+        begun(10.0).outcome()
+
+
+# Teams and policies
+
+
+def legs_of(number: int, origin: str, destination: str) -> LegDriven:
+    return LegDriven(TIMES[origin, destination] + number)
+
+
+def driven(number: int, route: tuple[str, ...]) -> Driven:
+    times = [TIMES[leg] + number for leg in pairwise(route)]
+    return Driven(leg_s=np.array(times), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
+
+
+def test_every_policy_is_registered() -> None:
+    assert set(POLICIES) == set(get_args(PolicyName))
+
+
+fuels, fates = st.floats(0, 40), st.sampled_from([0, 1, 2, NEVER])
+routes = st.sampled_from([ROUTE, ("base", "p1", "base"), ("base", "p1", "p2", "base"), ()])
+
+
+@given(routes, routes, fuels, fuels, st.floats(0, 60), fates, fates)
+def test_under_none_a_team_fares_as_its_robots_do_alone(
+        one: tuple[str, ...], two: tuple[str, ...], fuel: float, other: float, limit: float, fails: int, fails_too: int
+) -> None:
+    team = [orders("uv1", one, fuel=fuel, limit=limit), orders("uv2", two, fuel=other, limit=limit)]
+    found = play(team, [fails, fails_too], legs_of, POLICIES["none"])
+    assert found == [settle(team[0], driven(0, one), fails), settle(team[1], driven(1, two), fails_too)]
+
+
+@pytest.mark.parametrize("name", sorted(POLICIES))
+@given(fails=fates, fails_too=fates)
+def test_a_policy_gives_orders_that_end_at_the_base_and_the_same_for_the_same_state(
+        name: PolicyName, fails: int, fails_too: int) -> None:
+    seen: list[TeamState] = []
+
+    def watched(state: TeamState) -> Mapping[str, tuple[str, ...]]:
+        seen.append(state)
+        given = POLICIES[name](state)
+        assert given == POLICIES[name](state)
+        assert set(given) <= {robot.robot for robot in state.robots}
+        for robot in state.robots:
+            if robot.end is None and robot.robot in given:
+                assert given[robot.robot][-1] == "base"
+        return given
+
+    team = [orders("uv1"), orders("uv2", ("base", "p2", "base"))]
+    first: list[Outcome] = play(team, [fails, fails_too], legs_of, watched)
+    assert play(team, [fails, fails_too], legs_of, watched) == first
+    times = [state.time_s for state in seen[: len(seen) // 2]]
+    assert times == sorted(times)
+
+
+def test_a_policy_may_change_what_is_left_at_an_epoch() -> None:
+    # At p1, its stop over at 11 s, uv1 is sent home: 9 s more. It burns 19 s of its 20.
+    def homewards(state: TeamState) -> Mapping[str, tuple[str, ...]]:
+        return {"uv1": ("base",)} if state.robots[0].site == "p1" else {}
+
+    (outcome,) = play([orders()], [NEVER], legs_of, homewards)
+    assert (outcome.end, outcome.end_time_s, outcome.fuel_used_s, outcome.incentive) == ("home", 20.0, 19.0, 5.0)
+
+
+def test_at_an_epoch_a_policy_sees_who_stands_where_and_on_how_much() -> None:
+    seen: list[TeamState] = []
+
+    def watched(state: TeamState) -> Mapping[str, tuple[str, ...]]:
+        seen.append(state)
+        return {}
+
+    play([orders("uv1", ("base", "p1", "base")), orders("uv2", ("base", "p2", "base"))], [NEVER, 1], legs_of, watched)
+    # uv1 leaves at 0 and is at p1 until 11; uv2 fails on leaving, so it has one epoch.
+    assert [(s.time_s, s.at_epoch) for s in seen] == [(0.0, 0), (0.0, 1), (11.0, 0)]
+    first, second = seen[-1].robots
+    assert (first.site, first.ready_s, first.burnt_s, first.remaining, first.end) == ("p1", 11.0, 10.0, ("base",), None)
+    assert second.end == "failed"
+
+
+def test_orders_that_do_not_lead_home_are_refused() -> None:
+    with pytest.raises(ValueError, match="don't end at the base"):
+        play([orders()], [NEVER], legs_of, lambda _: {"uv1": ("p2",)})
