@@ -23,8 +23,8 @@ from sva_bench.batch.schema import BatchSettings
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.options import Options
-from tests.test_batch import rows_of
-from tests.test_cli import sva_bench
+from tests.batch.test_commands import rows_of
+from tests.cli.test_commands import sva_bench
 from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL, world_of
 

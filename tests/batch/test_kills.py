@@ -16,8 +16,8 @@ import pyarrow as pa
 import pytest
 
 from tests.batch.test_batches import posted, started, wait_for
-from tests.test_batch import rows_of
-from tests.test_cli import sva_bench
+from tests.batch.test_commands import rows_of
+from tests.cli.test_commands import sva_bench
 
 TRIALS = ("--trials", 1200, "--unit-trials", 10, "--rollouts", 2, "--fidelity", "kinematic")
 UNITS = 2 * 120

@@ -19,11 +19,11 @@ from sva_bench.travel.roadmap import plan_paths
 from sva_bench.travel.samples import arc_points
 from sva_bench.travel.tangents import tangents
 from sva_bench.world.load import load_world
+from tests.geometry.test_cells import cells_of, obstacles_of
 from tests.oracles.distances import path_clearance
 from tests.oracles.worlds import random_obstacles
 from tests.travel.test_maps import places_on
 from tests.travel.test_roadmap import length_of
-from tests.world.test_cells import cells_of, obstacles_of
 
 CLEARANCE_M = 0.297
 

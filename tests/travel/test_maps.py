@@ -17,11 +17,11 @@ from sva_bench.geometry.passages import widest_passage
 from sva_bench.travel.roadmap import plan_paths
 from sva_bench.world.maps.movingai import read_movingai_map
 from sva_bench.world.maps.ros import read_ros_map
+from tests.geometry.test_cells import cells_of, obstacles_of
 from tests.oracles.grids import shortest_lengths
 from tests.oracles.octile import octile_length, read_scen
 from tests.travel.test_roadmap import MEAN_RATIO, WORST_RATIO, length_of
 from tests.world.maps_for_tests import shared_map
-from tests.world.test_cells import cells_of, obstacles_of
 
 CLEARANCE_M = 0.297
 MOVINGAI = ["room-32-32-4", "maze-32-32-2", "random-32-32-20", "empty-32-32"]

@@ -13,8 +13,8 @@ import pytest
 from sva_bench.analysis.over_maps import Percentage
 from sva_bench.batch.aggregates import aggregate
 from sva_bench.files.records import as_dict
+from tests.cli.test_commands import sva_bench, world_file
 from tests.results_for_tests import unit
-from tests.test_cli import sva_bench, world_file
 from tests.worlds_for_tests import SMALL
 
 QUICK = ("--trials", 60, "--rollouts", 2, "--fidelity", "kinematic")

@@ -16,7 +16,7 @@ from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 from sva_bench.choices import PathPlanner
 from sva_bench.errors import BadFile, BadInput
-from tests.test_cli import sva_bench
+from tests.cli.test_commands import sva_bench
 from tests.worlds_for_tests import SMALL
 
 SWEEP = """\

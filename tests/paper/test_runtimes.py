@@ -27,8 +27,8 @@ from sva_bench.paper.runtimes import (
 from sva_bench.paper.solves import METHODS, Row, Study, read_rows, run
 from sva_bench.solver.two_stage import plan_stochastic
 
-PAPER = Path(__file__).parents[1] / "../shared/paper.tex"
-DOCS = Path(__file__).parents[1] / "docs"
+PAPER = Path(__file__).parents[2] / "../shared/paper.tex"
+DOCS = Path(__file__).parents[2] / "docs"
 # A mission limit of 0.6 fuel capacities leaves POIs behind, so that there is something to prove and to cut.
 TINY = Study(pois=(6,), seeds=(1,), fuel_multiples=(2.25,), availabilities=(0.75,), tau=0.6)
 

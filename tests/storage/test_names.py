@@ -15,7 +15,7 @@ from sva_bench.cli.loading import by_name
 from sva_bench.errors import BadInput
 from sva_bench.storage.run_folder import stem_of
 from sva_bench.storage.stored_run import read_content
-from tests.test_cli import TINY
+from tests.cli.test_commands import TINY
 from tests.worlds_for_tests import SMALL, world_of
 
 # In the first scenario nobody fails, in the second everybody does.

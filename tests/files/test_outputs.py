@@ -16,7 +16,7 @@ from PIL import Image
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder, check_output
-from tests.test_cli import TINY, sva_bench
+from tests.cli.test_commands import TINY, sva_bench
 from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL
 
@@ -181,7 +181,7 @@ def test_ctrl_c_is_heard_while_libraries_are_loaded(tmp_path: Path) -> None:
     (tmp_path / "typer.py").write_text("import time\nopen('loading', 'w').close()\ntime.sleep(60)\n")
     with subprocess.Popen([sys.executable, "-c", "from sva_bench.__main__ import main; main()"], cwd=tmp_path,
                           stderr=subprocess.PIPE, text=True,
-                          env=os.environ | {"PYTHONPATH": f"{tmp_path}:{Path(__file__).parents[1]}"}) as process:
+                          env=os.environ | {"PYTHONPATH": f"{tmp_path}:{Path(__file__).parents[2]}"}) as process:
         until = time.monotonic() + 60
         while not (tmp_path / "loading").exists() and time.monotonic() < until:
             time.sleep(0.01)

@@ -90,7 +90,7 @@ import sys, time
 from sva_bench.workers.answers import Caps
 from sva_bench.workers.local import LocalProcesses
 from sva_bench.workers.pool import local_workers
-from tests.batch.test_engines import Deed
+from tests.workers.test_guarded import Deed
 
 if __name__ == "__main__":
     engine = LocalProcesses(1, Caps(time_s=600.0, memory_mb=0))
