@@ -22,9 +22,9 @@ from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import unless_interrupted
 from sva_bench.robot.model import USUAL_MODEL
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.solver.routes.fronts import tables_of
+from sva_bench.solver.routes.fronts import leg_tables
 from sva_bench.solver.routes.heuristic import VisitOrders, search
-from sva_bench.solver.routes.refuelling import quickest, road_of
+from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.solver.two_stage import SolveLimits, plan_nominal
 from sva_bench.world.model import Site
 
@@ -168,8 +168,8 @@ def _limited(free: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> Propo
 def _hopeless(instance: Instance) -> bool:
     """Whether a robot can collect nothing."""
     for vehicle in instance.vehicles:
-        road = road_of(instance, vehicle)
-        if not any(quickest(road, (poi,)) for poi in instance.pois if vehicle.incentives[poi] > 0):
+        own_legs = vehicle_legs(instance, vehicle)
+        if not any(quickest_route(own_legs, (poi,)) for poi in instance.pois if vehicle.incentives[poi] > 0):
             return True
     return False
 
@@ -216,8 +216,8 @@ def _instance(proposal: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> 
 
 def _alone_s(instance: Instance, capacity_s: float) -> list[float]:
     """Least time to visit each POI alone and come home on such fillings [s]; ``inf`` where they don't last."""
-    road = road_of(instance, replace(instance.vehicles[0], fuel_capacity_s=capacity_s))
-    drives = [quickest(road, (poi,)) for poi in instance.pois]
+    own_legs = vehicle_legs(instance, replace(instance.vehicles[0], fuel_capacity_s=capacity_s))
+    drives = [quickest_route(own_legs, (poi,)) for poi in instance.pois]
     return [math.inf if drive is None else drive.time_s for drive in drives]
 
 
@@ -228,7 +228,7 @@ def _weights(instance: Instance) -> FloatArray:
 def _good_orders(instance: Instance, weights: FloatArray, stop: Callable[[float], bool]) -> VisitOrders:
     """A good plan; any one whose worth is enough to stop."""
     robots = len(weights)
-    return search(tables_of(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), starts=1,
+    return search(leg_tables(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), starts=1,
                   stop=stop).orders
 
 

@@ -13,7 +13,7 @@ from sva_bench.analysis.reach import reached
 from sva_bench.analysis.summaries import Reach
 from sva_bench.choices import PathPlanner
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.solver.routes.refuelling import quickest, road_of
+from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.study.given_plans import instance_name
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.travel.times import plan_travel_times
@@ -60,8 +60,8 @@ def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list
     instance = instance_of(world, costs, nominal_scenario(world))
     lost = {}
     for vehicle in instance.vehicles:
-        road = road_of(instance, vehicle)
-        pois = [instance.sites[poi] for poi in instance.pois if quickest(road, (poi,)) is None]
+        own_legs = vehicle_legs(instance, vehicle)
+        pois = [instance.sites[poi] for poi in instance.pois if quickest_route(own_legs, (poi,)) is None]
         if pois:
             lost[vehicle.name] = pois
     return lost

@@ -20,7 +20,7 @@ from sva_bench.generate.worlds import random_world
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.routes.refuelling import quickest
+from sva_bench.solver.routes.refuelling import quickest_route
 from sva_bench.solver.two_stage import knowledge_of, plan_nominal
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.options import Options
@@ -62,9 +62,9 @@ def check_that_it_is_a_good_mission(world: World) -> None:
 
 def collected_alone(instance: Instance) -> list[float]:
     """The most that each robot can collect at a single POI."""
-    roads = knowledge_of(instance).roads
-    return [max(vehicle.incentives[poi] if quickest(road, (poi,)) else 0.0 for poi in instance.pois)
-            for vehicle, road in zip(instance.vehicles, roads, strict=True)]
+    legs_by_vehicle = knowledge_of(instance).legs_by_vehicle
+    return [max(vehicle.incentives[poi] if quickest_route(own_legs, (poi,)) else 0.0 for poi in instance.pois)
+            for vehicle, own_legs in zip(instance.vehicles, legs_by_vehicle, strict=True)]
 
 
 def test_a_random_world_is_a_good_mission_with_the_papers_scenarios() -> None:

@@ -48,7 +48,7 @@ def test_failures_along_the_route_go_to_the_methods_that_serve_them(method: Meth
 
 
 def test_the_edge_model_refuses_robots_that_refuel() -> None:
-    with pytest.raises(BadInput, match=r"the method undirected \(.*\) doesn't serve it; take the method auto"):
+    with pytest.raises(BadInput, match=r"the method undirected \(.*\) doesn't support it; take the method auto"):
         plan_stochastic(REFUELLING, method="undirected")
 
 
