@@ -17,7 +17,7 @@ from sva_bench.files.documents import Loc, parse_yaml
 from sva_bench.files.fields import NAME
 from sva_bench.files.yaml_text import pretty_yaml
 from sva_bench.generate.terrain import DENSITY, random_places, random_terrain
-from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
+from sva_bench.geometry.cells import MAX_BOXES, TooManyBoxes, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -114,7 +114,7 @@ def world_from_map(
     section: dict[str, Any] = {form.key: {**told, "file": f"{name}-map/{read[0].name}"}}
     try:
         obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes_of(cells), cylinders=np.empty((0, 3)), cells=cells)
-    except TooRagged:
+    except TooManyBoxes:
         raise BadInput(f"{source}: its occupied cells take more than the {MAX_BOXES} boxes that physics holds; clean "
                        "the map of speckles, or cut it") from None
     radius = BUILT_IN[USUAL_MODEL].radius_m

@@ -31,7 +31,7 @@ from matplotlib.ticker import MultipleLocator
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import SiteKind
-from sva_bench.geometry.cells import TooRagged, bounds_of, boxes_of
+from sva_bench.geometry.cells import TooManyBoxes, bounds_of, boxes_of
 from sva_bench.report.labels import place_labels
 from sva_bench.world.model import World
 
@@ -194,7 +194,7 @@ def _layers(world: World) -> list[tuple[FloatArray, str, float]]:
         return [(boxes, _GREY, 1.0)] if len(boxes) else []
     try:
         known = boxes_of(replace(cells, occupied=cells.occupied & ~cells.unknown, unknown=None))
-    except TooRagged:
+    except TooManyBoxes:
         return [(boxes, _LIGHT_GREY, 0.5)]
     # Where a grid stands askew, the first four fill what is outside it.
     return [(boxes, _LIGHT_GREY, 0.5), (known[4 if cells.origin[2] else 0:], _GREY, 1.0)]

@@ -12,8 +12,8 @@ import numpy as np
 from sva_bench.choices import SiteKind
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_yaml, validate
-from sva_bench.geometry.buckets import open_heading, view_checker
-from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
+from sva_bench.geometry.buckets import longest_view_heading, sight_checker
+from sva_bench.geometry.cells import MAX_BOXES, TooManyBoxes, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, marginals, without_joint
@@ -96,7 +96,7 @@ def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSo
         raise
     try:
         boxes = boxes_of(cells)
-    except TooRagged:
+    except TooManyBoxes:
         raise document.error(("map", kind, "file"), f"its occupied cells take more than the {MAX_BOXES} boxes that "
                              "physics holds; clean the map of speckles, or cut it") from None
     obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes, cylinders=np.empty((0, 3)), cells=cells)
@@ -125,7 +125,7 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
     if clearance(obstacles, *file.sites.base.at_m) >= widest_m:  # else that is what to mend first
         entries += _stations_and_pois(document, file.sites, obstacles, widest_m)
     sites: list[Site] = []
-    sight = view_checker(obstacles)
+    sight = sight_checker(obstacles)
     for kind, name, entry, loc in entries:
         if any(site.name == name for site in sites):
             raise document.error(loc, f"there is another site named {name!r}; names must differ")
@@ -135,7 +135,7 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
             where = "inside an obstacle or outside the bounds" if gap <= 0 else f"only {gap:.3f} m from an obstacle"
             raise document.error((*loc, "at_m"), f"{name} is {where}; a robot of radius {widest_m} m doesn't fit "
                                  "there: move the site")
-        heading = (_radians(math.degrees(open_heading(obstacles, x, y, sight))) if entry.heading_deg is None
+        heading = (_radians(math.degrees(longest_view_heading(obstacles, x, y, sight))) if entry.heading_deg is None
                    else _radians(entry.heading_deg))
         sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s))
     for k, site in enumerate(sites):

@@ -19,7 +19,7 @@ from sva_bench.execution.engines.bullet import obstacles_urdf
 from sva_bench.geometry.buckets import clearances, keeps_clearance
 from sva_bench.geometry.cells import (
     Cells,
-    TooRagged,
+    TooManyBoxes,
     bounds_of,
     boxes_of,
     connected_region,
@@ -77,7 +77,7 @@ def test_the_cover_is_exact_and_no_cell_is_covered_twice(occupied: BoolArray) ->
 
 
 def test_a_checkerboard_is_refused_before_it_fills_the_memory() -> None:
-    with pytest.raises(TooRagged):
+    with pytest.raises(TooManyBoxes):
         cover(np.indices((2000, 2000)).sum(axis=0) % 2 == 0)
 
 

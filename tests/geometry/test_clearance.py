@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear, keeps_clearance, open_heading
+from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear, keeps_clearance, longest_view_heading
 from sva_bench.geometry.distances import clearance, segment_distance
 from sva_bench.geometry.obstacles import Obstacles
 from tests.oracles.distances import points_clearance, segment_clearance
@@ -128,15 +128,15 @@ def test_the_open_heading_looks_down_the_longest_free_line() -> None:
     # longer where it reaches: 9 / cos 5 = 9.03 m, but meets the side wall after 1 / sin 5 = 11.5 m. At 10 degrees it
     # meets it after 5.76 m. So 5 degrees (and -5 = 355) win; the smaller angle is taken.
     room = obstacles(bounds=[0, 0, 10, 2])
-    assert open_heading(room, 1, 1) == pytest.approx(math.radians(5))
+    assert longest_view_heading(room, 1, 1) == pytest.approx(math.radians(5))
     # A post on that side blocks 5 degrees, not 355.
     post = obstacles(bounds=[0, 0, 10, 2], cylinders=[[6, 1.45, 0.1]])
-    assert open_heading(post, 1, 1) == pytest.approx(math.radians(355))
+    assert longest_view_heading(post, 1, 1) == pytest.approx(math.radians(355))
 
 
 def test_ties_of_open_headings_go_to_the_smallest_angle() -> None:
     # In the middle of a square all four corners are as far.
-    assert open_heading(obstacles(bounds=[-1, -1, 1, 1]), 0, 0) == pytest.approx(math.radians(45))
+    assert longest_view_heading(obstacles(bounds=[-1, -1, 1, 1]), 0, 0) == pytest.approx(math.radians(45))
 
 
 def test_obstacles_are_read_only_copies_of_the_right_shape() -> None:
