@@ -35,14 +35,14 @@ def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterato
     """What is known of each point and seed of which some trials are done."""
     ranges = grid.ranges()
     for point, seed in grid.strands():
-        together: Note | None = None
+        combined: Note | None = None
         for first, _ in ranges:
             unit = grid.unit_name(point, seed, first)
             if unit in done:
                 note = read_note(shard_path(folder, unit), unit_of(grid, point, seed, first))
-                together = note if together is None else joined(together, note)
-        if together is not None:
-            yield together
+                combined = note if combined is None else joined(combined, note)
+        if combined is not None:
+            yield combined
 
 
 def joined(a: Note, b: Note) -> Note:
@@ -99,12 +99,12 @@ Key = tuple[str, str, str]
 
 def over_seeds(notes: Sequence[Note]) -> dict[Key, Estimate]:
     """Executed VSS of each map over the trials of all its seeds: each has failures and noise draws of its own."""
-    together: dict[Key, Figure] = {}
+    combined: dict[Key, Figure] = {}
     for note in notes:
         for scenario, tally in note.tallies.items():
             key = note.variant, scenario, note.facts.world
-            together[key] = pooled(together[key], tally.difference) if key in together else tally.difference
-    return {key: estimate(figure) for key, figure in together.items()}
+            combined[key] = pooled(combined[key], tally.difference) if key in combined else tally.difference
+    return {key: estimate(figure) for key, figure in combined.items()}
 
 
 def map_rows(units: Sequence[UnitSummary], executed: Mapping[Key, Estimate]) -> tuple[MapRow, ...]:

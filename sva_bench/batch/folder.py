@@ -64,20 +64,20 @@ def begin(folder: Path, settings: BatchSettings, *, resume: bool) -> None:
         BadInput: If it holds something else, or cannot be written to.
     """
     try:
-        held = [path for path in folder.iterdir() if path.suffix != ".tmp"]
+        stored = [path for path in folder.iterdir() if path.suffix != ".tmp"]
         manifest = folder / "manifest.json"
-        if not resume and manifest in held and not units_in(folder) and settings_in(folder) \
+        if not resume and manifest in stored and not units_in(folder) and settings_in(folder) \
                 and not any((folder / name).exists() for name in ("failures.json", "summary.json")):
-            held = []  # begun, but nothing was done
-        if held and not resume:
+            stored = []  # begun, but nothing was done
+        if stored and not resume:
             raise BadInput(f"{folder}: the folder isn't empty; go on with --resume, or choose another with --out")
-        if held:
+        if stored:
             refuse_other_settings(folder, settings)
         for draft in folder.glob("*.tmp"):
             draft.unlink()
     except OSError as error:
         raise _unwritable(folder, error) from None
-    if not held:
+    if not stored:
         content = pretty_json(as_dict(BatchManifest(settings=settings))).encode()
         if len(content) > MOST_BYTES:
             raise BadInput(f"the worlds and variants of this batch take {len(content)} bytes; at most {MOST_BYTES} are "
@@ -105,31 +105,31 @@ def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
 
 def refuse_other_settings(folder: Path, settings: BatchSettings) -> None:
     """Refuse to go on with a folder of other settings, naming what differs with both values."""
-    held, now = settings_in(folder)[0].data, json.loads(json.dumps(as_dict(settings)))
-    differences = list(islice(_differences(held, now), _MOST_TOLD + 1))
+    stored, now = settings_in(folder)[0].data, json.loads(json.dumps(as_dict(settings)))
+    differences = list(islice(_differences(stored, now), _MOST_NAMED + 1))
     if not differences:
         return
-    told = [f"{key} ({_shown(was)} there, {_shown(is_now)} now)" for key, was, is_now in differences[:_MOST_TOLD]]
-    more = ["and more"] if len(differences) > _MOST_TOLD else []
+    named = [f"{key} ({_shown(was)} there, {_shown(is_now)} now)" for key, was, is_now in differences[:_MOST_NAMED]]
+    more = ["and more"] if len(differences) > _MOST_NAMED else []
     raise BadFile(folder / "manifest.json", None, "settings", "not those of the batch in this folder: "
-                  f"{', '.join([*told, *more])}; use the same settings, or choose another folder with --out")
+                  f"{', '.join([*named, *more])}; use the same settings, or choose another folder with --out")
 
 
 _ABSENT = object()
-_MOST_TOLD = 12
+_MOST_NAMED = 12
 
 
-def _differences(held: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+def _differences(stored: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Each key at which two settings differ, and both values."""
-    if isinstance(held, dict) and isinstance(now, dict):
-        for name in [*held, *(name for name in now if name not in held)]:
-            yield from _differences(held.get(name, _ABSENT), now.get(name, _ABSENT), f"{key}.{name}" if key else name)
-    elif isinstance(held, list) and isinstance(now, list) and len(held) == len(now) and \
-            any(isinstance(item, dict | list) for item in [*held, *now]):
-        for number, (one, other) in enumerate(zip(held, now, strict=True)):
+    if isinstance(stored, dict) and isinstance(now, dict):
+        for name in [*stored, *(name for name in now if name not in stored)]:
+            yield from _differences(stored.get(name, _ABSENT), now.get(name, _ABSENT), f"{key}.{name}" if key else name)
+    elif isinstance(stored, list) and isinstance(now, list) and len(stored) == len(now) and \
+            any(isinstance(item, dict | list) for item in [*stored, *now]):
+        for number, (one, other) in enumerate(zip(stored, now, strict=True)):
             yield from _differences(one, other, f"{key}[{number}]")
-    elif held is _ABSENT or now is _ABSENT or held != now:
-        yield key, held, now
+    elif stored is _ABSENT or now is _ABSENT or stored != now:
+        yield key, stored, now
 
 
 def _shown(value: Any) -> str:
@@ -168,10 +168,10 @@ def write_maps(folder: Path, files: Mapping[str, bytes]) -> None:
         path = folder / name
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            held = path.exists() and path.read_bytes() == content
+            stored = path.exists() and path.read_bytes() == content
         except OSError as error:
             raise _unwritable(path, error) from None
-        if not held:
+        if not stored:
             write(path, content)
 
 

@@ -74,10 +74,10 @@ class Grid:
 
     def settings(self) -> BatchSettings:
         """Everything that the rows and shards of a batch depend on."""
-        told = self.options
+        stored = self.options
         options = OptionsEntry(
-            trials=told.trials, rollouts=told.rollouts, fidelity=told.fidelity, informed=False, assumptions=False,
-            time_limit_s=told.limits.time_limit_s, gap=told.limits.gap, evpi=told.evpi)
+            trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, informed=False, assumptions=False,
+            time_limit_s=stored.limits.time_limit_s, gap=stored.limits.gap, evpi=stored.evpi)
         return BatchSettings(version=__version__, seeds=tuple(self.seeds), options=options,
                              unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points})
 
@@ -143,10 +143,10 @@ def grid_of(document: Part, settings: BatchSettings) -> Grid:
         BadFile: If a world there is wrong, or stands under another name than its own.
         BadInput: If there are more units than any batch of ours has.
     """
-    told = settings.options
+    stored = settings.options
     options = Options(
-        trials=told.trials, rollouts=told.rollouts, fidelity=told.fidelity, evpi=told.evpi,
-        limits=SolveLimits(time_limit_s=told.time_limit_s, gap=told.gap))
+        trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, evpi=stored.evpi,
+        limits=SolveLimits(time_limit_s=stored.time_limit_s, gap=stored.gap))
     points = []
     for name, entry in settings.points.items():
         at = ("points", name)

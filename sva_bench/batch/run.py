@@ -85,21 +85,21 @@ def run_batch(
     with locked(folder):
         begin(folder, grid.settings(), resume=resume or retry)
         write_maps(folder, grid.map_files())
-        books = _Books(grid, folder, retry=retry)
-        report(books.progress())
-        if books.left:
+        state = _BatchState(grid, folder, retry=retry)
+        report(state.progress())
+        if state.left:
             with engine() as running:
                 Conductor(running, cache, Hooks(
-                    shard=books.keep, unit_failed=books.unit_failed, strand_failed=books.strand_failed,
-                    tick=lambda: report(books.progress()))).run(books.strands())
-        summary = summary_of(grid, folder, books.done, books.failures)
+                    shard=state.keep, unit_failed=state.unit_failed, strand_failed=state.strand_failed,
+                    tick=lambda: report(state.progress()))).run(state.strands())
+        summary = summary_of(grid, folder, state.done, state.failures)
         write(folder / "summary.json", pretty_json(as_dict(summary)).encode())
         with writing(folder / "report.html") as draft:
             write_batch_report(draft, summary)
         return summary
 
 
-class _Books:
+class _BatchState:
     """What is done, what was given up, and what it comes to so far."""
 
     def __init__(self, grid: Grid, folder: Path, *, retry: bool) -> None:
@@ -112,7 +112,7 @@ class _Books:
         if self.failures != held:
             write_failures(folder, self.failures)
         self._before = len(self.done)
-        self._so_far: dict[tuple[str, int], Note] = {}
+        self._totals: dict[tuple[str, int], Note] = {}
         for unit, (point, seed, first) in self._owner.items():
             if unit in self.done:
                 self._add(point.name, seed, read_note(shard_path(folder, unit), unit_of(grid, point, seed, first)))
@@ -124,9 +124,9 @@ class _Books:
 
     def strands(self) -> Iterator[tuple[Point, int, Strand]]:
         """The work that is left."""
-        over = frozenset(self.done | {failure.unit for failure in self.failures})
+        finished = frozenset(self.done | {failure.unit for failure in self.failures})
         for point, seed in self._grid.strands():
-            yield point, seed, strand(self._grid, point, seed, over)
+            yield point, seed, strand(self._grid, point, seed, finished)
 
     def keep(self, unit: str, shard: Shard) -> None:
         """Write a unit's rows."""
@@ -138,25 +138,25 @@ class _Books:
     def unit_failed(self, unit: str, reason: str, attempts: int) -> None:
         """Put down that a unit was given up."""
         point, seed, _ = self._owner[unit]
-        self._put_down([(unit, point, seed)], reason, attempts)
+        self._add_failures([(unit, point, seed)], reason, attempts)
 
     def strand_failed(self, point: Point, seed: int, reason: str, attempts: int) -> None:
         """Put down that all that was left of a point and seed was given up."""
-        over = self.done | {failure.unit for failure in self.failures}
+        finished = self.done | {failure.unit for failure in self.failures}
         names = [self._grid.unit_name(point, seed, first) for first, _ in self._grid.ranges()]
-        self._put_down([(name, point, seed) for name in names if name not in over], reason, attempts)
+        self._add_failures([(name, point, seed) for name in names if name not in finished], reason, attempts)
 
     def progress(self) -> BatchProgress:
         """How far the batch is."""
         return BatchProgress(done=len(self.done), failed=len(self.failures), units=len(self._owner),
                              before=self._before, seconds=time.monotonic() - self._begun,
-                             vss=lambda: aggregate([unit_summary(note) for note in self._so_far.values()]))
+                             vss=lambda: aggregate([unit_summary(note) for note in self._totals.values()]))
 
-    def _put_down(self, units: list[tuple[str, Point, int]], reason: str, attempts: int) -> None:
+    def _add_failures(self, units: list[tuple[str, Point, int]], reason: str, attempts: int) -> None:
         self.failures += [GivenUp(unit=unit, world=point.label, seed=seed, reason=reason, attempts=attempts)
                           for unit, point, seed in units]
         write_failures(self._folder, self.failures)
 
     def _add(self, point: str, seed: int, note: Note) -> None:
-        known = self._so_far.get((point, seed))
-        self._so_far[point, seed] = note if known is None else joined(known, note)
+        known = self._totals.get((point, seed))
+        self._totals[point, seed] = note if known is None else joined(known, note)

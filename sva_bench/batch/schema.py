@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from sva_bench.analysis.over_maps import GivenUp
-from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, two
+from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, low_and_high
 from sva_bench.analysis.summaries import Facts
-from sva_bench.analysis.unseen import UNHAPPY
+from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.choices import ENDS, Fidelity, Objective, PathPlanner
-from sva_bench.files.fields import Name, Number, Seed, WholeNumber
+from sva_bench.files.fields import Name, NonNegativeInt, Number, Seed
 from sva_bench.files.records import Record
 
 MANIFEST: Literal["sva-bench/batch-manifest@1"] = "sva-bench/batch-manifest@1"
@@ -75,7 +75,7 @@ class GivenUpUnits(Record):
     failures: tuple[GivenUp, ...]
 
 
-_Bounds = Annotated[tuple[_Sum, _Sum], BeforeValidator(two)]
+_Bounds = Annotated[tuple[_Sum, _Sum], BeforeValidator(low_and_high)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ class StoredPlan(Record):
     total: StoredFigure
     by_robot: tuple[_Sum, ...]
     ends: Annotated[tuple[_Count, ...], Field(min_length=len(ENDS), max_length=len(ENDS))]
-    charged: Annotated[tuple[_Sum, ...], Field(min_length=len(UNHAPPY), max_length=len(UNHAPPY))]
+    charged: Annotated[tuple[_Sum, ...], Field(min_length=len(EXECUTION_LOSSES), max_length=len(EXECUTION_LOSSES))]
     statistics: Mapping[Name, StoredFigure] = field(default_factory=dict)
 
 
@@ -125,7 +125,7 @@ class StoredNote(Record):
     facts: Facts
     variant: Words
     robots: Annotated[tuple[Name, ...], Field(min_length=1)]
-    first: WholeNumber
+    first: NonNegativeInt
     trials: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
     tallies: Mapping[Name, StoredTally]
 

@@ -156,7 +156,7 @@ def seeds_of(words: Sequence[str], what: str = "--seed ") -> tuple[int, ...]:
     for part in ",".join(words).split(","):
         ends = part.strip().split("-")
         if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
-            raise BadInput(f"{what}{part.strip()!r}: expected a whole number, or a range like 0-9")
+            raise BadInput(f"{what}{part.strip()!r}: expected an integer, or a range like 0-9")
         if any(len(end) > 100 or int(end) > MOST_SEED for end in ends):
             raise BadInput(f"{what}{shown(part.strip())}: a seed is {MOST_SEED} at most (2^63 - 1)")
         first, last = int(ends[0]), int(ends[-1])
@@ -216,9 +216,9 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
     planners = sweep.planners or ("prmstar",)
     for key, values in vary.items():
         if len({json.dumps(value) for value in values}) < len(values):
-            raise sweep.wrong("vary", ("set", key), f"--set {key}", "a value stands there twice")
+            raise sweep.wrong("vary", ("set", key), f"--set {key}", "a value is a duplicate")
     if len(set(planners)) < len(planners):
-        raise sweep.wrong("planners", ("planners",), "--planner", "a planner stands there twice; name each once")
+        raise sweep.wrong("planners", ("planners",), "--planner", "a planner is a duplicate; name each once")
     options = _options_of(sweep)
     unit_trials = sweep.unit_trials or (UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS)
     seeds = sweep.seeds or (0,)

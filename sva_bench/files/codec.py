@@ -175,7 +175,7 @@ def _pairs_of(keys: _Codec, values: _Codec) -> _Codec:
         pairs = [_exactly(pair, 2) for pair in _exactly(tree)]
         found = {keys.decode(key, body): values.decode(item, body) for key, item in pairs}
         if len(found) < len(pairs):
-            raise NotOfType("a key stands twice")
+            raise NotOfType("a key is a duplicate")
         return found
 
     return _Codec(encode, decode)

@@ -104,9 +104,9 @@ _PLAINLY = {  # what pydantic says of its own types, said of the file
     "dataclass_type": "expected a mapping", "tuple_type": "expected a list", "list_type": "expected a list",
     "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
     "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",
-    "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
-    "float_parsing": "expected a number", "int_parsing": "expected a whole number",
-    "int_from_float": "expected a whole number",
+    "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected an integer",
+    "float_parsing": "expected a number", "int_parsing": "expected an integer",
+    "int_from_float": "expected an integer",
 }
 
 

@@ -126,7 +126,7 @@ def read_json(path: Path, most: int = MAX_JSON_BYTES) -> Document:
         if len(found) < len(pairs):
             keys = [key for key, _ in pairs]
             key = next(key for key in keys if keys.count(key) > 1)
-            raise BadFile(path, _last_line_of(text, f'"{key}"'), dotted((key,)), "this key stands twice; remove one")
+            raise BadFile(path, _last_line_of(text, f'"{key}"'), dotted((key,)), "this key is a duplicate; remove one")
         return found
 
     def refuse(constant: str) -> float:

@@ -17,7 +17,7 @@ Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]
 """Times [s] and incentives: sums of more than 1e9 would lose the feasibility tolerance to rounding."""
 Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
-WholeNumber = Annotated[int, Field(strict=True, ge=0)]
+NonNegativeInt = Annotated[int, Field(strict=True, ge=0)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=MOST_SEED)]
 
 

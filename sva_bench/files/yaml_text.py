@@ -78,7 +78,7 @@ def plain_data(node: Node, path: Path, loc: Loc) -> Any:
             key = str(key_node.value)
             if key in data:
                 raise BadFile(path, key_node.start_mark.line + 1, dotted((*loc, key)),
-                              "this key stands twice; remove one")
+                              "this key is a duplicate; remove one")
             data[key] = plain_data(value_node, path, (*loc, key))
         return data
     if isinstance(node, SequenceNode):

@@ -89,7 +89,7 @@ def markdown(rows: Sequence[Row], study: Study, picture: str | None = None) -> s
         "BD: optimality cuts, SEC: subtour cuts, averages; up to the limit where a solve met it. The paper adds its "
         "cuts while CPLEX branches. HiGHS takes none there, so ours come between runs of the master program, and a "
         "limit that ends the first run leaves one optimality cut and no subtour cut. Ours count a subtour cut for each "
-        "POI of a part that does not hang together with the base, and for each vehicle; the paper has one a part.",
+        "POI of a component that is not connected with the base, and for each vehicle; the paper has one a component.",
         "## Runtime of the decomposition (Table 3)", runtime_table(rows),
         f"In seconds. A solve that met its limit counts with the time it took: {LIMIT_S:g} in the paper.",
         "## Gaps (Figure 3)", f"![Box plots of gaps]({picture})" if picture else "", gaps_table(rows),

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 
 from sva_bench import __version__
 from sva_bench.analysis.results import Amount, Words
-from sva_bench.files.fields import Seed, WholeNumber
+from sva_bench.files.fields import NonNegativeInt, Seed
 from sva_bench.files.records import Record
 from sva_bench.files.versions import library_versions
 from sva_bench.workers.pool import usable_cores
@@ -36,7 +36,7 @@ class Machine(Record):
 
     platform: Words
     python: Words
-    cpus: WholeNumber
+    cpus: NonNegativeInt
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -109,7 +109,7 @@ class Planned:
 
 def model_is_executed(world: World) -> bool:
     """Whether failures are planned for and executed as in the two-stage model."""
-    return world.plan_failure == world.execute_failure == "mission"
+    return world.plan_failure == world.execute_failure == MODEL
 
 
 def plan_scenarios(

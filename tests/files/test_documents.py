@@ -64,7 +64,7 @@ def test_a_good_file_gives_its_data(tmp_path: Path) -> None:
      "found the text '1': take the quotes away"),
     ("format: test/whole@1\nname: a b\n", 2, "name", "no valid name"),
     ("format: test/whole@1\nname: ../a\n", 2, "name", "no valid name"),
-    ("format: test/whole@1\nname: a\nname: b\n", 3, "name", "stands twice"),
+    ("format: test/whole@1\nname: a\nname: b\n", 3, "name", "is a duplicate"),
     ("format: test/whole@2\nname: a\n", 1, "format", "expected 'test/whole@1', found 'test/whole@2'"),
     ("name: a\n", 1, "", "the key 'format' is missing"),
     ("- format\n", 1, "", "expected a mapping"),
@@ -158,7 +158,7 @@ def test_dates_and_words_of_old_yaml_stay_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "line", "says"), [
-    ('{"a": 1,\n "a": 2}', 2, "stands twice"),
+    ('{"a": 1,\n "a": 2}', 2, "is a duplicate"),
     ('{"a": 1,\n "b": NaN}', 2, "NaN is not a number"),
     ('{"a": 1,\n "b": -Infinity}', 2, "-Infinity is not a number"),
     ('{"a": 1,\n "b" 2}', 2, "not valid JSON"),

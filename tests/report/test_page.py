@@ -188,7 +188,7 @@ def spoil(folder: Path, what: str) -> None:
     ("foreign", r"outcomes\.parquet: incentive: these aren't the trials of summary\.json: half, stochastic"),
     ("missing", r"the run folder is incomplete: legs\.parquet is missing; run its command again"),
     ("older", r"summary\.json:\d+: scenarios\[0\]\.vss\.executed: the key 'executed' is missing; add it"),
-    ("vss", r"vss\.executed\.mean: expected what the stochastic plan collects beyond the other"),
+    ("vss", r"vss\.executed\.mean: expected the difference between the plans"),
     ("interval", r"executed: ci95: the mean, .* lies outside"),
     ("availability", r"availability: not that of the world in manifest\.json"),
     ("seed", r"seed: not of the world in manifest\.json: expected 0, found 7"),

@@ -165,7 +165,7 @@ def test_more_stations_than_fit_are_refused() -> None:
     # Stations keep their own distance: what is asked of POIs is no matter of theirs.
     ("min_spacing_m: 0.8", "min_spacing_m: 6", "sites.pois", "no POIs .* keep 6 m .* a smaller min_spacing_m"),
     ("random: 4, seed: 7", "random: 4", "sites.pois.seed", "the key 'seed' is missing"),
-    ("random: 4", "random: many", "sites.pois.random", "expected a whole number"),
+    ("random: 4", "random: many", "sites.pois.random", "expected an integer"),
     ("random: 4", "random: 4, spacing: 1", "sites.pois.spacing", "unknown key 'spacing'; did you mean 'min_spacing_m'"),
     ("spread: 2", "spread: 0", "sites.stations.spread", "expected at least 1"),
     ("[0.8, 0.8]", "[0.1, 0.8]", "sites.base.at_m", "doesn't fit there"),
