@@ -30,12 +30,12 @@ def beyond_reach(reach: Reach) -> list[str]:
     """A sentence for each robot that can't visit some POIs within its fuel and limit; none if no POI is reachable."""
     if reach.nothing:
         return []
-    said = [f"{robot} reaches no POI within its fuel and limit, and stays home." if robot in reach.robots else
+    sentences = [f"{robot} reaches no POI within its fuel and limit, and stays home." if robot in reach.robots else
             f"{robot} reaches none of {_named(pois)} within its fuel and limit, and will never be sent there."
             for robot, pois in reach.missed.items()]
     if reach.pois:
-        said.append(f"No robot reaches {_named(reach.pois)}.")
-    return said
+        sentences.append(f"No robot reaches {_named(reach.pois)}.")
+    return sentences
 
 
 def maps_without_reach(labels: Sequence[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Hands out jobs as strands come to need them, keeps what is worth keeping, and tries again what failed."""
+"""The scheduler of a batch: submits jobs as strands need them, caches their results, and retries failures."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _log = logging.getLogger(__name__)
 
 @dataclass(eq=False, kw_only=True)
 class ActiveStrand:
-    """A strand at work.
+    """A strand that is being executed.
 
     Attributes:
         point, seed: What it measures.
-        strand: Its steps.
-        results: Those of the step at hand, by position.
-        missing: How many of them are missing.
-        failure: Why one of them will always be missing, and after how many attempts.
+        strand: Its generator of jobs.
+        results: Results of the current step's jobs, by position.
+        missing: Number of results still missing.
+        failure: Why one of the jobs failed for good, and after how many attempts.
     """
 
     point: Point
@@ -44,13 +44,13 @@ class ActiveStrand:
 
 @dataclass(frozen=True, kw_only=True)
 class Hooks:
-    """What the conductor tells of.
+    """Callbacks of the conductor.
 
     Attributes:
-        shard: A unit is measured.
-        unit_failed: A unit is given up: why, after how many attempts.
-        strand_failed: All units of a point and seed that are not done are given up.
-        tick: Time has passed.
+        shard: A unit is complete: its name and shard.
+        unit_failed: A unit failed for good: its name, why, after how many attempts.
+        strand_failed: The remaining units of a point and seed failed: why, after how many attempts.
+        tick: Called regularly.
     """
 
     shard: Callable[[str, Shard], None]
@@ -60,7 +60,7 @@ class Hooks:
 
 
 class Conductor:
-    """The jobs at hand. Strands share a job where its hash is the same, whether it runs, waits, or ran before."""
+    """Executes strands. They share jobs of equal hash, whether queued, running or cached."""
 
     def __init__(self, engine: Engine, cache: Cache, hooks: Hooks) -> None:
         self._engine, self._cache, self._hooks = engine, cache, hooks
@@ -74,10 +74,10 @@ class Conductor:
         self._warned: set[str] = set()
 
     def run(self, strands: Iterator[tuple[Point, int, Strand]]) -> None:
-        """Bring all strands to their end."""
+        """Execute all strands to their end."""
         more = True
         while more or self._open:
-            # A few more than there are workers: one that plans leaves them work, and memory stays bounded.
+            # A few more strands than workers, so that none idles, and memory stays bounded.
             while more and self._open < 2 * self._engine.slots + 2 and len(self._queue) < 4 * self._engine.slots:
                 upcoming = next(strands, None)
                 if upcoming is None:
@@ -100,7 +100,7 @@ class Conductor:
             self._hooks.tick()
 
     def _advance(self, active: ActiveStrand, results: Sequence[Any] | None) -> None:
-        """Take a strand to its next step that must wait for something."""
+        """Advance a strand to its next step that has to wait for jobs."""
         while True:
             try:
                 jobs = active.strand.send(results) if results is not None else next(active.strand)
@@ -130,7 +130,7 @@ class Conductor:
             results = active.results
 
     def _drop(self, key: str) -> None:
-        """Leave out a job that only strands want which failed in another: a world that hangs would do so for hours."""
+        """Cancel a job that only failed strands need, so that a world that hangs costs no more time."""
         del self._jobs[key]
         self._attempts.pop(key, None)
         for active, _ in self._waiting_strands.pop(key):

@@ -1,4 +1,4 @@
-"""A batch folder: one writer at a time by the kernel's lock, and every file whole or absent."""
+"""The folder of a batch: one writer at a time by a kernel lock, and atomically written files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 from sva_bench.analysis.over_maps import GivenUp
 from sva_bench.batch.schema import FAILURES, MANIFEST, BatchManifest, BatchSettings, GivenUpUnits
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.files.atomic import by_way_of, why
+from sva_bench.files.atomic import by_way_of, reason_of
 from sva_bench.files.documents import read_json, validate
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
@@ -24,10 +24,10 @@ from sva_bench.files.records import as_dict
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """The only batch at work in a folder. The lock is the kernel's, on the folder itself: it ends with the process.
+    """A block that holds the lock of a batch folder. It is a kernel lock on the folder, and ends with the process.
 
     Raises:
-        BadInput: If the folder cannot be made or opened, or another batch is at work there.
+        BadInput: If the folder cannot be created or opened, or another batch holds the lock.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -46,7 +46,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def at_work(folder: Path) -> bool:
-    """Whether a batch is at work in a folder."""
+    """Whether a batch is running in a folder."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -58,7 +58,7 @@ def at_work(folder: Path) -> bool:
 
 
 def begin(folder: Path, settings: BatchSettings, *, resume: bool) -> None:
-    """Make a locked folder ready for a batch of these settings.
+    """Prepare a locked folder for a batch of these settings.
 
     Raises:
         BadInput: If it holds something else, or cannot be written to.
@@ -86,11 +86,11 @@ def begin(folder: Path, settings: BatchSettings, *, resume: bool) -> None:
 
 
 def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
-    """The settings that a batch folder was made with, as they stand there and as they were checked.
+    """The settings of a batch folder, as read and as validated.
 
     Raises:
         BadInput: If it is no batch folder.
-        BadFile: If its manifest is not as ours are.
+        BadFile: If its manifest is invalid.
     """
     path = folder / "manifest.json"
     if not path.exists():
@@ -104,7 +104,11 @@ def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
 
 
 def refuse_other_settings(folder: Path, settings: BatchSettings) -> None:
-    """Refuse to go on with a folder of other settings, naming what differs with both values."""
+    """Refuse to resume a batch with other settings; the message names the differences.
+
+    Raises:
+        BadFile: If the settings differ.
+    """
     stored, now = settings_in(folder)[0].data, json.loads(json.dumps(as_dict(settings)))
     differences = list(islice(_differences(stored, now), _MOST_NAMED + 1))
     if not differences:
@@ -140,17 +144,17 @@ def _shown(value: Any) -> str:
 
 
 def shard_path(folder: Path, unit: str) -> Path:
-    """Where a unit's rows are."""
+    """Path of a unit's shard."""
     return folder / f"outcomes-{unit}.parquet"
 
 
 def units_in(folder: Path) -> set[str]:
-    """Names of the units whose rows are there."""
+    """Names of the completed units."""
     return {path.stem.removeprefix("outcomes-") for path in folder.glob("outcomes-*.parquet")}
 
 
 def failures_in(folder: Path) -> list[GivenUp]:
-    """The units that were given up."""
+    """The units that failed for good."""
     path = folder / "failures.json"
     if not path.exists():
         return []
@@ -158,12 +162,12 @@ def failures_in(folder: Path) -> list[GivenUp]:
 
 
 def write_failures(folder: Path, failures: Sequence[GivenUp]) -> None:
-    """Put down the units that were given up."""
+    """Write the list of units that failed for good."""
     write(folder / "failures.json", pretty_json(as_dict(GivenUpUnits(failures=tuple(failures)))).encode())
 
 
 def write_maps(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Put the files of maps into a batch folder, unless they are there: it is all that ``retry`` needs."""
+    """Write the files of maps into a batch folder, unless they exist: resuming needs no other files."""
     for name, content in files.items():
         path = folder / name
         try:
@@ -176,7 +180,7 @@ def write_maps(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file of a batch folder, whole or not at all, to the disk itself.
+    """Write a file of a batch folder atomically, and sync it to disk.
 
     Raises:
         BadInput: If it cannot be written; what was written before stays.
@@ -187,7 +191,7 @@ def write(path: Path, content: bytes) -> None:
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """A file of a batch folder to be written, which appears when it is whole.
+    """A draft of a file of a batch folder, which replaces it when the block ends.
 
     Raises:
         BadInput: If it cannot be written; what was written before stays.
@@ -203,5 +207,5 @@ def writing(path: Path) -> Iterator[Path]:
 def _unwritable(place: Path, error: OSError) -> BadInput:
     way_out = "make room and go on with --resume" if error.errno in (errno.ENOSPC, errno.EDQUOT) else \
         "make it writable and go on with --resume"
-    return BadInput(f"{place}: cannot be written to ({why(error)}); what is done is kept: {way_out}, or choose "
+    return BadInput(f"{place}: cannot be written to ({reason_of(error)}); what is done is kept: {way_out}, or choose "
                     "another folder with --out")

@@ -1,4 +1,4 @@
-"""A batch from its grid to its summary; only this process writes."""
+"""The execution of a batch, from its grid to its summary; only this process writes."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from sva_bench.workers.engine import Engine
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BatchProgress:
-    """How far a batch is.
+    """The progress of a batch.
 
     Attributes:
-        done, failed, units: Units measured, given up, and all.
-        before: Units that were measured before this process began.
-        seconds: Time since it began.
-        vss: The VSS over maps so far, when it is asked for.
+        done, failed, units: Units completed, failed for good, and all.
+        before: Units completed before this process started.
+        seconds: Time since the start [s].
+        vss: Computes the VSS over maps so far.
     """
 
     done: int
@@ -57,7 +57,7 @@ class BatchProgress:
 
     @property
     def left_s(self) -> float | None:
-        """Time left at this rate."""
+        """Estimated time left [s]; ``None`` before the first unit."""
         return None if self.rate is None else (self.units - self.done - self.failed) / self.rate
 
 
@@ -65,19 +65,19 @@ def run_batch(
     grid: Grid, folder: Path, engine: Callable[[], AbstractContextManager[Engine]], cache: Cache,
     report: Callable[[BatchProgress], None], *, resume: bool, retry: bool = False,
 ) -> BatchSummary:
-    """Measure every unit of a grid that is not measured yet, and sum up.
+    """Execute every remaining unit of a grid, and write the summary.
 
     Args:
-        grid: What to measure.
+        grid: The grid.
         folder: The batch folder.
-        engine: Makes the place where jobs run; not called if nothing is left.
-        cache: Travel times, plans and drives.
-        report: Called every half a second or so.
-        resume: Go on with what the folder holds.
-        retry: Take up again the units that were given up.
+        engine: Opens the engine that runs the jobs; not called if nothing is left.
+        cache: Cache of travel times, plans and drives.
+        report: Called about twice a second.
+        resume: Continue a batch in the folder.
+        retry: Retry the units that failed.
 
     Returns:
-        What it comes to.
+        The summary.
 
     Raises:
         BadInput: If the folder holds something else, is in use, or cannot be written to.
@@ -100,7 +100,7 @@ def run_batch(
 
 
 class _BatchState:
-    """What is done, what was given up, and what it comes to so far."""
+    """Completed and failed units, and the joined notes so far."""
 
     def __init__(self, grid: Grid, folder: Path, *, retry: bool) -> None:
         self._grid, self._folder, self._begun = grid, folder, time.monotonic()
@@ -119,35 +119,35 @@ class _BatchState:
 
     @property
     def left(self) -> bool:
-        """Whether there is something to do."""
+        """Whether units are left."""
         return len(self.done) + len(self.failures) < len(self._owner)
 
     def strands(self) -> Iterator[tuple[Point, int, Strand]]:
-        """The work that is left."""
+        """The strands with units left."""
         finished = frozenset(self.done | {failure.unit for failure in self.failures})
         for point, seed in self._grid.strands():
             yield point, seed, strand(self._grid, point, seed, finished)
 
     def keep(self, unit: str, shard: Shard) -> None:
-        """Write a unit's rows."""
+        """Write a unit's shard."""
         write(shard_path(self._folder, unit), shard.content)
         self.done.add(unit)
         point, seed, _ = self._owner[unit]
         self._add(point.name, seed, shard.note)
 
     def unit_failed(self, unit: str, reason: str, attempts: int) -> None:
-        """Put down that a unit was given up."""
+        """Record that a unit failed for good."""
         point, seed, _ = self._owner[unit]
         self._add_failures([(unit, point, seed)], reason, attempts)
 
     def strand_failed(self, point: Point, seed: int, reason: str, attempts: int) -> None:
-        """Put down that all that was left of a point and seed was given up."""
+        """Record that the remaining units of a point and seed failed for good."""
         finished = self.done | {failure.unit for failure in self.failures}
         names = [self._grid.unit_name(point, seed, first) for first, _ in self._grid.ranges()]
         self._add_failures([(name, point, seed) for name in names if name not in finished], reason, attempts)
 
     def progress(self) -> BatchProgress:
-        """How far the batch is."""
+        """The progress of the batch."""
         return BatchProgress(done=len(self.done), failed=len(self.failures), units=len(self._owner),
                              before=self._before, seconds=time.monotonic() - self._begun,
                              vss=lambda: aggregate([unit_summary(note) for note in self._totals.values()]))

@@ -1,4 +1,4 @@
-"""What the files of a batch folder hold, key by key."""
+"""Schemas of the files of a batch folder."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _Count = Annotated[int, Field(strict=True, ge=0, le=10**12)]
 
 @dataclass(frozen=True, kw_only=True)
 class OptionsEntry(Record):
-    """What all runs of a batch were told."""
+    """The options of all runs of a batch."""
 
     informed: Literal[False]
     assumptions: Literal[False]
@@ -40,7 +40,7 @@ class OptionsEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PointEntry(Record):
-    """A world as it is measured; it is checked as any world is."""
+    """A point of the grid; its world is validated as any world file."""
 
     variant: Words
     planner: PathPlanner
@@ -69,7 +69,7 @@ class BatchManifest(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class GivenUpUnits(Record):
-    """``failures.json``: units that were given up."""
+    """``failures.json``: units that failed for good."""
 
     format: Literal["sva-bench/batch-failures@1"] = FAILURES
     failures: tuple[GivenUp, ...]
@@ -80,7 +80,7 @@ _Bounds = Annotated[tuple[_Sum, _Sum], BeforeValidator(low_and_high)]
 
 @dataclass(frozen=True, kw_only=True)
 class StoredFigure(Record):
-    """A figure (``analysis.moments``) as a shard holds it: its drawn part, and what was taken by noise draw."""
+    """A figure (``analysis.moments``) in a shard: its drawn part, and the losses by noise draw."""
 
     count: Annotated[_Count, Field(ge=1)]
     mean: _Sum
@@ -101,7 +101,7 @@ class StoredFigure(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class StoredPlan(Record):
-    """A plan's trials, added up."""
+    """Sums over a plan's trials."""
 
     total: StoredFigure
     by_robot: tuple[_Sum, ...]
@@ -112,7 +112,7 @@ class StoredPlan(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class StoredTally(Record):
-    """A scenario's trials, added up."""
+    """Sums over a scenario's trials."""
 
     difference: StoredFigure
     plans: Mapping[Objective, StoredPlan]
@@ -120,7 +120,7 @@ class StoredTally(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class StoredNote(Record):
-    """What a shard says of itself, in the metadata of its table."""
+    """The note of a shard, in the metadata of its table."""
 
     facts: Facts
     variant: Words

@@ -56,7 +56,7 @@ def random_world(
     Args:
         family: What stands there.
         size_m: Side of the square.
-        density: How full it is (``random_terrain``); default: the family's.
+        density: Density (``random_terrain``); default: the family's.
         pois, stations, robots: How many of each.
         seed: Seed of everything.
         progress: Told how far it is.
@@ -143,7 +143,7 @@ def world_from_map(
         (): f"A mission on a map: sva-bench world from-map {source.name}\n"
             f"--pois {pois} --stations {stations} --robots {robots} --seed {seed}{asked}",
         ("sites", "base"): "in the middle of the largest region that walls enclose" if base is None else "as asked for",
-        ("sites", "stations"): "each as far as can be from base and stations before it, by the way there",
+        ("sites", "stations"): "each as far as can be from base and stations before it, by path length",
         ("sites", "pois"): f"drawn from what is reached from the base, {spacing:g} m from each other at least"}
     data = {"map": section, "sites": sites_section(places.base, places.stations, places.pois)}
     files = tuple(replace(file, name=f"{name}-map/{file.name}") for file in read)
