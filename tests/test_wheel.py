@@ -85,7 +85,7 @@ def test_an_installed_wheel_has_the_shipped_worlds_at_hand(bench: Path, tmp_path
     assert all(path.is_file() and bench.parents[1] in path.parents for path in plans)
 
 
-def test_an_installed_wheel_says_that_the_table_of_runtimes_wants_a_checkout(bench: Path, tmp_path: Path) -> None:
+def test_an_installed_wheel_refuses_the_table_of_runtimes_without_a_checkout(bench: Path, tmp_path: Path) -> None:
     refused = typed(bench, tmp_path, "reproduce", "runtimes")
     assert refused.returncode == 2
     assert "use a checkout" in refused.stderr

@@ -29,7 +29,7 @@ from sva_bench.world.load import world_of
 from sva_bench.world.maps.files import MapFile
 from sva_bench.world.maps.formats import format_of
 from sva_bench.world.model import MapSource
-from sva_bench.world.places import NoRoom, Point, enclosed_beside, field_of, find_places
+from sva_bench.world.places import NoRoom, Places, Point, enclosed_beside, field_of, find_places
 from sva_bench.world.schema import KIND
 
 _log = logging.getLogger(__name__)
@@ -117,24 +117,10 @@ def world_from_map(
     except TooManyBoxes:
         raise BadInput(f"{source}: its occupied cells take more than the {MAX_BOXES} boxes that physics holds; clean "
                        "the map of speckles, or cut it") from None
-    radius = BUILT_IN[USUAL_MODEL].radius_m
     progress("placing the sites", 0, 1)
-    try:
-        if base is not None and clearance(obstacles, *base) < radius:
-            raise NoRoom("base", 0, 0.0)
-        field = field_of(obstacles)
-        places, spacing = find_places(field, base=base, radius_m=radius, stations=stations, pois=pois,
-                                      spacing_m=spacing_m, seed=seed, key=obstacles.key())
-    except NoRoom as error:
-        where = "at the base" if error.kind == "base" and base else "on this map"
-        said = f"there is no room {where}" if error.kind == "base" else str(error)
-        raise BadInput(f"{source}: for a robot of radius {radius} m, {said}; choose fewer sites, another base, or "
-                       "another map") from None
+    places, spacing = _placed(source, obstacles, base=base, pois=pois, stations=stations, spacing_m=spacing_m,
+                              seed=seed)
     progress("placing the sites", 1, 1)
-    if (beside := enclosed_beside(field, places.base, radius)) is not None:
-        area, (x, y) = beside
-        _log.warning("%s: the sites are in a region that reaches the map's rim, maybe outside of all walls; the "
-                     "largest that walls enclose has %.3g m2: --base %g %g", source, area, x, y)
     asked = "" if base is None else f" --base {base[0]:g} {base[1]:g}"
     asked += "".join(f" --{key.replace('_', '-')} {value if isinstance(value, str) else f'{value:g}'}"
                      for key, value in told.items() if key != "file")
@@ -150,6 +136,34 @@ def world_from_map(
     ground = (obstacles, MapSource(section=section, files=files))
     text = with_mission(name, data, remarks, robots=robots, seed=seed, path=target, progress=progress, ground=ground)
     return text, files
+
+
+def _placed(
+    source: Path, obstacles: Obstacles, *, base: Point | None, pois: int, stations: int, spacing_m: float | None,
+    seed: int,
+) -> tuple[Places, float]:
+    """Places of a mission's sites on a map, and their spacing [m]; warns if they may be outside the building.
+
+    Raises:
+        BadInput: If they don't fit.
+    """
+    radius = BUILT_IN[USUAL_MODEL].radius_m
+    try:
+        if base is not None and clearance(obstacles, *base) < radius:
+            raise NoRoom("base", 0, 0.0)
+        field = field_of(obstacles)
+        places, spacing = find_places(field, base=base, radius_m=radius, stations=stations, pois=pois,
+                                      spacing_m=spacing_m, seed=seed, key=obstacles.key())
+    except NoRoom as error:
+        where = "at the base" if error.kind == "base" and base else "on this map"
+        said = f"there is no room {where}" if error.kind == "base" else str(error)
+        raise BadInput(f"{source}: for a robot of radius {radius} m, {said}; choose fewer sites, another base, or "
+                       "another map") from None
+    if (beside := enclosed_beside(field, places.base, radius)) is not None:
+        area, (x, y) = beside
+        _log.warning("%s: the sites are in a region that reaches the map's rim, maybe outside of all walls; the "
+                     "largest that walls enclose has %.3g m2: --base %g %g", source, area, x, y)
+    return places, spacing
 
 
 def sites_section(base: Point, stations: tuple[Point, ...], pois: tuple[Point, ...]) -> dict[str, Any]:

@@ -106,7 +106,7 @@ def test_what_was_seen_counts_in_full() -> None:
     assert (lost, ends["stuck"]) == (50.0, 1.0)
 
 
-def test_without_noise_the_one_drive_tells_all() -> None:
+def test_without_noise_a_single_drive_determines_the_shares() -> None:
     assert exposed([driven(8, 11.8, 10, 5)], noisy=False)[0] == 0.0
     assert exposed([driven(8, 12.5, 10, 5)], noisy=False)[0] == 50.0
 

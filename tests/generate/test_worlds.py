@@ -77,7 +77,7 @@ def test_a_random_world_is_a_good_mission_with_the_papers_scenarios() -> None:
     assert set(world.robots[1].incentives) == {poi.name for poi in world.pois}
 
 
-def test_the_same_arguments_give_the_same_bytes_and_say_how() -> None:
+def test_equal_arguments_give_equal_bytes_with_the_command_in_a_comment() -> None:
     text = text_of("field", 3)
     assert text == text_of("field", 3)
     lines = text.splitlines()
@@ -109,7 +109,7 @@ def test_limits_let_a_team_collect_much_but_not_all() -> None:
     assert all(1 <= value <= 170 for earned in mission.incentives for value in earned.values())
 
 
-def test_a_filling_lasts_for_the_way_to_the_remotest_poi_and_back_to_a_station() -> None:
+def test_the_fuel_capacity_suffices_for_the_remotest_poi() -> None:
     sites, fuel = line_of_sites(8, stations=0)
     fuel = fuel / 10 + 100 * (fuel > 0)  # about 100 s between any two: half the limit would not do
     mission = propose_mission(sites, fuel, robots=2, seed=0, key=())

@@ -69,7 +69,7 @@ def test_runs_of_rows_become_few_boxes() -> None:
 
 @settings(deadline=None)  # the first call compiles
 @given(grids)
-def test_the_cover_is_exact_and_no_cell_is_covered_twice(occupied: BoolArray) -> None:
+def test_the_cover_is_exact_and_disjoint(occupied: BoolArray) -> None:
     times = np.zeros(occupied.shape, dtype=int)
     for x0, y0, x1, y1 in cover(occupied).astype(int):
         times[y0:y1, x0:x1] += 1

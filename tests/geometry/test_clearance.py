@@ -94,7 +94,7 @@ crowds = st.builds(
 
 
 @given(crowds, places, places)
-def test_distances_agree_with_another_way_to_compute_them(crowd: Obstacles, a: tuple[float, float],
+def test_distances_agree_with_an_independent_computation(crowd: Obstacles, a: tuple[float, float],
                                                           b: tuple[float, float]) -> None:
     expected = segment_clearance(crowd, np.array(a), np.array(b))
     # 1e-9 m: where a segment touches a side, rounding decides on which side of it.
@@ -153,7 +153,7 @@ def test_obstacles_are_read_only_copies_of_the_right_shape() -> None:
 
 
 @given(st.integers(0, 10_000), st.floats(0.05, 1.5))
-def test_buckets_know_what_a_look_at_every_obstacle_tells(seed: int, needed: float) -> None:
+def test_buckets_agree_with_a_check_of_every_obstacle(seed: int, needed: float) -> None:
     o = random_obstacles(seed)
     rng = np.random.default_rng(seed)
     ends = rng.uniform(-1, 15, (40, 4))

@@ -29,7 +29,7 @@ def route(*sites: str, **more: tuple[str, ...]) -> Plan:
     return Plan(routes={"a": sites, **more})
 
 
-def test_a_feasible_plan_is_worth_what_its_robots_are_expected_to_collect() -> None:
+def test_the_value_of_a_feasible_plan_is_its_expected_incentive() -> None:
     # base -4-> p1 -3-> r1: 7 of 12; r1 -3-> p2 -7-> base: 10 of 12. 17 s in all.
     certificate = certify(instance(), route("base", "p1", "r1", "p2", "base"))
     assert certificate.feasible
@@ -81,7 +81,7 @@ def test_a_plan_that_breaks_a_rule_is_refused_with_the_reason(plan: Plan, reason
 
 
 @pytest.mark.parametrize("stops", [("p1", "p1"), ("p1", "r1", "p1"), ("p1", "p1", "p1"), ("p1", "r1", "p1", "p1")])
-def test_a_poi_named_twice_in_a_route_gets_one_message_wherever_it_stands(stops: tuple[str, ...]) -> None:
+def test_a_duplicate_poi_in_a_route_gets_one_message(stops: tuple[str, ...]) -> None:
     certificate = certify(instance(capacity=100, limit=100), route("base", *stops, "base"))
     assert certificate.reasons == ("a: POI p1 is visited twice; name it once",)
 

@@ -37,14 +37,14 @@ def tour(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_recording_is_whole_and_nothing_else_is_left(tour: Path) -> None:
+def test_a_recording_is_complete_and_no_draft_is_left(tour: Path) -> None:
     verify(tour)
     assert [file.name for file in tour.parent.iterdir()] == ["tour.rrd"]
     assert len(RrdReader(tour).blueprints()) == 1
     assert end_s(tour) == 14.0
 
 
-def test_robots_stand_where_their_traces_say(tour: Path) -> None:
+def test_robots_are_shown_at_the_poses_of_their_traces(tour: Path) -> None:
     expected = trace("uv2", fails_before=2)
     times, places = rows(tour, "world/robots/uv2", "Transform3D:translation")
     _, turns = rows(tour, "world/robots/uv2/hull", "Transform3D:quaternion")

@@ -16,7 +16,7 @@ def entries(story: Story) -> list[tuple[float, Level, str]]:
     return [(sentence.time_s, sentence.level, sentence.text) for sentence in story.log]
 
 
-def test_each_event_is_told_in_order_of_time() -> None:
+def test_events_are_logged_in_order_of_time() -> None:
     # p1 after 2 m, r1 after 2 m more and 2 s of refuelling, p2 after 2 m, 6 m home; all at 1 m/s.
     story = story_of(WORLD, [trace("uv1")], "tour")
     assert entries(story) == [
@@ -27,7 +27,7 @@ def test_each_event_is_told_in_order_of_time() -> None:
     assert story.duration_s == 14
 
 
-def test_unhappy_ends_are_told_and_stop_the_robot_for_good() -> None:
+def test_failed_and_stuck_robots_are_logged_and_stop_for_good() -> None:
     late = trace("uv1", limit_s=5.0)  # p2 is reached after 8 s
     empty = trace("uv2", fuel_s=3.0)  # r1 is 4 s away
     failed = trace("uv3", fails_before=2)  # on leaving r1 for p2, at 6 s

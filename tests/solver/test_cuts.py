@@ -75,7 +75,7 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_enumerated_routes_cover_each_set_of_pois_that_is_worth_enough(seed: int) -> None:
+def test_enumeration_finds_every_set_of_pois_above_the_threshold(seed: int) -> None:
     instance, rng = small(seed), np.random.default_rng(seed)
     n, pois = len(instance.sites), np.array(instance.pois)
     graph = graph_of(instance, scope_of(instance, instance.vehicles[0], np.isin(np.arange(n), pois)), 1.0)

@@ -32,7 +32,7 @@ def test_a_method_proves_the_plan_that_auto_proves(method: Method) -> None:
 
 
 @every_method
-def test_a_method_says_what_it_is(method: Method) -> None:
+def test_every_method_has_a_description(method: Method) -> None:
     assert METHODS[method].name == method
     assert METHODS[method].description
 

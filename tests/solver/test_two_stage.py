@@ -158,7 +158,7 @@ def test_a_robot_that_can_earn_nothing_stays_home(
     assert wait_and_see(instance) == 0.0
 
 
-def test_a_poi_worth_nothing_is_visited_only_as_a_shortcut() -> None:
+def test_a_poi_without_reward_is_visited_only_as_a_shortcut() -> None:
     # p1 is worth nothing. The way over it to p2, 1 + 1, beats the direct one, 50, which is over the limit of 30.
     fuel = np.array([[0, 1, 50], [9, 0, 1], [9, 9, 0]], dtype=float)
     plan = plan_stochastic(instance_of("base p1 p2", (), vehicle(fuel, [0, 0, 5], limit=30)))
@@ -197,7 +197,7 @@ def test_correlated_failures_count_for_foresight_but_not_for_the_plan() -> None:
     assert wait_and_see(disjoint) == pytest.approx(0.25 * 19 + 0.5 * 10)
 
 
-def test_foresight_over_many_outcomes_is_worked_out_only_when_asked() -> None:
+def test_wait_and_see_over_many_outcomes_is_computed_only_on_request() -> None:
     robots = [vehicle(TRIANGLE, [0, 10, 9], name=f"a{k}", limit=20, availability=0.5) for k in range(5)]
     instance = instance_of("base p1 p2", (), *robots)
     assert wait_and_see(instance) is None
@@ -256,7 +256,7 @@ def test_out_of_time_the_best_plan_so_far_comes_with_a_valid_bound(limit_s: floa
     assert wait_and_see(instance, SolveLimits(time_limit_s=limit_s)) is None
 
 
-def test_a_wide_gap_is_enough_when_asked_for() -> None:
+def test_a_solve_stops_at_a_wide_gap() -> None:
     plan = plan_stochastic(scattered(25), SolveLimits(gap=5.0))
     assert plan.status == "optimal"
     value, bound = value_and_bound(plan)

@@ -87,7 +87,7 @@ def test_the_search_for_tangents_stops_when_the_work_is_done_and_keeps_the_short
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7])
-def test_ways_on_the_lattice_keep_the_clearance_and_get_through_every_passage(yaw: float) -> None:
+def test_lattice_paths_keep_the_clearance_and_find_every_passage(yaw: float) -> None:
     # Squares of 6 cells, shifted from row to row: the gaps between them, of 10 cells, lie askew.
     y, x = np.mgrid[:120, :120]
     occupied = ((x + (y // 16) % 2 * 8) % 16 < 6) & (y % 16 < 6)
@@ -102,7 +102,7 @@ def test_ways_on_the_lattice_keep_the_clearance_and_get_through_every_passage(ya
         assert path_clearance(obstacles, way) >= clearance - 1e-6
 
 
-def test_no_way_leads_through_a_wall() -> None:
+def test_no_path_leads_through_a_wall() -> None:
     occupied = np.zeros((40, 40), dtype=np.bool_)
     occupied[:, 20] = True
     cells = cells_of(occupied, 0.1)

@@ -50,7 +50,7 @@ def distance_to_cells(occupied: BoolArray, a: FloatArray, b: FloatArray) -> floa
 @settings(max_examples=8)
 @given(arrays(np.bool_, (6, 7), elements=st.sampled_from([False, False, True])), st.floats(0.1, 0.6),
        st.sampled_from([0.0, 0.9]))
-def test_no_path_comes_nearer_to_an_occupied_cell_than_asked(occupied: BoolArray, radius: float, yaw: float) -> None:
+def test_every_path_keeps_the_clearance_from_occupied_cells(occupied: BoolArray, radius: float, yaw: float) -> None:
     cells = cells_of(occupied, 1.0, (0.0, 0.0, yaw))
     points = places_on(cells, 6, 0, radius)
     for row in plan_paths(obstacles_of(cells), points, radius):

@@ -75,7 +75,7 @@ def answer_to(engine: LocalProcesses, deed: str) -> Answer:
     pytest.param("memory", "2048 MB", False, marks=pytest.mark.long),
     pytest.param("fault", "ZeroDivisionError: by zero", False, marks=pytest.mark.long),
     ("mend", "move the site", True)])
-def test_what_befalls_a_job_is_told_and_the_next_one_runs(
+def test_the_failure_of_a_job_is_reported_and_the_next_one_runs(
     deed: str, told: str, mendable: bool, engine: LocalProcesses
 ) -> None:
     failed = answer_to(engine, deed)
