@@ -80,7 +80,7 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
 def end_s(path: Path) -> float:
     """Last moment of a recording [s]."""
     timed = (chunk.to_record_batch() for chunk in RrdReader(path).stream() if TIMELINE in chunk.timeline_names)
-    return max((int(rows.column(TIMELINE).views("int64").to_numpy().max()) for rows in timed), default=0) / 1e9
+    return max((int(rows.column(TIMELINE).cast("int64").to_numpy().max()) for rows in timed), default=0) / 1e9
 
 
 def photograph(port: int, path: Path, picture: Path, at_s: float) -> None:

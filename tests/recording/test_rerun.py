@@ -21,7 +21,7 @@ def rows(path: Path, entity: str, component: str) -> tuple[np.ndarray[Any, np.dt
     for chunk in RrdReader(path).stream():
         batch = chunk.to_record_batch()
         if chunk.entity_path == f"/{entity}" and TIMELINE in chunk.timeline_names and component in batch.schema.names:
-            times += batch.column(TIMELINE).views("int64").to_pylist()
+            times += batch.column(TIMELINE).cast("int64").to_pylist()
             values += batch.column(component).to_pylist()
     return np.array(times) / 1e9, values
 

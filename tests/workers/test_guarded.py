@@ -95,7 +95,7 @@ from tests.workers.test_guarded import Deed
 if __name__ == "__main__":
     engine = LocalProcesses(1, Caps(time_s=600.0, memory_mb=0))
     engine.submit("hang", Deed(deed="hang"))
-    while not engine._at:
+    while not engine._job_of:
         engine.answers(0.5)
     with local_workers(2, "sva_bench.execution.execute") as executor:
         pids = {executor.submit(Deed(deed="work").run).result() for _ in range(8)}
