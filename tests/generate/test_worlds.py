@@ -120,7 +120,7 @@ def test_the_fuel_capacity_suffices_for_the_remotest_poi() -> None:
 @pytest.mark.parametrize(("pois", "robots"), [(8, 1), (3, 2), (7, 4)])
 def test_too_few_robots_or_pois_leave_nothing_to_decide(pois: int, robots: int) -> None:
     sites, fuel = line_of_sites(pois)
-    with pytest.raises(BadInput, match=f"{robots} robots and {pois} POIs leave nothing to decide"):
+    with pytest.raises(BadInput, match=f"{robots} robots? and {pois} POIs leave nothing to decide"):
         propose_mission(sites, fuel, robots=robots, seed=0, key=())
 
 

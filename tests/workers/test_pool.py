@@ -79,9 +79,9 @@ def test_no_process_of_ours_outlives_a_program_that_had_workers() -> None:
 
 ORPHAN = """
 import ctypes, os, time
-from sva_bench.workers.pool import die_with
+from sva_bench.workers.pool import kill_with_parent
 ctypes.CDLL = lambda *_, **__: object()  # a C library without prctl, as that of macOS
-die_with(int(os.environ["PARENT"]))
+kill_with_parent(int(os.environ["PARENT"]))
 print("there", flush=True)
 time.sleep(60)
 """
