@@ -17,7 +17,7 @@ from PIL import Image
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.drives import DriveTask, drive_route
-from sva_bench.geometry.buckets import open_heading
+from sva_bench.geometry.buckets import longest_view_heading
 from sva_bench.geometry.cells import Cells, bounds_of, boxes_of, connected_region, distance_field
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.model import BUILT_IN
@@ -65,7 +65,7 @@ def map_world(cells: Cells, seed: int) -> World:
     chosen = np.unravel_index(rng.choice(reached, SITES, replace=False), shape)
     places: FloatArray = field.places(np.column_stack(chosen))
     sites = [Site(name=f"p{k}" if k else "base", kind="poi" if k else "base", x_m=x, y_m=y,
-                  heading_rad=open_heading(obstacles, x, y)) for k, (x, y) in enumerate(places.tolist())]
+                  heading_rad=longest_view_heading(obstacles, x, y)) for k, (x, y) in enumerate(places.tolist())]
     return World(name="office", obstacles=obstacles, sites=tuple(sites), robots=(), scenarios=(),
                  plan_failure="mission", execute_failure="mission", margin=0.01, noise=Noise())
 

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from sva_bench.geometry.buckets import open_heading
+from sva_bench.geometry.buckets import longest_view_heading
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.model import BUILT_IN
@@ -33,7 +33,7 @@ def random_world(seed: int) -> World:
         x, y = rng.uniform(0.5, 19.5, 2)
         if clearance(obstacles, x, y) > 0.35:
             sites.append(Site(name=f"p{len(sites)}" if sites else "base", kind="poi" if sites else "base",
-                              x_m=float(x), y_m=float(y), heading_rad=open_heading(obstacles, x, y)))
+                              x_m=float(x), y_m=float(y), heading_rad=longest_view_heading(obstacles, x, y)))
     return World(name="random", obstacles=obstacles, sites=tuple(sites), robots=(), scenarios=(),
                  plan_failure="mission", execute_failure="mission", margin=0.01, noise=Noise())
 

@@ -74,7 +74,7 @@ def test_seeds_are_bounded_in_number_and_size(world: Path) -> None:
 
 
 @pytest.mark.parametrize("pattern", ["/**", "/**/*.yaml"])
-def test_a_pattern_that_leads_through_the_whole_machine_is_refused(
+def test_a_pattern_that_would_visit_too_many_entries_is_refused(
     pattern: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sva_bench.files.patterns.MOST_LOOKED_AT", 2000)  # the machine of a test may be small

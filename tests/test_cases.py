@@ -17,8 +17,8 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.instance_file import read_instance
 from sva_bench.mission.plan_file import read_plan
 from sva_bench.solver.risk import RiskMeasure
+from tests.cli.test_commands import sva_bench
 from tests.solver.oracle import risk_optimum
-from tests.test_cli import sva_bench
 
 CASES = Path(__file__).parents[1] / "../shared/cases"
 pytestmark = pytest.mark.skipif(not CASES.is_dir(), reason="the cases are not part of the repository")
@@ -75,7 +75,7 @@ def test_a_hatched_map_is_checked_in_seconds(folder: Path) -> None:
     assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 20
 
 
-def test_a_map_without_a_free_cell_says_so(folder: Path) -> None:
+def test_a_map_without_a_free_cell_is_an_error(folder: Path) -> None:
     done = sva_bench("world", "from-map", "transparent.yaml", "--pois", 4, "--stations", 1, "-o", "w.yaml", cwd=folder)
     assert done.returncode == 2
     for word in ("free", "unknown", "--unknown free", "negate", "mode"):
@@ -83,7 +83,7 @@ def test_a_map_without_a_free_cell_says_so(folder: Path) -> None:
     assert not (folder / "w.yaml").exists()
 
 
-def test_an_odd_key_of_a_map_is_told_once_by_the_name_of_the_users_file(folder: Path) -> None:
+def test_an_unknown_key_of_a_map_gives_one_warning_with_the_users_file(folder: Path) -> None:
     done = sva_bench("world", "from-map", "typed.yaml", "--pois", 4, "--stations", 1, "-o", "w.yaml", cwd=folder)
     assert done.returncode == 0, done.stderr
     told = [line for line in done.stderr.splitlines() if "type" in line]
@@ -92,13 +92,13 @@ def test_an_odd_key_of_a_map_is_told_once_by_the_name_of_the_users_file(folder: 
     assert "/tmp" not in done.stderr.replace(str(folder), "")
 
 
-def test_a_yaw_of_ninety_radians_is_asked_about(folder: Path) -> None:
+def test_a_yaw_of_ninety_radians_gives_a_warning(folder: Path) -> None:
     done = sva_bench("world", "from-map", "degrees.yaml", "--pois", 4, "--stations", 1, "-o", "w.yaml", cwd=folder)
     assert "degrees" in done.stderr
     assert "radians" in done.stderr
 
 
-def test_a_mission_that_reaches_nothing_is_told(folder: Path) -> None:
+def test_a_mission_without_reachable_pois_is_reported(folder: Path) -> None:
     done = sva_bench("run", "out-of-reach.yaml", "--trials", 50, "--rollouts", 2, "--fidelity", "kinematic", "--out",
                      "runs", cwd=folder)
     told = " ".join((done.stdout + done.stderr).split())
@@ -120,7 +120,7 @@ def test_a_place_that_takes_no_results_is_refused_before_any_work(folder: Path, 
 
 @pytest.mark.parametrize("command", [
     "run two-rooms.yaml --trials 50 --fidelity kinematic --out runs", "world check two-rooms.yaml", "--help"])
-def test_a_reader_who_has_gone_is_no_fault(folder: Path, command: str) -> None:
+def test_a_closed_pipe_is_no_fault(folder: Path, command: str) -> None:
     done = subprocess.run(["bash", "-c", f"{sys.executable} -m sva_bench {command} | true; exit ${{PIPESTATUS[0]}}"],
                           cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr

@@ -66,7 +66,7 @@ def test_where_it_is_heard_it_comes_at_once_and_not_again_at_the_end() -> None:
     assert done == ["kept", "written"]
 
 
-def test_what_was_pressed_before_is_heard_as_soon_as_somebody_listens() -> None:
+def test_an_earlier_ctrl_c_is_raised_as_soon_as_a_block_hears_it() -> None:
     done = []
     with deferring_ctrl_c():
         press()

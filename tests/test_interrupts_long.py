@@ -229,7 +229,7 @@ def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
 
 
 @pytest.mark.parametrize(("name", "count"), [("plan", 2), *LONG])
-def test_a_kill_at_any_moment_leaves_a_whole_result_or_none_and_blocks_nothing(
+def test_a_kill_at_any_moment_leaves_a_complete_result_or_none_and_no_lock(
     name: str, count: int, tmp_path: Path
 ) -> None:
     command, draw = COMMANDS[name], random.Random(f"kill {name}")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from sva_bench.world.load import load_world
-from tests.test_cli import sva_bench
+from tests.cli.test_commands import sva_bench
 
 WORLDS = sorted((Path(__file__).parents[1] / "worlds").glob("*.yaml"))
 

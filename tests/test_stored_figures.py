@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.test_cli import sva_bench
+from tests.cli.test_commands import sva_bench
 
 ROOT = Path(__file__).parents[1]
 STORED = json.loads((ROOT / "tests" / "stored" / "kinematic.json").read_text(encoding="utf-8"))
@@ -66,7 +66,7 @@ def test_every_shipped_world_has_the_figures_that_were_stored(world: str, tmp_pa
     assert differences(found, stored) == []
 
 
-def test_a_figure_that_is_off_is_told_with_its_place() -> None:
+def test_a_differing_figure_is_reported_with_its_key() -> None:
     assert differences({"a": [1.0, {"b": 2.0}], "c": 1}, {"a": [1.0, {"b": 2.1}], "d": 1}) == [
         ".a[1].b: 2.0 instead of 2.1", ".d is missing"]
     assert differences({"a": None, "b": 1.0 + 1e-12}, {"a": None, "b": 1.0}) == []

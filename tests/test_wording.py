@@ -44,6 +44,6 @@ NEVER_ONE = {  # said of what is more than a bound, or two at least
 }
 
 
-def test_numbers_are_told_apart_from_one() -> None:
+def test_singular_and_plural_are_distinguished() -> None:
     assert [counted(count, "entry", "entries") for count in (0, 1, 2)] == ["0 entries", "1 entry", "2 entries"]
     assert [counted(count, "map") for count in (0, 1, 2)] == ["0 maps", "1 map", "2 maps"]

@@ -15,7 +15,7 @@ import numpy as np
 from sva_bench.choices import InstanceFamily
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.routes.fronts import tables_of
+from sva_bench.solver.routes.fronts import leg_tables
 from sva_bench.solver.routes.heuristic import search
 from sva_bench.solver.two_stage import SolveLimits, plan_stochastic
 
@@ -88,7 +88,7 @@ def alone(instance: Instance) -> float:
     """Value of the heuristic's plan."""
     weights = np.array([v.incentives * v.availability for v in instance.vehicles])
     ones = np.ones(len(instance.vehicles))
-    found = search(tables_of(instance), weights, ones, tuple(() for _ in instance.vehicles))
+    found = search(leg_tables(instance), weights, ones, tuple(() for _ in instance.vehicles))
     return float(sum(weights[m, j] for m, order in enumerate(found.orders) for j in order))
 
 

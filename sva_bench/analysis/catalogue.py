@@ -1,4 +1,4 @@
-"""The statistics of a plan, each an entry of one table: what it is, where it comes from and where it is shown.
+"""The catalogue of a plan's statistics: an entry for each, with its meaning, source and where it is shown.
 
 The terminal's table, the page, ``statistics.csv`` and the table in ``docs/statistics.md`` are made of these entries;
 ``summary.json`` holds the figures of all. A new statistic is one entry with ``measure``.
@@ -24,7 +24,7 @@ class Measure(Protocol):
     """A statistic as a function of a plan's trials."""
 
     def __call__(self, run: Executed, *, noisy: bool) -> Figure:
-        """The figure, whose parts add up over ranges of trials."""
+        """The statistic of a plan's trials, as a figure that adds up over ranges of trials."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,17 +32,17 @@ class Statistic:
     """One statistic of a plan.
 
     Attributes:
-        key: Where it stands in a plan of ``summary.json``; a measured one under ``statistics``.
+        key: Its key in a plan of ``summary.json``; of a measured one, below ``statistics``.
         label: Heading of its column.
         unit: Its unit; empty = that of incentives in the world file.
-        meaning: What it says.
-        read: Where the result of a plan holds it; ``None`` for one that is measured by ``measure``.
-        measure: Of a plan's trials, for a statistic that nothing else rests on.
-        shown: Where it is a column; ``summary.json`` holds all.
-        section: Table of the page.
-        interval: Whether its value is a mean with an interval; of one that is measured it always is.
-        factor: From its value to what is shown, such as 100 for per cent.
-        signed: Whether a sign stands before gains, too.
+        meaning: What it is, for the docs.
+        read: Reads it from the result of a plan; ``None`` for one with ``measure``.
+        measure: Measures it from a plan's trials.
+        shown: Where it is a column; ``summary.json`` has all.
+        section: The table of the page that it is a column of.
+        interval: Whether its value is a mean with an interval, as measured ones always are.
+        factor: Factor from the value to the one shown, such as 100 for per cent.
+        signed: Whether it is shown with a plus sign when positive.
     """
 
     key: str
@@ -64,16 +64,16 @@ class Statistic:
 
     @property
     def heading(self) -> str:
-        """Label and unit."""
+        """Label and unit, as a column's heading."""
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
     @property
     def place(self) -> str:
-        """Where it stands in a plan of ``summary.json``."""
+        """Its dotted key in a plan of ``summary.json``."""
         return self.key if self.measure is None else f"statistics.{self.key}"
 
     def of(self, plan: PlanFigures) -> Value:
-        """Its value, as it is shown; ``None`` where the plan has none."""
+        """Its value for a plan, in the unit shown; ``None`` where the plan has none."""
         value = plan.statistics.get(self.key) if self.read is None else self.read(plan)
         if value is None or self.factor == 1.0:
             return value
@@ -96,20 +96,20 @@ def _charged(key: str, meaning: str, read: Callable[[Ledger], float]) -> Statist
 
 STATISTICS: tuple[Statistic, ...] = (
     Statistic(key="promised", label="promised", section="promise", read=lambda plan: plan.promised,
-              meaning="value in the plan's own objective, as its maker believes it"),
+              meaning="value in the plan's own objective, as its planner claims it"),
     Statistic(key="expected", label="expected", shown=frozenset({"terminal", "csv"}), read=lambda plan: plan.expected,
               meaning="closed-form value under the failure process executed"),
     _charged("assumption", "expected less promised", lambda ledger: ledger.assumption),
     _charged("draws", "failures as drawn, against their expectation", lambda ledger: ledger.draws),
-    _charged("out_of_fuel", "what robots that ran dry did not collect", lambda ledger: ledger.out_of_fuel),
-    _charged("late", "what robots past their mission limit did not collect", lambda ledger: ledger.late),
-    _charged("stuck", "what robots that got stuck did not collect", lambda ledger: ledger.stuck),
+    _charged("out_of_fuel", "incentive that robots out of fuel did not collect", lambda ledger: ledger.out_of_fuel),
+    _charged("late", "incentive that robots past their mission limit did not collect", lambda ledger: ledger.late),
+    _charged("stuck", "incentive that stuck robots did not collect", lambda ledger: ledger.stuck),
     Statistic(key="executed", label="executed", section="promise", interval=True, read=lambda plan: plan.executed,
-              meaning="mean over trials of what the team collected, with its 95 % interval"),
-    Statistic(key="executed_controlled", label="executed, luck of the draw taken out", section="promise",
+              meaning="mean over trials of the team's incentive, with its 95 % interval"),
+    Statistic(key="executed_controlled", label="executed, variance-reduced", section="promise",
               interval=True, shown=frozenset({"page", "csv"}),
               read=lambda plan: plan.executed_controlled if isinstance(plan, PlanResult) else None,
-              meaning="the same with the closed form in place of the failures drawn"),
+              meaning="the same, with the closed form in place of the failures drawn"),
     _over_trials("least", "least", "least of all trials", lambda found: found.least),
     _over_trials("cvar10", "worst tenth", "mean of the worst tenth of the trials (CVaR)", lambda found: found.cvar10),
     _over_trials("q05", "5 %", "5 % quantile of the trials", lambda found: found.q05),
@@ -122,18 +122,18 @@ STATISTICS: tuple[Statistic, ...] = (
 
 
 def statistics(place: Place | None = None, section: Section | None = None) -> tuple[Statistic, ...]:
-    """The entries that are shown in a place, or all; of one table of the page, or of all."""
+    """The entries of the catalogue, or those shown in a place, or in one table of the page."""
     return tuple(entry for entry in STATISTICS if (place is None or place in entry.shown)
                  and (section is None or entry.section == section))
 
 
 def measured(run: Executed, *, noisy: bool) -> dict[str, Figure]:
-    """The figures of the statistics that are measured trial by trial, by their keys."""
+    """The figures of the statistics with ``measure``, by key."""
     return {entry.key: entry.measure(run, noisy=noisy) for entry in STATISTICS if entry.measure is not None}
 
 
 def csv_columns() -> list[str]:
-    """Columns of ``statistics.csv``; a mean has the ends of its interval beside it."""
+    """Columns of ``statistics.csv``; each mean is followed by the ends of its interval."""
     return [name for entry in statistics("csv") for name in (
         (entry.key, f"{entry.key}_low", f"{entry.key}_high") if entry.interval else (entry.key,))]
 

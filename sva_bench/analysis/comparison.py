@@ -16,9 +16,9 @@ from sva_bench.execution.execute import Executed
 
 
 def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy: bool) -> ComparedScenario:
-    """One scenario in which plans from anywhere were executed: every pair compared, trial by trial.
+    """The summary of one scenario in which given plans were executed: every pair is compared, trial by trial.
 
-    A pair is distinguishable where the interval that is adjusted for the number of pairs leaves zero out.
+    A pair is distinguishable where the simultaneous interval excludes zero.
     """
     scenario = plans[0].executed.case.scenario
     pairs = list(combinations([judged.executed for judged in plans], 2))
@@ -34,16 +34,16 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
 
 def _comparison(a: Executed, b: Executed, pairs: int, *, noisy: bool) -> Comparison:
     beyond = difference_figure(a, b, noisy=noisy)
-    alone, together = estimate(beyond), estimate(beyond, comparisons=pairs)
+    single, simultaneous = estimate(beyond), estimate(beyond, comparisons=pairs)
     names = a.case.planner, b.case.planner
     same = a.case.plan.drives_like(b.case.plan)
-    return Comparison(a=names[0], b=names[1], mean=alone.mean, ci95=alone.ci95, ci95_adjusted=together.ci95,
-                      distinguishable=together.excludes_zero, same_plan=same,
-                      verdict=verdict_of(together, *names, same=same))
+    return Comparison(a=names[0], b=names[1], mean=single.mean, ci95=single.ci95, ci95_adjusted=simultaneous.ci95,
+                      distinguishable=simultaneous.excludes_zero, same_plan=same,
+                      verdict=verdict_of(simultaneous, *names, same=same))
 
 
 def lost(run: Executed) -> int:
-    """How many robot missions of all trials ended along the route: by failing, out of fuel or stuck."""
+    """Number of robot missions of all trials that ended along the route: by a failure, out of fuel or stuck."""
     along = (run.end == ENDS.index("failed")) & (run.stops_reached > 0)
     return int((along | (run.end == ENDS.index("out_of_fuel")) | (run.end == ENDS.index("stuck"))).sum())
 

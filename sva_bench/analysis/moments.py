@@ -1,4 +1,4 @@
-"""What intervals are made of, added up so that ranges of trials can be joined."""
+"""Sufficient statistics of intervals, which add up over ranges of trials."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from sva_bench.arrays import FloatArray, IntArray
 
 Bounds = tuple[float, float]
-"""The least and the greatest that an observation can be."""
+"""Least and greatest possible value of an observation."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Moments:
-    """A sample's count, mean and squares about it.
+    """Count, mean and sum of squared deviations of a sample.
 
     Attributes:
         count: Number of trials.
         mean: Their mean.
-        squares: Sum of the squares about the mean.
+        squares: Sum of squared deviations from the mean.
     """
 
     count: int
@@ -29,7 +29,7 @@ class Moments:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Clusters:
-    """Trials and their sum for each noise draw; none where there is no noise.
+    """Count and sum of the trials of each noise draw (the clusters); empty without noise.
 
     Attributes:
         counts, sums: Shape (rollouts,).
@@ -40,21 +40,21 @@ class Clusters:
 
     @property
     def means(self) -> FloatArray:
-        """Mean of each draw that was met, shape (draws met,)."""
-        met = self.counts > 0
-        means: FloatArray = self.sums[met] / self.counts[met]
+        """Mean of each noise draw that has trials, shape (draws with trials,)."""
+        has_trials = self.counts > 0
+        means: FloatArray = self.sums[has_trials] / self.counts[has_trials]
         return means
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Figure:
-    """A figure measured trial by trial, in two parts that vary for different reasons: ``drawn`` less ``taken``.
+    """A figure measured trial by trial: ``drawn``, due to the failures, less ``taken``, the losses due to noise.
 
     Attributes:
-        drawn: What the failures drawn leave of the plan had nothing else gone wrong: independent from trial to trial.
-        drawn_bounds: What that can be.
-        taken: What noise took of it: trials of one noise draw share it.
-        taken_bounds: What a draw that was not met could take, as far as those that were met let us fear.
+        drawn: The figure under the failures drawn alone; independent from trial to trial.
+        drawn_bounds: Its least and greatest possible value.
+        taken: The losses due to noise; trials of one noise draw are correlated.
+        taken_bounds: Least and greatest loss possible in a noise draw that was not observed (``analysis.unseen``).
     """
 
     drawn: Moments
@@ -69,20 +69,20 @@ class Figure:
 
     @property
     def mean_taken(self) -> float:
-        """Mean over trials of what noise took."""
+        """Mean over trials of the losses due to noise."""
         return float(self.taken.sums.sum()) / self.drawn.count
 
 
 def figure_of(drawn: FloatArray, drawn_bounds: Bounds, taken: FloatArray, taken_bounds: Bounds, rollout: IntArray,
               *, noisy: bool) -> Figure:
-    """A figure of trials.
+    """The figure of some trials.
 
     Args:
-        drawn, taken: One figure per trial each, shape (trials,).
-        drawn_bounds, taken_bounds: What they can be.
+        drawn, taken: Both parts of each trial, shape (trials,).
+        drawn_bounds, taken_bounds: Their least and greatest possible value.
         rollout: Noise draw of each trial, shape (trials,).
-        noisy: Whether noise draws differ. Without noise what is taken goes by the rules and depends on the failures
-            alone: ``drawn`` holds the whole figure then.
+        noisy: Whether noise draws differ. Without noise, losses are a function of the failures,
+            so ``drawn`` holds the whole figure.
     """
     shared = Clusters(counts=np.zeros(0, dtype=np.int64), sums=np.zeros(0))
     if noisy:
@@ -97,24 +97,24 @@ def figure_of(drawn: FloatArray, drawn_bounds: Bounds, taken: FloatArray, taken_
 
 
 def joined(a: Figure, b: Figure) -> Figure:
-    """The figure of two ranges of trials together, which share their noise draws."""
-    draws = max(len(a.taken.counts), len(b.taken.counts))  # a short range may not have met the last ones
+    """The figure of two ranges of trials under the same noise draws."""
+    draws = max(len(a.taken.counts), len(b.taken.counts))  # a short range may lack trials of the last ones
     counts = [np.pad(part.taken.counts, (0, draws - len(part.taken.counts))) for part in (a, b)]
     sums = [np.pad(part.taken.sums, (0, draws - len(part.taken.sums))) for part in (a, b)]
-    return _together(a, b, Clusters(counts=counts[0] + counts[1], sums=sums[0] + sums[1]))
+    return _combined(a, b, Clusters(counts=counts[0] + counts[1], sums=sums[0] + sums[1]))
 
 
 def pooled(a: Figure, b: Figure) -> Figure:
-    """The figure of trials under two seeds together: each seed has noise draws of its own."""
-    return _together(a, b, Clusters(counts=np.concatenate([a.taken.counts, b.taken.counts]),
+    """The figure of trials under two seeds, each with noise draws of its own."""
+    return _combined(a, b, Clusters(counts=np.concatenate([a.taken.counts, b.taken.counts]),
                                     sums=np.concatenate([a.taken.sums, b.taken.sums])))
 
 
-def _together(a: Figure, b: Figure, taken: Clusters) -> Figure:
-    """Both, with such clusters.
+def _combined(a: Figure, b: Figure, taken: Clusters) -> Figure:
+    """The figure of both samples, with these clusters.
 
     Source:
-        Chan, Golub & LeVeque (1979), Updating Formulae and a Pairwise Algorithm for Computing Sample Variances.
+        Chan, Golub & LeVeque (1979), "Updating formulae and a pairwise algorithm for computing sample variances".
     """
     x, y = a.drawn, b.drawn
     count, step = x.count + y.count, y.mean - x.mean

@@ -1,4 +1,4 @@
-"""What a batch comes to: a summary for each world, variant and seed, the VSS map by map, and over maps."""
+"""Results of a batch: a summary for each world, variant and seed, the VSS of each map, and over maps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 from sva_bench.analysis.results import Estimate, ScenarioFigures, Words
 from sva_bench.analysis.summaries import Head, Reach
 from sva_bench.choices import Fidelity
-from sva_bench.files.fields import WholeNumber
+from sva_bench.files.fields import NonNegativeInt
 from sva_bench.files.records import Record
 
 BATCH: Literal["sva-bench/batch@1"] = "sva-bench/batch@1"
@@ -19,9 +19,9 @@ class UnitSummary(Head):
     """The summary of one world, variant and seed.
 
     Attributes:
-        variant: What a sweep varied; empty without a sweep.
-        scenarios: What came of its scenarios, as far as sums over trials tell.
-        reach: What its robots cannot reach.
+        variant: The varied settings; empty without a sweep.
+        scenarios: Results of its scenarios, from sums over trials.
+        reach: POIs that its robots cannot reach.
     """
 
     variant: str
@@ -30,13 +30,13 @@ class UnitSummary(Head):
 
     @property
     def label(self) -> str:
-        """Its map, for a person."""
+        """Its map, as shown to users."""
         return labelled(self.world, self.variant)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapVss(Estimate):
-    """The executed VSS of one map over the trials of all its seeds; ``same_plan`` = under each of them."""
+    """The executed VSS of one map over the trials of all seeds; ``same_plan``: the plans are equal under each."""
 
     same_plan: bool
 
@@ -58,8 +58,8 @@ class Percentage(Record):
     """Mean percentage over maps, and its interval.
 
     Attributes:
-        mean, ci95: ``None`` where no map has one, or nothing tells how maps differ.
-        maps: Over how many maps, where it is over fewer than the rest of its row.
+        mean, ci95: ``None`` where no map has a percentage, or the sample gives no interval.
+        maps: Number of maps, where fewer than in the rest of its row.
     """
 
     mean: float | None
@@ -69,7 +69,7 @@ class Percentage(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class OverMaps(Record):
-    """The VSS over maps, which are the sample, for one variant and scenario."""
+    """The VSS over maps, for one variant and scenario; the maps are the sample."""
 
     variant: str
     scenario: str
@@ -79,19 +79,19 @@ class OverMaps(Record):
 
     @property
     def label(self) -> str:
-        """Scenario and variant, for a person."""
+        """Scenario and variant, as shown to users."""
         return labelled(self.scenario, self.variant)
 
 
 @dataclass(frozen=True, kw_only=True)
 class GivenUp(Record):
-    """A unit that was given up, and why."""
+    """A unit that failed for good, and why."""
 
     unit: Words
     world: Words
-    seed: WholeNumber
+    seed: NonNegativeInt
     reason: Words
-    attempts: WholeNumber
+    attempts: NonNegativeInt
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,5 +111,5 @@ class BatchSummary(Record):
 
 
 def labelled(name: str, variant: str) -> str:
-    """A scenario or a map, and what a sweep varied in it."""
+    """A scenario or a map with its varied settings, as shown to users."""
     return f"{name} ({variant})" if variant else name

@@ -1,4 +1,4 @@
-"""Precision asked for in place of trials: when a run has enough of them."""
+"""Sequential stopping: a run that continues until its interval has a required relative half-width."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from sva_bench.errors import BadInput
 
 @dataclass(frozen=True, kw_only=True)
 class Precision:
-    """How sure a run is to be.
+    """A stopping rule.
 
     Attributes:
-        pct: Half-width of the executed VSS's interval in per cent of the stochastic plan's mean, in every scenario.
-        max_trials: Trials at which it ends all the same.
+        pct: Required relative half-width of the executed VSS in every scenario [% of the stochastic plan's mean].
+        max_trials: Trials at which the run stops in any case.
     """
 
     pct: float
     max_trials: int
 
     def next_size(self, summary: Summary) -> tuple[int, int] | None:
-        """Trials and rollouts to go on with: twice as many of both; ``None`` = enough.
+        """Trials and rollouts of the next step, twice as many of both; ``None`` = stop.
 
-        More trials of the same noise draws would not tell more of the noise, so both grow. Few looks, each at twice
-        the data, keep the chance small that a lucky look ends the run too early.
+        More trials under the same noise draws would not reduce the variance due to noise, so both grow. Few interim
+        analyses, each of twice the data, keep the probability of stopping too early small.
 
         Source:
-            Chow & Robbins (1965), On the Asymptotic Theory of Fixed-Width Sequential Confidence Intervals; Glynn &
-            Whitt (1992), The Asymptotic Validity of Sequential Stopping Rules for Stochastic Simulations.
+            Chow & Robbins (1965), "On the asymptotic theory of fixed-width sequential confidence intervals"; Glynn &
+            Whitt (1992), "The asymptotic validity of sequential stopping rules for stochastic simulations".
         """
         if self.reached(summary.scenarios).met or summary.trials >= self.max_trials:
             return None
@@ -39,16 +39,16 @@ class Precision:
         return trials, math.ceil(summary.rollouts * trials / summary.trials)
 
     def reached(self, scenarios: Sequence[ScenarioSummary]) -> ReachedPrecision:
-        """What became of it; met where every scenario is as sure as asked for."""
+        """The precision reached, and whether every scenario has the required one."""
         reached = half_width_pct(scenarios)
         return ReachedPrecision(asked_pct=self.pct, reached_pct=reached, max_trials=self.max_trials,
                                 met=reached is not None and reached <= self.pct)
 
 
 def half_width_pct(scenarios: Sequence[ScenarioSummary]) -> float | None:
-    """The greatest half-width of an executed VSS, in per cent of the stochastic plan's mean.
+    """The greatest relative half-width of an executed VSS over scenarios [% of the stochastic plan's mean].
 
-    Nothing varies: 0. ``None`` where there is no interval, or nothing that it could be per cent of.
+    0 where nothing varies; ``None`` where there is no interval, or the mean is not positive.
     """
     widths = []
     for scenario in scenarios:
@@ -60,10 +60,10 @@ def half_width_pct(scenarios: Sequence[ScenarioSummary]) -> float | None:
 
 
 def precision_of(text: str, max_trials: int, trials: int, rollouts: int) -> Precision:
-    """The precision that a command line asks for, such as ``1%``.
+    """The precision given on the command line, such as ``1%``.
 
     Raises:
-        BadInput: If it can't be meant, or never be met.
+        BadInput: If it is no percentage, or can't be reached with these trials and rollouts.
     """
     figure = text.strip()
     try:

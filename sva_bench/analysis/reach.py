@@ -1,4 +1,4 @@
-"""What robots cannot reach, and plans that break their limits, in words: the same for terminal, page and check."""
+"""Sentences about unreachable POIs and infeasible plans, for terminal, page and check."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _NAMED = 20  # POIs or maps that a sentence names
 
 
 def reached(missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Sequence[str]) -> Reach:
-    """What ``summary.json`` says of reach.
+    """The section ``reach`` of ``summary.json``.
 
     Args:
-        missed: POIs that each robot cannot visit and come home from, by robot; those that miss none may be left out.
+        missed: POIs that each robot cannot visit and return from, by robot; robots that miss none may be left out.
         robots: All robots.
         pois: All POIs.
     """
@@ -27,19 +27,19 @@ def reached(missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Se
 
 
 def beyond_reach(reach: Reach) -> list[str]:
-    """A sentence for each robot that can't visit some POIs within its fuel and limit; none where nothing is reached."""
+    """A sentence for each robot that can't visit some POIs within its fuel and limit; none if no POI is reachable."""
     if reach.nothing:
         return []
-    said = [f"{robot} reaches no POI within its fuel and limit, and stays home." if robot in reach.robots else
+    sentences = [f"{robot} reaches no POI within its fuel and limit, and stays home." if robot in reach.robots else
             f"{robot} reaches none of {_named(pois)} within its fuel and limit, and will never be sent there."
             for robot, pois in reach.missed.items()]
     if reach.pois:
-        said.append(f"No robot reaches {_named(reach.pois)}.")
-    return said
+        sentences.append(f"No robot reaches {_named(reach.pois)}.")
+    return sentences
 
 
 def maps_without_reach(labels: Sequence[str]) -> list[str]:
-    """What to say of the maps of a batch on which nothing can be collected; a map may be named for several seeds."""
+    """A sentence about the maps of a batch on which no POI is reachable; a map may be listed for several seeds."""
     names = list(dict.fromkeys(labels))
     if not names:
         return []
@@ -48,18 +48,18 @@ def maps_without_reach(labels: Sequence[str]) -> list[str]:
 
 
 def lost_robots(plan: GivenPlanResult) -> str:
-    """``500 of 2000``: how many robot missions ended along the route."""
+    """How many robot missions ended along the route, as ``500 of 2000``."""
     return f"{plan.lost} of {sum(plan.ends.values())}"
 
 
 def warned(plan: GivenPlanResult) -> str:
-    """What a ranking says of a plan before its figure: that it is infeasible, and how many robots were lost."""
+    """The warning beside a plan in a ranking: that it is infeasible, and how many robot missions were lost."""
     words = ["infeasible"] * (not plan.feasible) + [f"{lost_robots(plan)} robot missions lost"] * bool(plan.lost)
     return f" ({', '.join(words)})" if words else ""
 
 
 def infeasible_plans(summary: ComparisonSummary) -> list[str]:
-    """A sentence about the plans that break fuel or limit."""
+    """A sentence about the plans that exceed fuel or limit; none if all are feasible."""
     names = list(dict.fromkeys(name for scenario in summary.scenarios for name, plan in scenario.plans.items()
                                if not plan.feasible))
     if not names:

@@ -1,5 +1,6 @@
-"""Results: what ``summary.json`` holds, from the measuring to the page. Each type is made where its figures are worked
-out, and checked where it is read from a file that may come from anywhere.
+"""Results: the types behind ``summary.json``, from their computation to the page.
+
+Each is created where its figures are computed, and validated where it is read from a file of any origin.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from sva_bench.choices import End, FailureProcess, Objective, Status
-from sva_bench.files.fields import Name, Probability, WholeNumber
+from sva_bench.files.fields import Name, NonNegativeInt, Probability
 from sva_bench.files.printable import is_name
 from sva_bench.files.records import Record, stands_after
 
@@ -19,8 +20,8 @@ SUMMARY: Literal["sva-bench/summary@1"] = "sva-bench/summary@1"
 MOST_TRIALS, MOST_ROLLOUTS = 10_000_000, 10_000_000
 
 
-def two(ends: object) -> object:
-    """A list of two."""
+def low_and_high(ends: object) -> object:
+    """The value, if it is a list of two."""
     if not isinstance(ends, list | tuple) or len(ends) != 2:
         raise ValueError("expected [low, high]")
     return ends
@@ -32,32 +33,32 @@ def _in_order(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
-def _is_shown(name: str) -> str:
+def _is_printable(name: str) -> str:
     if not is_name(name):
-        raise ValueError("a name that holds control characters")
+        raise ValueError("a name with control characters")
     return name
 
 
 MOST_AMOUNT = 1e15
 Amount = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST_AMOUNT, le=MOST_AMOUNT)]
-"""A sum of incentives, or a percentage of one; a page adds, subtracts and draws them."""
-Interval = Annotated[tuple[Amount, Amount], BeforeValidator(two), AfterValidator(_in_order)]
+"""A sum of incentives, or a percentage of one; bounded, since pages add, subtract and plot them."""
+Interval = Annotated[tuple[Amount, Amount], BeforeValidator(low_and_high), AfterValidator(_in_order)]
 Words = Annotated[str, Field(max_length=10_000)]
-PlanName = Annotated[str, Field(pattern=r"^[^/\x00-\x1f]{1,250}$"), AfterValidator(_is_shown)]
-"""Part of file names."""
+PlanName = Annotated[str, Field(pattern=r"^[^/\x00-\x1f]{1,250}$"), AfterValidator(_is_printable)]
+"""The name of a plan, which is part of file names."""
 Availability = Annotated[Mapping[Name, Probability], Field(min_length=1)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate(Record):
-    """A mean and its 95 % interval; ``None`` where the data carry none."""
+    """A mean and its 95 % confidence interval; ``None`` where the data give none."""
 
     mean: Amount
     ci95: Interval | None
 
     @property
     def excludes_zero(self) -> bool:
-        """Whether the interval leaves zero out. Differences that are all zero are not distinguishable from it."""
+        """Whether the interval excludes zero; one of differences that are all zero doesn't."""
         return self.ci95 is not None and (self.ci95[0] > 0 or self.ci95[1] < 0)
 
     @property
@@ -76,7 +77,7 @@ class Estimate(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Share(Record):
-    """A share of trials and its 95 % interval."""
+    """A share of trials and its 95 % confidence interval."""
 
     share: Probability
     ci95: Interval | None
@@ -84,7 +85,7 @@ class Share(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Distribution(Record):
-    """Quantiles over trials, all of them figures that a trial came to, and the mean of the worst tenth."""
+    """Quantiles over trials (each an observed value), and the mean of the worst tenth (CVaR)."""
 
     least: Amount
     q05: Amount
@@ -98,7 +99,7 @@ class Distribution(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Ledger(Record):
-    """How a promise became what was executed; the entries between the two add up to their difference."""
+    """The decomposition of the difference between promised and executed value; its entries add up to it."""
 
     promised: Amount
     assumption: Amount
@@ -111,12 +112,12 @@ class Ledger(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Promise(Record):
-    """What is known of a plan before any trial.
+    """The values of a plan that are known before any trial.
 
     Attributes:
         promised: Its value in its own objective.
         bound: The upper bound that its solver proved.
-        status: How its solve ended; ``None`` for a plan from elsewhere that doesn't say.
+        status: How its solve ended; ``None`` for a given plan without one.
         expected: Its closed-form value under the failure process executed.
     """
 
@@ -128,31 +129,31 @@ class Promise(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PlanFigures(Promise):
-    """What came of a plan, as far as sums over its trials tell.
+    """The results of a plan that follow from sums over its trials.
 
     Attributes:
-        executed: What the team collected.
-        by_robot: What each robot collected, on average.
-        ends: How often missions ended which way.
-        ledger: From promise to execution.
+        executed: Mean incentive of the team.
+        by_robot: Mean incentive of each robot.
+        ends: Number of robot missions with each end.
+        ledger: Decomposition of executed less promised value.
         statistics: Those of ``analysis.catalogue`` that are measured trial by trial, by their keys.
     """
 
     executed: Estimate
     by_robot: Mapping[Name, Amount]
-    ends: Mapping[End, WholeNumber]
+    ends: Mapping[End, NonNegativeInt]
     ledger: Ledger
     statistics: Mapping[Name, Estimate] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlanResult(PlanFigures):
-    """What came of a plan, single trials at hand.
+    """The results of a plan from its single trials.
 
     Attributes:
-        executed_controlled: What it collected, free of the luck of the draw.
-        distribution: Over trials.
-        end_shares: Share of trials in which each robot ended which way.
+        executed_controlled: Variance-reduced mean incentive of the team.
+        distribution: Distribution over trials.
+        end_shares: Share of trials with each end, by robot.
     """
 
     executed_controlled: Estimate = field(metadata=stands_after("executed"))
@@ -162,28 +163,28 @@ class PlanResult(PlanFigures):
 
 @dataclass(frozen=True, kw_only=True)
 class GivenPlanResult(PlanResult):
-    """What came of a plan from anywhere.
+    """The results of a given plan.
 
     Attributes:
-        feasible: Whether it keeps within fuel and limit.
-        lost: How many robot missions ended along the route.
+        feasible: Whether it keeps fuel capacities and mission limits.
+        lost: Number of robot missions that ended along the route.
     """
 
     feasible: bool
-    lost: WholeNumber
+    lost: NonNegativeInt
 
 
 @dataclass(frozen=True, kw_only=True)
 class VssFigures(Record):
-    """The value of the stochastic solution, as far as sums over trials tell.
+    """The value of the stochastic solution, from sums over trials.
 
     Attributes:
         modelled, modelled_pct: Difference of the plans' closed-form values; in per cent of the stochastic plan's.
         modelled_range: Least and greatest over all deterministic plans that tie; ``None`` if not known.
-        executed, executed_pct: Difference of what was collected; in per cent of the stochastic plan's mean.
-        distinguishable: Whether the executed interval leaves zero out.
+        executed, executed_pct: Difference in incentive; in per cent of the stochastic plan's mean.
+        distinguishable: Whether the executed interval excludes zero.
         same_plan: Whether both plans have the same routes.
-        verdict: Which plan is worth more, in words.
+        verdict: Which plan has the greater value, in words.
     """
 
     modelled: Amount
@@ -198,11 +199,11 @@ class VssFigures(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Vss(VssFigures):
-    """The value of the stochastic solution, single trials at hand.
+    """The value of the stochastic solution, from single trials.
 
     Attributes:
         executed_range: Least and greatest executed VSS over the deterministic plans that tie.
-        executed_controlled: The executed VSS, free of the luck of the draw.
+        executed_controlled: The variance-reduced executed VSS.
     """
 
     executed_range: Interval | None = field(metadata=stands_after("executed_pct"))
@@ -211,7 +212,7 @@ class Vss(VssFigures):
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison(Record):
-    """What plan ``a`` collected beyond plan ``b``, trial by trial; the verdict rests on the adjusted interval."""
+    """The incentive of plan ``a`` less that of ``b``, trial by trial; the verdict follows the simultaneous interval."""
 
     a: PlanName
     b: PlanName
@@ -225,7 +226,7 @@ class Comparison(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Ranked(Record):
-    """A plan's place: one more than the number of plans that are distinguishably better."""
+    """A plan's rank: one more than the number of plans that are distinguishably better."""
 
     rank: Annotated[int, Field(strict=True, ge=1)]
     plan: PlanName
@@ -234,7 +235,7 @@ class Ranked(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PerfectInformation(Estimate):
-    """What the informed planner collected beyond the stochastic plan."""
+    """The executed EVPI: incentive of the perfect-information plans less that of the stochastic plan."""
 
     distinguishable: bool
     verdict: Words
@@ -242,7 +243,7 @@ class PerfectInformation(Estimate):
 
 @dataclass(frozen=True, kw_only=True)
 class Loss(Estimate):
-    """What the plan for the failures executed collected beyond another one."""
+    """The loss of a plan against the plan made for the failure process executed."""
 
     distinguishable: bool
     same_plan: bool
@@ -255,10 +256,10 @@ class AssumptionRow(Record):
     Attributes:
         executed_under: The failure process.
         planner: ``stochastic`` or ``deterministic``.
-        planned_for: The failure process that it was made for; ``None`` for the plan that knows no failures.
+        planned_for: The failure process that it was made for; ``None`` for the deterministic plan.
         expected: Its closed-form value under the process executed.
-        executed: What it collected.
-        loss_modelled, loss: What the plan for the process executed is worth beyond it.
+        executed: Mean incentive of the team.
+        loss_modelled, loss: Value of the plan for the process executed less its own, modelled and executed.
     """
 
     executed_under: FailureProcess
@@ -272,17 +273,17 @@ class AssumptionRow(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioFacts(Record):
-    """What the model says of a scenario before any trial; ``None`` = not worked out, or without a meaning there.
+    """The modelled values of a scenario, known before any trial; ``None`` = not computed, or not defined there.
 
     Attributes:
         name, availability: The scenario.
-        plans: What is known of its two plans.
+        plans: Promises of its two plans.
         modelled_range: Least and greatest modelled VSS over all deterministic plans that tie.
         same_plan: Whether both have the same routes.
-        vss_mean_value: Birge's VSS, of the plan for the mean scenario.
-        ws: Value of knowing beforehand who is available (wait and see).
+        vss_mean_value: VSS after Birge, against the plan for the mean scenario.
+        ws: Wait-and-see value.
         evpi: Expected value of perfect information.
-        value_of_process: What planning for failures along the route is worth under them.
+        value_of_process: Gain of planning for failures along the route, under them.
     """
 
     name: Name
@@ -298,7 +299,7 @@ class ScenarioFacts(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioPlans(Record):
-    """A scenario and what came of its plans."""
+    """A scenario and the results of its plans."""
 
     name: Name
     availability: Availability
@@ -307,7 +308,7 @@ class ScenarioPlans(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioFigures(ScenarioPlans):
-    """What came of the two plans of a scenario, as far as sums over trials tell."""
+    """The results of the two plans of a scenario, from sums over trials."""
 
     vss: VssFigures
     vss_mean_value: Amount | None
@@ -318,17 +319,17 @@ class ScenarioFigures(ScenarioPlans):
 
     @property
     def stochastic(self) -> PlanFigures:
-        """The stochastic plan's."""
+        """The results of the stochastic plan."""
         return self.plans["stochastic"]
 
     @property
     def deterministic(self) -> PlanFigures:
-        """The deterministic plan's."""
+        """The results of the deterministic plan."""
         return self.plans["deterministic"]
 
 
-def told(given: object) -> object:
-    """A key that may be absent holds something where it is there."""
+def not_null(given: object) -> object:
+    """The value of a key that may be absent, but not null."""
     if given is None:
         raise ValueError("expected something, found nothing")
     return given
@@ -339,38 +340,38 @@ class ScenarioSummary(ScenarioFigures):
     """One scenario of ``run``.
 
     Attributes:
-        evpi_executed: What the informed planner collected beyond the stochastic plan, where it was asked for.
-        assumptions: Plans under the failures they were made for and under the others, where it was asked for.
+        evpi_executed: Executed EVPI, with ``--informed``.
+        assumptions: Plans executed under each failure process, with ``--assumptions``.
     """
 
     plans: Annotated[Mapping[PlanName, PlanResult], Field(min_length=1)]
     vss: Vss
-    evpi_executed: Annotated[PerfectInformation | None, BeforeValidator(told)] = None
-    assumptions: Annotated[tuple[AssumptionRow, ...] | None, BeforeValidator(told)] = None
+    evpi_executed: Annotated[PerfectInformation | None, BeforeValidator(not_null)] = None
+    assumptions: Annotated[tuple[AssumptionRow, ...] | None, BeforeValidator(not_null)] = None
 
     @model_validator(mode="after")
-    def _fits_together(self) -> ScenarioSummary:
-        _of_these_robots(self.plans, self.availability)
+    def _is_consistent(self) -> ScenarioSummary:
+        _refuse_other_robots(self.plans, self.availability)
         if not {"stochastic", "deterministic"} <= set(self.plans):
             raise ValueError("a scenario with 'vss' has the plans 'stochastic' and 'deterministic'")
         s, d = self.stochastic.executed.mean, self.deterministic.executed.mean
         if abs(self.vss.executed.mean - (s - d)) > 1e-6 * max(abs(s), abs(d)):
-            raise ValueError("vss.executed.mean: expected what the stochastic plan collects beyond the other, "
+            raise ValueError("vss.executed.mean: expected the difference between the plans' means, "
                              f"{s - d:g}, found {self.vss.executed.mean:g}")
         return self
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedScenario(ScenarioPlans):
-    """One scenario of ``execute``: every pair of plans compared, and all of them from best to worst."""
+    """One scenario of ``execute``: the comparison of every pair of plans, and their ranking."""
 
     plans: Annotated[Mapping[PlanName, GivenPlanResult], Field(min_length=1)]
     comparisons: tuple[Comparison, ...]
     ranking: tuple[Ranked, ...]
 
     @model_validator(mode="after")
-    def _fits_together(self) -> ComparedScenario:
-        _of_these_robots(self.plans, self.availability)
+    def _is_consistent(self) -> ComparedScenario:
+        _refuse_other_robots(self.plans, self.availability)
         if sorted(row.plan for row in self.ranking) != sorted(self.plans):
             raise ValueError("ranking: expected each of 'plans' once")
         if not {name for pair in self.comparisons for name in (pair.a, pair.b)} <= set(self.plans):
@@ -378,7 +379,7 @@ class ComparedScenario(ScenarioPlans):
         return self
 
 
-def _of_these_robots(plans: Mapping[str, PlanResult], availability: Mapping[str, float]) -> None:
+def _refuse_other_robots(plans: Mapping[str, PlanResult], availability: Mapping[str, float]) -> None:
     for name, plan in plans.items():
         for key, held in (("by_robot", plan.by_robot), ("end_shares", plan.end_shares)):
             if list(held) != list(availability):

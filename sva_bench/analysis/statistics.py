@@ -1,4 +1,4 @@
-"""Means and tails of trials, with intervals that hold where bad noise draws are rare."""
+"""Means and tails of trials, with confidence intervals that are valid where bad noise draws are rare."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ CONFIDENCE = 0.95
 WORST = 0.1
 """Share of the trials whose mean is reported as the tail (CVaR)."""
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-_SPREADLESS = 1e-12  # relative to the bounds: rounding of sums, not spread
+_SPREADLESS = 1e-12  # spread relative to the bounds that counts as rounding of sums
 
 
 def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
     """Mean of trials that share noise draws, with its interval.
 
-    Failures vary from trial to trial and noise from draw to draw, so each part has an interval of its own sample, and
-    the two are put together: as far as the drawn part may be below its mean and noise may have taken more than it did,
-    the mean may be too high.
+    Failures vary from trial to trial and noise from draw to draw, so each part has an interval from its own sample;
+    the two are combined by the method of variance estimates recovery.
 
     Args:
-        figure: The figure, or a difference of two plans that met the same failures.
-        comparisons: How many intervals are to hold together with 95 %; each is widened accordingly.
+        figure: The figure, such as a difference of two plans under the same failures.
+        comparisons: Number of intervals that hold simultaneously with 95 %.
 
     Source:
-        Two parts together: Zou & Donner (2008), Construction of Confidence Limits about Effect Measures (MOVER).
+        Zou & Donner (2008), "Construction of confidence limits about effect measures" (MOVER); Bonferroni's inequality
+        for simultaneous intervals.
         Several intervals at a time: Bonferroni's inequality, whatever they share.
     """
     drawn, taken = _drawn_interval(figure, comparisons), _taken_interval(figure, comparisons)
@@ -45,17 +45,18 @@ def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
 
 
 def controlled(figure: Figure, expected: float) -> Estimate:
-    """Mean of trials, free of the luck of the draw: what the failures leave has a closed form, what noise took is left.
+    """Variance-reduced mean of trials: the part due to failures is replaced by its closed form (a control variate).
 
-    Without noise all is as the rules have it, and what a robot loses to them is a matter of the draw: then only the
-    plain mean is known, and is given.
+    Without noise, losses are a function of the failures drawn, and the figure has no closed form: then the
+    plain mean is returned.
 
     Args:
         figure: The figure.
         expected: The expectation of its drawn part.
 
     Source:
-        A control variate with the slope of 1, which is right where noise takes nothing: Lavenberg & Welch (1981).
+        Lavenberg & Welch (1981), "A perspective on the use of control variables to increase the efficiency of Monte
+        Carlo simulations"; the coefficient is 1, which is optimal without losses.
     """
     if not len(figure.taken.counts):
         return estimate(figure)
@@ -67,7 +68,7 @@ def controlled(figure: Figure, expected: float) -> Estimate:
 
 
 def _estimate(mean: float, ci95: tuple[float, float] | None) -> Estimate:
-    """An estimate without minus zeros."""
+    """An estimate without negative zeros."""
     return Estimate(mean=mean + 0.0, ci95=None if ci95 is None else (ci95[0] + 0.0, ci95[1] + 0.0))
 
 
@@ -79,7 +80,7 @@ def _drawn_interval(figure: Figure, comparisons: int) -> tuple[float, float] | N
 
 
 def _taken_interval(figure: Figure, comparisons: int) -> tuple[float, float] | None:
-    """Interval of what noise takes on average: its sample are the draws."""
+    """Interval of the mean loss due to noise; the sample is the noise draws."""
     if not len(figure.taken.counts):
         return 0.0, 0.0
     means = figure.taken.means
@@ -93,24 +94,24 @@ def _taken_interval(figure: Figure, comparisons: int) -> tuple[float, float] | N
 def bounded_mean(
     count: int, mean: float, squares: float, bounds: Bounds, *, comparisons: int = 1, seen: Bounds | None = None,
 ) -> tuple[float, float]:
-    """Interval of the mean of independent observations that can't lie outside known bounds.
+    """Confidence interval of the mean of independent observations within known bounds.
 
-    To each side, one more observation is put on the bound, and the observations are weighted at random as a Bayesian
-    bootstrap does; the weighted mean's distribution is that of a beta with its moments. For a share it is exactly
-    Clopper and Pearson's interval, so what was not seen in ``n`` observations may have a share of about 3 / n; for many
-    observations it is the normal interval.
+    For each limit one observation is added at the bound, and the observations get random weights as in a Bayesian
+    bootstrap; the weighted mean's distribution is approximated by a beta with its moments. For a share it is exactly
+    Clopper and Pearson's interval, so an event that did not occur in ``n`` observations may have a share of about
+    3 / n; for many observations it is the normal interval.
 
     Args:
         count: Number of observations, at least 1.
         mean: Their mean.
-        squares: Sum of their squares about it.
-        bounds: The least and the greatest that one can be.
-        comparisons: How many intervals are to hold together.
-        seen: The least and the greatest observation, where the bounds might be too tight for them.
+        squares: Sum of their squared deviations from it.
+        bounds: Least and greatest possible observation.
+        comparisons: Number of intervals that hold simultaneously.
+        seen: Least and greatest observation, by which the bounds are widened if necessary.
 
     Source:
-        Gaffke (2005), Three test statistics for a nonparametric one-sided hypothesis on the mean of a nonnegative
-        variable; Phan, Thomas & Learned-Miller (2021), Towards Practical Mean Bounds for Small Samples; Clopper &
+        Gaffke (2005), "Three test statistics for a nonparametric one-sided hypothesis on the mean of a nonnegative
+        variable"; Phan, Thomas & Learned-Miller (2021), "Towards practical mean bounds for small samples"; Clopper &
         Pearson (1934).
     """
     low, high = bounds if seen is None else (min(bounds[0], seen[0]), max(bounds[1], seen[1]))
@@ -119,14 +120,14 @@ def bounded_mean(
         return mean, mean
     tail = (1 - CONFIDENCE) / (2 * comparisons)
     share = (mean - low) / (high - low)
-    spread = min(squares / (high - low) ** 2, count * share * (1 - share))  # no more fits between the bounds
+    spread = min(squares / (high - low) ** 2, count * share * (1 - share))  # the greatest possible within the bounds
     upper = _upper(count, share, spread, tail)
     lower = 1 - _upper(count, 1 - share, spread, tail)
     return low + (high - low) * lower, low + (high - low) * upper
 
 
 def _upper(count: int, mean: float, squares: float, tail: float) -> float:
-    """Upper limit of a mean of observations between 0 and 1."""
+    """Upper confidence limit of the mean of observations in [0, 1]."""
     total, second = count * mean, squares + count * mean**2
     middle = (total + 1) / (count + 1)
     variance = ((second + 1) / (count + 1) - middle**2) / (count + 2)
@@ -137,13 +138,16 @@ def _upper(count: int, mean: float, squares: float, tail: float) -> float:
 
 
 def sample_mean(values: Sequence[float]) -> Estimate:
-    """Mean of a sample of anything, such as maps, with its interval; none from fewer than two, or if all are alike.
+    """Mean of a sample, such as of maps, with its confidence interval; none from fewer than two, or if all are equal.
 
-    Student's t is too narrow where most maps show nothing and a few show much, so the interval is widened to that of
-    observations which could lie beyond those met by their range over the square root of their number.
+    Student's t interval is too narrow where most maps have values near 0 and a few large ones, so it is widened to
+    ``bounded_mean`` with bounds beyond the observations by their range over the square root of their number.
+
+    Raises:
+        ValueError: If the sample is empty.
     """
     if not len(values):
-        raise ValueError("no sample, no mean")
+        raise ValueError("the sample is empty")
     sample = np.asarray(values, dtype=np.float64)
     mean, count = float(np.mean(sample)), len(sample)
     beyond = float(np.ptp(sample)) / math.sqrt(count)
@@ -156,21 +160,25 @@ def sample_mean(values: Sequence[float]) -> Estimate:
 
 
 def distribution(values: FloatArray) -> Distribution:
-    """Quantiles of trials, all of them figures that a trial came to, and the mean of the worst tenth."""
+    """Quantiles of trials (each an observed value), and the mean of the worst tenth.
+
+    Args:
+        values: Shape (trials,).
+    """
     q05, q25, q50, q75, q95 = (float(np.quantile(values, q, method="inverted_cdf")) for q in _QUANTILES)
     return Distribution(least=float(np.min(values)), q05=q05, q25=q25, q50=q50, q75=q75, q95=q95,
                         greatest=float(np.max(values)), cvar10=tail_mean(values, WORST))
 
 
 def tail_mean(values: FloatArray, worst: float) -> float:
-    """Mean of the worst trials, a given share of them: conditional value at risk.
+    """Conditional value at risk: the mean of a given share of worst trials.
 
     Args:
-        values: One figure per trial, more is better, shape (trials,).
-        worst: Share of the trials, above 0; a trial on its edge counts in part.
+        values: One value per trial, greater is better, shape (trials,).
+        worst: Share of the trials, above 0; the trial at its boundary counts in part.
 
     Source:
-        Rockafellar & Uryasev (2002), Conditional Value-at-Risk for General Loss Distributions.
+        Rockafellar & Uryasev (2002), "Conditional value-at-risk for general loss distributions".
     """
     ordered = np.sort(values)
     weights = np.clip(worst * len(values) - np.arange(len(values)), 0.0, 1.0)

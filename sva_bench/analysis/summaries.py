@@ -1,4 +1,4 @@
-"""Whole summaries: what every one says first, and its scenarios."""
+"""Whole summaries: the common head, and the scenarios."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from sva_bench.analysis.results import (
     ScenarioFacts,
     ScenarioPlans,
     ScenarioSummary,
-    told,
+    not_null,
 )
 from sva_bench.choices import FailureProcess, Fidelity
-from sva_bench.files.fields import Name, Seed, WholeNumber
+from sva_bench.files.fields import Name, NonNegativeInt, Seed
 from sva_bench.files.records import Record
 
 
@@ -34,32 +34,32 @@ class Failures(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Travel(Record):
-    """How many travel times there are, and what their metric repair changed."""
+    """Number of travel times, and the extent of their metric repair."""
 
-    pairs: WholeNumber
+    pairs: NonNegativeInt
     triangle_violations_pct: Amount
     max_excess_pct: Amount
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReachedPrecision(Record):
-    """What became of the precision that was asked for."""
+    """The required precision, and the one reached."""
 
     asked_pct: Amount
     reached_pct: Amount | None
     met: bool
-    max_trials: WholeNumber
+    max_trials: NonNegativeInt
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reach(Record):
-    """What robots cannot reach within fuel and limit.
+    """The POIs that robots cannot reach within fuel and limit.
 
     Attributes:
         nothing: Whether no robot reaches any POI.
-        robots: Those that reach none.
-        pois: Those that no robot reaches.
-        missed: What each robot misses, if anything.
+        robots: Robots that reach no POI.
+        pois: POIs that no robot reaches.
+        missed: POIs that a robot doesn't reach, for robots with any.
     """
 
     nothing: bool
@@ -70,13 +70,13 @@ class Reach(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Head(Record):
-    """What every summary says first.
+    """The common head of summaries.
 
     Attributes:
-        world, seed, trials, rollouts, fidelity: What was executed, and how.
+        world, seed, trials, rollouts, fidelity: The settings of the execution.
         failure: The failure processes.
-        travel: Of the travel times.
-        reproducible: Whether no solve met a limit.
+        travel: Figures of the travel times.
+        reproducible: Whether every solve was proved within its gap, so that the plans don't depend on the machine.
     """
 
     format: Literal["sva-bench/summary@1"] = SUMMARY
@@ -92,7 +92,7 @@ class Head(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Facts(Head):
-    """What is known of a point of a batch before any trial."""
+    """The modelled values of a batch point, known before any trial."""
 
     scenarios: Annotated[tuple[ScenarioFacts, ...], Field(min_length=1, max_length=10_000)]
     reach: Reach
@@ -103,12 +103,12 @@ class Summary(Head):
     """``summary.json`` of ``run``."""
 
     scenarios: Annotated[tuple[ScenarioSummary, ...], Field(min_length=1, max_length=10_000)]
-    precision: Annotated[ReachedPrecision | None, BeforeValidator(told)] = None
+    precision: Annotated[ReachedPrecision | None, BeforeValidator(not_null)] = None
     reach: Reach
 
     @model_validator(mode="after")
-    def _alike(self) -> Summary:
-        _of_the_same_plans(self.scenarios)
+    def _is_consistent(self) -> Summary:
+        _refuse_other_plans(self.scenarios)
         return self
 
 
@@ -120,8 +120,8 @@ class ComparisonSummary(Head):
     reach: Reach
 
     @model_validator(mode="after")
-    def _alike(self) -> ComparisonSummary:
-        _of_the_same_plans(self.scenarios)
+    def _is_consistent(self) -> ComparisonSummary:
+        _refuse_other_plans(self.scenarios)
         return self
 
 
@@ -129,16 +129,16 @@ AnySummary = Summary | ComparisonSummary
 
 
 def summary_form(data: object) -> type[Summary] | type[ComparisonSummary]:
-    """What a summary in a file is to be read as: one with comparisons is of ``execute``."""
+    """The type of a summary in a file: one with comparisons is of ``execute``."""
     scenarios = data.get("scenarios") if isinstance(data, dict) else None
     first = scenarios[0] if isinstance(scenarios, list) and scenarios else None
     return ComparisonSummary if isinstance(first, dict) and "comparisons" in first else Summary
 
 
-def _of_the_same_plans(scenarios: Sequence[ScenarioPlans]) -> None:
+def _refuse_other_plans(scenarios: Sequence[ScenarioPlans]) -> None:
     first = scenarios[0]
     if len({scenario.name for scenario in scenarios}) < len(scenarios):
-        raise ValueError("scenarios: a name stands twice")
+        raise ValueError("scenarios: a name is a duplicate")
     for number, scenario in enumerate(scenarios):
         if (list(scenario.plans), list(scenario.availability)) != (list(first.plans), list(first.availability)):
             raise ValueError(f"scenarios[{number}]: other plans or robots than in the first scenario")

@@ -1,4 +1,4 @@
-"""Trials made into results: what was promised, what was executed, and what the stochastic plan is worth."""
+"""Results from trials: promised and executed values of plans, and the value of the stochastic solution."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sva_bench.analysis.results import (
     VssFigures,
 )
 from sva_bench.analysis.statistics import controlled, distribution, estimate
-from sva_bench.analysis.unseen import UNHAPPY
+from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Executed
@@ -39,7 +39,7 @@ class Judged:
     Attributes:
         expected: Closed-form value under the failure process executed.
         executed: Its trials.
-        feasible: Whether it keeps within fuel and limit.
+        feasible: Whether it keeps fuel capacities and mission limits.
     """
 
     expected: float
@@ -48,7 +48,7 @@ class Judged:
 
     @property
     def promise(self) -> Promise:
-        """What is known of it before any trial."""
+        """Its values before any trial."""
         return promise_of(self.executed.case.plan, self.expected)
 
 
@@ -58,8 +58,8 @@ class ScenarioTrials:
 
     Attributes:
         stochastic, deterministic: Those of the two plans.
-        worst: Those of the deterministic plan that ties and is worth least; ``None`` where none is worth less.
-        informed: The planner that knows beforehand who is available, where it was asked for.
+        worst: Those of the tied deterministic plan of least expected value; ``None`` where no tie has less.
+        informed: The perfect-information plans, with ``--informed``.
     """
 
     stochastic: Executed
@@ -69,7 +69,13 @@ class ScenarioTrials:
 
 
 def scenario_summary(facts: ScenarioFacts, trials: ScenarioTrials, *, noisy: bool) -> ScenarioSummary:
-    """One scenario of ``run``."""
+    """The summary of one scenario of ``run``.
+
+    Args:
+        facts: Its modelled values.
+        trials: Its trials.
+        noisy: Whether noise draws differ.
+    """
     s, d, informed = trials.stochastic, trials.deterministic, trials.informed
     results = {"stochastic": plan_result(facts.plans["stochastic"], s, noisy=noisy),
                "deterministic": plan_result(facts.plans["deterministic"], d, noisy=noisy)}
@@ -84,7 +90,7 @@ def scenario_summary(facts: ScenarioFacts, trials: ScenarioTrials, *, noisy: boo
         vss=Vss(**vars(found), executed_range=spread,
                 executed_controlled=controlled(beyond, facts.plans["stochastic"].expected
                                                - facts.plans["deterministic"].expected)),
-        # The plan for the mean is the stochastic plan itself, drive for drive.
+        # The plan for the mean scenario is the stochastic plan itself.
         vss_mean_value=facts.vss_mean_value, vss_mean_value_executed=facts.vss_mean_value, ws=facts.ws,
         evpi=facts.evpi, value_of_process=facts.value_of_process,
         evpi_executed=None if informed is None else _beyond(informed.executed, s, noisy=noisy))
@@ -94,9 +100,9 @@ def vss_figures(facts: ScenarioFacts, plans: Mapping[str, PlanFigures], differen
     """The value of the stochastic solution.
 
     Args:
-        facts: What is known of the scenario without trials.
-        plans: What came of the stochastic and the deterministic plan.
-        difference: What the first collected beyond the second.
+        facts: Modelled values of the scenario.
+        plans: Results of the stochastic and the deterministic plan.
+        difference: Executed difference in incentive between the two.
     """
     s, d = plans["stochastic"], plans["deterministic"]
     modelled = s.expected - d.expected + 0.0
@@ -108,14 +114,14 @@ def vss_figures(facts: ScenarioFacts, plans: Mapping[str, PlanFigures], differen
 
 
 def _beyond(informed: Executed, stochastic: Executed, *, noisy: bool) -> PerfectInformation:
-    """What knowing beforehand was worth, in the same trials."""
+    """The executed EVPI, in the same trials."""
     found = estimate(difference_figure(informed, stochastic, noisy=noisy))
     return PerfectInformation(mean=found.mean, ci95=found.ci95, distinguishable=found.excludes_zero,
                               verdict=verdict_of(found, "informed", "stochastic"))
 
 
 def verdict_of(difference: Estimate, a: str, b: str, *, same: bool = False) -> str:
-    """Which of two plans is worth more, in words, if that can be told; ``same`` where they have the same routes."""
+    """Which of two plans has the greater value, in words; ``same`` where they have the same routes."""
     if same:
         return "the same plan"
     if difference.ci95 is None:
@@ -126,7 +132,7 @@ def verdict_of(difference: Estimate, a: str, b: str, *, same: bool = False) -> s
 
 
 def plan_result(promise: Promise, run: Executed, *, noisy: bool) -> PlanResult:
-    """What one plan promised and what came of it, single trials at hand."""
+    """The results of one plan from its single trials."""
     figure = value_figure(run, noisy=noisy)
     counts: dict[End, int] = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
     shares = {name: {end: _share(found) for end, found in end_figures(run, k, noisy=noisy).items()
@@ -139,7 +145,7 @@ def plan_result(promise: Promise, run: Executed, *, noisy: bool) -> PlanResult:
 
 
 def promise_of(plan: Plan, expected: float) -> Promise:
-    """What is known of a plan before any trial.
+    """The values of a plan before any trial.
 
     Args:
         plan: The plan.
@@ -150,27 +156,27 @@ def promise_of(plan: Plan, expected: float) -> Promise:
 
 
 def charges(run: Executed) -> FloatArray:
-    """What each end in ``UNHAPPY`` cost in all trials together, shape (3,).
+    """Incentive lost to each end in ``EXECUTION_LOSSES`` in all trials together, shape (3,).
 
-    A POI is charged to the end of the robot that planned it.
+    A POI is charged to the end of the robot whose route it is on.
     """
     lost = run.planned_incentive - run.incentive
-    return np.array([float(np.where(run.end == ENDS.index(end), lost, 0.0).sum()) for end in UNHAPPY])
+    return np.array([float(np.where(run.end == ENDS.index(end), lost, 0.0).sum()) for end in EXECUTION_LOSSES])
 
 
 def plan_figures(
     promise: Promise, executed: Estimate, by_robot: Mapping[str, float], ends: Mapping[End, int], charged: FloatArray,
     statistics: Mapping[str, Estimate],
 ) -> PlanFigures:
-    """What one plan promised and what came of it, from sums over its trials.
+    """The results of one plan from sums over its trials.
 
     Args:
-        promise: What was known before.
-        executed: What it collected.
-        by_robot: What each robot collected, on average.
-        ends: How often missions ended which way.
-        charged: What each end in ``UNHAPPY`` cost, on average, shape (3,).
-        statistics: Those that are measured trial by trial, by their keys.
+        promise: Its values before any trial.
+        executed: Mean incentive of the team.
+        by_robot: Mean incentive of each robot.
+        ends: Number of robot missions with each end.
+        charged: Mean incentive lost to each end in ``EXECUTION_LOSSES``, shape (3,).
+        statistics: The measured statistics, by key.
     """
     return PlanFigures(**vars(promise), executed=executed, by_robot=by_robot, statistics=statistics,
                        ends={end: count for end, count in ends.items() if count},
@@ -178,12 +184,13 @@ def plan_figures(
 
 
 def ledger(promise: Promise, charged: FloatArray, executed: float) -> Ledger:
-    """How the promise became what was executed.
+    """The decomposition of executed less promised value.
 
-    A POI that was not credited is charged to the end of the robot that planned it. What robots lost that failed by
-    draw, against what they were expected to lose, is ``draws``.
+    A POI that was not collected is charged to the end of the robot whose route it is on. What robots lost to failures
+    drawn, less its expectation, is ``draws``.
     """
-    out_of_fuel, late, stuck = (-float(charged[UNHAPPY.index(end)]) + 0.0 for end in ("out_of_fuel", "late", "stuck"))
+    out_of_fuel, late, stuck = (
+        -float(charged[EXECUTION_LOSSES.index(end)]) + 0.0 for end in ("out_of_fuel", "late", "stuck"))
     assumption = promise.expected - promise.promised + 0.0
     draws = executed - promise.promised - assumption - (out_of_fuel + late + stuck) + 0.0
     return Ledger(promised=promise.promised, assumption=assumption, draws=draws, out_of_fuel=out_of_fuel, late=late,
@@ -191,7 +198,7 @@ def ledger(promise: Promise, charged: FloatArray, executed: float) -> Ledger:
 
 
 def totals(run: Executed) -> FloatArray:
-    """What the robots collected together, shape (trials,)."""
+    """Incentive of the team in each trial, shape (trials,)."""
     collected: FloatArray = run.incentive.sum(axis=1)
     return collected
 
@@ -203,6 +210,6 @@ def _share(figure: Figure) -> Share:
 
 
 def _percent(part: float, whole: float) -> float | None:
-    """``None`` of nothing, or of so little that the percentage tells nothing."""
+    """A percentage; ``None`` of 0, or beyond ``MOST_AMOUNT``."""
     percentage = 100.0 * part / whole + 0.0 if whole else np.inf
     return percentage if abs(percentage) <= MOST_AMOUNT else None

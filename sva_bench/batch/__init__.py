@@ -1,1 +1,1 @@
-"""Batches: Monte Carlo over many worlds that loses nothing of what is done."""
+"""Batches: Monte Carlo over many worlds, with results kept unit by unit."""

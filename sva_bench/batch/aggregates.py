@@ -1,4 +1,4 @@
-"""What a batch comes to, streamed from the tallies in its shards: memory doesn't grow with trials."""
+"""Summaries of a batch, from the tallies in its shards: memory doesn't grow with trials."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from sva_bench.batch.tallies import join, scenario_of
 
 
 def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failures: Sequence[GivenUp]) -> BatchSummary:
-    """The summary of a batch, from the shards of the units that are done.
+    """The summary of a batch, from the shards of its completed units.
 
-    Shards are joined in the order of the grid, whatever the order they were written in, so the sums are the same.
+    Shards are joined in the order of the grid, so that sums don't depend on the order in which they were written.
     """
     notes = list(_notes(grid, folder, done))
     units = [unit_summary(note) for note in notes]
@@ -32,21 +32,21 @@ def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failur
 
 
 def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterator[Note]:
-    """What is known of each point and seed of which some trials are done."""
+    """The joined notes of each point and seed with completed trials."""
     ranges = grid.ranges()
     for point, seed in grid.strands():
-        together: Note | None = None
+        combined: Note | None = None
         for first, _ in ranges:
             unit = grid.unit_name(point, seed, first)
             if unit in done:
                 note = read_note(shard_path(folder, unit), unit_of(grid, point, seed, first))
-                together = note if together is None else joined(together, note)
-        if together is not None:
-            yield together
+                combined = note if combined is None else joined(combined, note)
+        if combined is not None:
+            yield combined
 
 
 def joined(a: Note, b: Note) -> Note:
-    """Two ranges of trials of one point and seed together."""
+    """The note of two ranges of trials of one point and seed."""
     return Note(facts=a.facts, variant=a.variant, robots=a.robots, first=min(a.first, b.first),
                 trials=a.trials + b.trials,
                 tallies={name: join(tally, b.tallies[name]) for name, tally in a.tallies.items()})
@@ -65,10 +65,10 @@ def unit_summary(note: Note) -> UnitSummary:
 def aggregate(units: Sequence[UnitSummary]) -> tuple[OverMaps, ...]:
     """VSS over maps, for each variant and scenario: the maps are the sample, seeds and trials are nested in them.
 
-    The interval is that of a mean over maps, each map's figure being the mean over its seeds. A map where the
-    stochastic plan collects nothing has no percentage: then those are over fewer maps, and say over how many.
-    Where every robot is sure to be there, both plans are the same on any map; elsewhere maps that agree leave open
-    how maps differ, and there is no interval.
+    The interval is that of the mean over maps, of each map's mean over its seeds. A map on which the
+    stochastic plan collects nothing has no percentage; the number of maps with one is then given.
+    Where every robot is certain, both plans are equal on any map; otherwise maps with equal values don't show
+    how maps vary, and there is no interval.
     """
     doubtful = {(unit.variant, s.name) for unit in units for s in unit.scenarios
                 if any(p < 1 for p in s.availability.values())}
@@ -85,7 +85,7 @@ def aggregate(units: Sequence[UnitSummary]) -> tuple[OverMaps, ...]:
 
 
 def _percentage(figures: Sequence[float], maps: int, *, sure: bool) -> Percentage:
-    """Over those of so many maps that have a percentage."""
+    """Mean over the maps that have a percentage."""
     fewer = None if len(figures) == maps else len(figures)
     if not figures:
         return Percentage(mean=None, ci95=None, maps=fewer)
@@ -98,13 +98,13 @@ Key = tuple[str, str, str]
 
 
 def over_seeds(notes: Sequence[Note]) -> dict[Key, Estimate]:
-    """Executed VSS of each map over the trials of all its seeds: each has failures and noise draws of its own."""
-    together: dict[Key, Figure] = {}
+    """Executed VSS of each map over the trials of all its seeds, whose failures and noise draws are independent."""
+    combined: dict[Key, Figure] = {}
     for note in notes:
         for scenario, tally in note.tallies.items():
             key = note.variant, scenario, note.facts.world
-            together[key] = pooled(together[key], tally.difference) if key in together else tally.difference
-    return {key: estimate(figure) for key, figure in together.items()}
+            combined[key] = pooled(combined[key], tally.difference) if key in combined else tally.difference
+    return {key: estimate(figure) for key, figure in combined.items()}
 
 
 def map_rows(units: Sequence[UnitSummary], executed: Mapping[Key, Estimate]) -> tuple[MapRow, ...]:
@@ -112,7 +112,7 @@ def map_rows(units: Sequence[UnitSummary], executed: Mapping[Key, Estimate]) -> 
 
     Args:
         units: Summaries, a map and seed at a time.
-        executed: As ``over_seeds`` gives it.
+        executed: From ``over_seeds``.
     """
     rows = []
     for (variant, scenario), by_map in _by_map(units).items():
@@ -136,7 +136,7 @@ def _by_map(units: Sequence[UnitSummary]) -> dict[tuple[str, str], dict[str, lis
 
 
 def over(figures: Sequence[float], *, sure: bool) -> Estimate:
-    """Mean of a sample of maps, with its interval; ``sure`` where no map could have another figure."""
+    """Mean of a sample of maps, with its interval; ``sure`` where the value is the same on every possible map."""
     found = sample_mean(figures)
     alike = sure and len(figures) > 1 and len(set(figures)) == 1
     return Estimate(mean=found.mean, ci95=(found.mean, found.mean)) if alike else found

@@ -1,4 +1,4 @@
-"""Results kept by the hash of what they depend on, shared by all units, batches and sweeps of a user."""
+"""A cache of results by the hash of their inputs, shared by all units, batches and sweeps of a user."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ def default_folder() -> Path:
 class Cache:
     """A folder of results; only one process of a batch writes to it.
 
-    Files are data behind a checksum (``codec``), never code. One that is torn, altered, not exactly of the type that
-    its job gives, not fitting to that job, or not written by this user alone counts as absent. What is kept lies in a
-    folder of its own for each version, which only its user may write to.
+    Files are data with a checksum (``codec``), never code. A file that is truncated, altered, not exactly of the type
+    of its job's result, inconsistent with the job, or not written by this user alone counts as absent. Files are in a
+    folder for each version, which only its user may write to.
     """
 
     folder: Path
 
     def get(self, job: Job, key: str) -> Any | None:
-        """The result of a job, by its key; ``None`` if none is kept, or none that is whole and ours.
+        """The result of a job, by its key; ``None`` if there is no valid one.
 
         Raises:
             BadInput: If the cache cannot be read, or others could have written to it.
@@ -64,7 +64,7 @@ class Cache:
         return result if job.fits(result) else None
 
     def put(self, job: Job, key: str, result: Any) -> None:
-        """Keep the result of a job under its key, whole or not at all.
+        """Store the result of a job under its key, atomically.
 
         Raises:
             BadInput: If it cannot be written, or others can write to the cache.
@@ -88,7 +88,7 @@ class Cache:
 
     @property
     def _home(self) -> Path:
-        """What this version keeps: other code, other results."""
+        """The folder of this version: results depend on the code."""
         return self.folder / code_digest()[:16]
 
     def _path(self, kind: str, key: str) -> Path:
@@ -111,7 +111,7 @@ class Cache:
 
 
 def _read(path: Path) -> bytes:
-    """The content of a file that only its owner, this user, can have written; nothing of any other."""
+    """The content of a file that only this user can have written; empty for any other."""
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     with os.fdopen(handle, "rb") as file:
         found = os.fstat(handle)

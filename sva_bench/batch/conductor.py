@@ -1,4 +1,4 @@
-"""Hands out jobs as strands come to need them, keeps what is worth keeping, and tries again what failed."""
+"""The scheduler of a batch: submits jobs as strands need them, caches their results, and retries failures."""
 
 from __future__ import annotations
 
@@ -23,34 +23,34 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(eq=False, kw_only=True)
-class Open:
-    """A strand at work.
+class ActiveStrand:
+    """A strand that is being executed.
 
     Attributes:
         point, seed: What it measures.
-        strand: Its steps.
-        results: Those of the step at hand, by position.
-        lacking: How many of them are missing.
-        failure: Why one of them will always be missing, and after how many attempts.
+        strand: Its generator of jobs.
+        results: Results of the current step's jobs, by position.
+        missing: Number of results still missing.
+        failure: Why one of the jobs failed for good, and after how many attempts.
     """
 
     point: Point
     seed: int
     strand: Strand
     results: list[Any] = field(default_factory=list)
-    lacking: int = 0
+    missing: int = 0
     failure: tuple[str, int] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Hooks:
-    """What the conductor tells of.
+    """Callbacks of the conductor.
 
     Attributes:
-        shard: A unit is measured.
-        unit_failed: A unit is given up: why, after how many attempts.
-        strand_failed: All units of a point and seed that are not done are given up.
-        tick: Time has passed.
+        shard: A unit is complete: its name and shard.
+        unit_failed: A unit failed for good: its name, why, after how many attempts.
+        strand_failed: The remaining units of a point and seed failed: why, after how many attempts.
+        tick: Called regularly.
     """
 
     shard: Callable[[str, Shard], None]
@@ -60,88 +60,88 @@ class Hooks:
 
 
 class Conductor:
-    """The jobs at hand. Strands share a job where its hash is the same, whether it runs, waits, or ran before."""
+    """Executes strands. They share jobs of equal hash, whether queued, running or cached."""
 
     def __init__(self, engine: Engine, cache: Cache, hooks: Hooks) -> None:
         self._engine, self._cache, self._hooks = engine, cache, hooks
         self._queue: deque[str] = deque()
         self._jobs: dict[str, Job] = {}
         self._attempts: dict[str, int] = {}
-        self._wanted: dict[str, list[tuple[Open, int]]] = {}
-        self._flying = 0
+        self._waiting_strands: dict[str, list[tuple[ActiveStrand, int]]] = {}
+        self._in_flight = 0
         self._open = 0
         self._given_up: dict[str, tuple[str, int]] = {}
         self._warned: set[str] = set()
 
     def run(self, strands: Iterator[tuple[Point, int, Strand]]) -> None:
-        """Bring all strands to their end."""
+        """Execute all strands to their end."""
         more = True
         while more or self._open:
-            # A few more than there are workers: one that plans leaves them work, and memory stays bounded.
+            # A few more strands than workers, so that none idles, and memory stays bounded.
             while more and self._open < 2 * self._engine.slots + 2 and len(self._queue) < 4 * self._engine.slots:
-                following = next(strands, None)
-                if following is None:
+                upcoming = next(strands, None)
+                if upcoming is None:
                     more = False
                     break
                 self._open += 1
-                self._advance(Open(point=following[0], seed=following[1], strand=following[2]), None)
-            while self._queue and self._flying < self._engine.slots:
+                self._advance(ActiveStrand(point=upcoming[0], seed=upcoming[1], strand=upcoming[2]), None)
+            while self._queue and self._in_flight < self._engine.slots:
                 key = self._queue.popleft()
-                if all(opened.failure is not None for opened, _ in self._wanted[key]):
+                if all(active.failure is not None for active, _ in self._waiting_strands[key]):
                     self._drop(key)
                     continue
                 self._attempts[key] = self._attempts.get(key, 0) + 1
-                self._flying += 1
+                self._in_flight += 1
                 self._engine.submit(key, self._jobs[key])
-            if self._flying:
+            if self._in_flight:
                 for key, answer in self._engine.answers(_TICK_S):
-                    self._flying -= 1
+                    self._in_flight -= 1
                     self._take(key, answer)
             self._hooks.tick()
 
-    def _advance(self, opened: Open, results: Sequence[Any] | None) -> None:
-        """Take a strand to its next step that must wait for something."""
+    def _advance(self, active: ActiveStrand, results: Sequence[Any] | None) -> None:
+        """Advance a strand to its next step that has to wait for jobs."""
         while True:
             try:
-                jobs = opened.strand.send(results) if results is not None else next(opened.strand)
+                jobs = active.strand.send(results) if results is not None else next(active.strand)
             except StopIteration:
                 self._open -= 1
                 return
-            opened.results, opened.lacking = [None] * len(jobs), 0
+            active.results, active.missing = [None] * len(jobs), 0
             for position, job in enumerate(jobs):
                 key = job.key
                 if key in self._given_up:
-                    opened.failure = opened.failure or self._given_up[key]
+                    active.failure = active.failure or self._given_up[key]
                     continue
                 if key not in self._jobs:
                     kept = self._cache.get(job, key) if job.kept else None
                     if kept is not None:
-                        opened.results[position] = kept
+                        active.results[position] = kept
                         continue
                     self._jobs[key] = job
                     self._queue.append(key)
-                self._wanted.setdefault(key, []).append((opened, position))
-                opened.lacking += 1
-            if opened.lacking:
+                self._waiting_strands.setdefault(key, []).append((active, position))
+                active.missing += 1
+            if active.missing:
                 return
-            if opened.failure is not None:
-                self._give_up(opened, opened.failure)
+            if active.failure is not None:
+                self._give_up(active, active.failure)
                 return
-            results = opened.results
+            results = active.results
 
     def _drop(self, key: str) -> None:
-        """Leave out a job that only strands want which failed in another: a world that hangs would do so for hours."""
+        """Cancel a job that only failed strands need, so that a world that hangs costs no more time."""
         del self._jobs[key]
         self._attempts.pop(key, None)
-        for opened, _ in self._wanted.pop(key):
-            opened.lacking -= 1
-            if not opened.lacking and opened.failure is not None:
-                self._give_up(opened, opened.failure)
+        for active, _ in self._waiting_strands.pop(key):
+            active.missing -= 1
+            if not active.missing and active.failure is not None:
+                self._give_up(active, active.failure)
 
-    def _give_up(self, opened: Open, failure: tuple[str, int]) -> None:
+    def _give_up(self, active: ActiveStrand, failure: tuple[str, int]) -> None:
         self._open -= 1
-        opened.strand.close()
-        self._hooks.strand_failed(opened.point, opened.seed, *failure)
+        active.strand.close()
+        self._hooks.strand_failed(active.point, active.seed, *failure)
 
     def _take(self, key: str, answer: Answer) -> None:
         job, attempts = self._jobs[key], self._attempts[key]
@@ -163,15 +163,15 @@ class Conductor:
         else:
             self._given_up[key] = (f"{job.what}: {answer.reason}", attempts)
         del self._jobs[key], self._attempts[key]
-        for opened, position in self._wanted.pop(key):
-            opened.lacking -= 1
+        for active, position in self._waiting_strands.pop(key):
+            active.missing -= 1
             if isinstance(answer, Done):
-                opened.results[position] = answer.result if job.kept else None
+                active.results[position] = answer.result if job.kept else None
             elif job.kept:
-                opened.failure = opened.failure or self._given_up[key]
-            if opened.lacking:
+                active.failure = active.failure or self._given_up[key]
+            if active.missing:
                 continue
-            if opened.failure is None:
-                self._advance(opened, opened.results)
+            if active.failure is None:
+                self._advance(active, active.results)
             else:
-                self._give_up(opened, opened.failure)
+                self._give_up(active, active.failure)

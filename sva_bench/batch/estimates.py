@@ -1,4 +1,4 @@
-"""What a grid will take, before it is run: roughly where nothing is known, closely where the cache knows."""
+"""Estimates of a grid's cost before it is run, refined by the cache's content."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sva_bench.workers.progress import OnProgress
 # Measured on a core of a shared virtual machine.
 _PATHS_S, _PLANS_S, _ROW_S = 5.0, 5.0, 1.5e-6
 _REAL_TIME = 135.0
-"""Physics is so many times faster than the mission."""
+"""Speed of physics relative to real time."""
 _TWIN_TIME = 3000.0
 _USUAL_MISSION_S = 600.0
 _ROW_BYTES = 5.0
@@ -37,7 +37,7 @@ class StrandCost:
 
 
 def estimates(grid: Grid, cache: Cache, folder: Path, progress: OnProgress = lambda *_: None) -> list[StrandCost]:
-    """What is left of a grid, a point and seed at a time."""
+    """Estimated cost of the remaining units of each point and seed."""
     done = frozenset(units_in(folder)) if folder.is_dir() else frozenset()
     seen: set[str] = set()
     listed: list[StrandCost] = []
@@ -86,7 +86,7 @@ def _seconds(job: Job, each: float) -> float:
 
 
 def _beyond(job: Job, point: Point, grid: Grid, each: float) -> float:
-    """What comes after a step whose result isn't known yet."""
+    """Estimated processor time of the steps after one whose result isn't cached [s]."""
     scenarios = len(point.world.scenarios)
     plans = _PLANS_S * scenarios if isinstance(job, TravelTimesJob) else 0.0
     if isinstance(job, DriveJob) or grid.options.fidelity == "physics":

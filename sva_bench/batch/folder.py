@@ -1,4 +1,4 @@
-"""A batch folder: one writer at a time by the kernel's lock, and every file whole or absent."""
+"""The folder of a batch: one writer at a time by a kernel lock, and atomically written files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 from sva_bench.analysis.over_maps import GivenUp
 from sva_bench.batch.schema import FAILURES, MANIFEST, BatchManifest, BatchSettings, GivenUpUnits
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.files.atomic import by_way_of, why
+from sva_bench.files.atomic import by_way_of, reason_of
 from sva_bench.files.documents import read_json, validate
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
@@ -24,10 +24,10 @@ from sva_bench.files.records import as_dict
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """The only batch at work in a folder. The lock is the kernel's, on the folder itself: it ends with the process.
+    """A block that holds the lock of a batch folder. It is a kernel lock on the folder, and ends with the process.
 
     Raises:
-        BadInput: If the folder cannot be made or opened, or another batch is at work there.
+        BadInput: If the folder cannot be created or opened, or another batch holds the lock.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -46,7 +46,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def at_work(folder: Path) -> bool:
-    """Whether a batch is at work in a folder."""
+    """Whether a batch is running in a folder."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -58,26 +58,26 @@ def at_work(folder: Path) -> bool:
 
 
 def begin(folder: Path, settings: BatchSettings, *, resume: bool) -> None:
-    """Make a locked folder ready for a batch of these settings.
+    """Prepare a locked folder for a batch of these settings.
 
     Raises:
         BadInput: If it holds something else, or cannot be written to.
     """
     try:
-        held = [path for path in folder.iterdir() if path.suffix != ".tmp"]
+        stored = [path for path in folder.iterdir() if path.suffix != ".tmp"]
         manifest = folder / "manifest.json"
-        if not resume and manifest in held and not units_in(folder) and settings_in(folder) \
+        if not resume and manifest in stored and not units_in(folder) and settings_in(folder) \
                 and not any((folder / name).exists() for name in ("failures.json", "summary.json")):
-            held = []  # begun, but nothing was done
-        if held and not resume:
+            stored = []  # begun, but nothing was done
+        if stored and not resume:
             raise BadInput(f"{folder}: the folder isn't empty; go on with --resume, or choose another with --out")
-        if held:
+        if stored:
             refuse_other_settings(folder, settings)
         for draft in folder.glob("*.tmp"):
             draft.unlink()
     except OSError as error:
         raise _unwritable(folder, error) from None
-    if not held:
+    if not stored:
         content = pretty_json(as_dict(BatchManifest(settings=settings))).encode()
         if len(content) > MOST_BYTES:
             raise BadInput(f"the worlds and variants of this batch take {len(content)} bytes; at most {MOST_BYTES} are "
@@ -86,11 +86,11 @@ def begin(folder: Path, settings: BatchSettings, *, resume: bool) -> None:
 
 
 def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
-    """The settings that a batch folder was made with, as they stand there and as they were checked.
+    """The settings of a batch folder, as read and as validated.
 
     Raises:
         BadInput: If it is no batch folder.
-        BadFile: If its manifest is not as ours are.
+        BadFile: If its manifest is invalid.
     """
     path = folder / "manifest.json"
     if not path.exists():
@@ -104,32 +104,36 @@ def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
 
 
 def refuse_other_settings(folder: Path, settings: BatchSettings) -> None:
-    """Refuse to go on with a folder of other settings, naming what differs with both values."""
-    held, now = settings_in(folder)[0].data, json.loads(json.dumps(as_dict(settings)))
-    differences = list(islice(_differences(held, now), _MOST_TOLD + 1))
+    """Refuse to resume a batch with other settings; the message names the differences.
+
+    Raises:
+        BadFile: If the settings differ.
+    """
+    stored, now = settings_in(folder)[0].data, json.loads(json.dumps(as_dict(settings)))
+    differences = list(islice(_differences(stored, now), _MOST_NAMED + 1))
     if not differences:
         return
-    told = [f"{key} ({_shown(was)} there, {_shown(is_now)} now)" for key, was, is_now in differences[:_MOST_TOLD]]
-    more = ["and more"] if len(differences) > _MOST_TOLD else []
+    named = [f"{key} ({_shown(was)} there, {_shown(is_now)} now)" for key, was, is_now in differences[:_MOST_NAMED]]
+    more = ["and more"] if len(differences) > _MOST_NAMED else []
     raise BadFile(folder / "manifest.json", None, "settings", "not those of the batch in this folder: "
-                  f"{', '.join([*told, *more])}; use the same settings, or choose another folder with --out")
+                  f"{', '.join([*named, *more])}; use the same settings, or choose another folder with --out")
 
 
 _ABSENT = object()
-_MOST_TOLD = 12
+_MOST_NAMED = 12
 
 
-def _differences(held: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+def _differences(stored: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Each key at which two settings differ, and both values."""
-    if isinstance(held, dict) and isinstance(now, dict):
-        for name in [*held, *(name for name in now if name not in held)]:
-            yield from _differences(held.get(name, _ABSENT), now.get(name, _ABSENT), f"{key}.{name}" if key else name)
-    elif isinstance(held, list) and isinstance(now, list) and len(held) == len(now) and \
-            any(isinstance(item, dict | list) for item in [*held, *now]):
-        for number, (one, other) in enumerate(zip(held, now, strict=True)):
+    if isinstance(stored, dict) and isinstance(now, dict):
+        for name in [*stored, *(name for name in now if name not in stored)]:
+            yield from _differences(stored.get(name, _ABSENT), now.get(name, _ABSENT), f"{key}.{name}" if key else name)
+    elif isinstance(stored, list) and isinstance(now, list) and len(stored) == len(now) and \
+            any(isinstance(item, dict | list) for item in [*stored, *now]):
+        for number, (one, other) in enumerate(zip(stored, now, strict=True)):
             yield from _differences(one, other, f"{key}[{number}]")
-    elif held is _ABSENT or now is _ABSENT or held != now:
-        yield key, held, now
+    elif stored is _ABSENT or now is _ABSENT or stored != now:
+        yield key, stored, now
 
 
 def _shown(value: Any) -> str:
@@ -140,17 +144,17 @@ def _shown(value: Any) -> str:
 
 
 def shard_path(folder: Path, unit: str) -> Path:
-    """Where a unit's rows are."""
+    """Path of a unit's shard."""
     return folder / f"outcomes-{unit}.parquet"
 
 
 def units_in(folder: Path) -> set[str]:
-    """Names of the units whose rows are there."""
+    """Names of the completed units."""
     return {path.stem.removeprefix("outcomes-") for path in folder.glob("outcomes-*.parquet")}
 
 
 def failures_in(folder: Path) -> list[GivenUp]:
-    """The units that were given up."""
+    """The units that failed for good."""
     path = folder / "failures.json"
     if not path.exists():
         return []
@@ -158,25 +162,25 @@ def failures_in(folder: Path) -> list[GivenUp]:
 
 
 def write_failures(folder: Path, failures: Sequence[GivenUp]) -> None:
-    """Put down the units that were given up."""
+    """Write the list of units that failed for good."""
     write(folder / "failures.json", pretty_json(as_dict(GivenUpUnits(failures=tuple(failures)))).encode())
 
 
 def write_maps(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Put the files of maps into a batch folder, unless they are there: it is all that ``retry`` needs."""
+    """Write the files of maps into a batch folder, unless they exist: resuming needs no other files."""
     for name, content in files.items():
         path = folder / name
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            held = path.exists() and path.read_bytes() == content
+            stored = path.exists() and path.read_bytes() == content
         except OSError as error:
             raise _unwritable(path, error) from None
-        if not held:
+        if not stored:
             write(path, content)
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file of a batch folder, whole or not at all, to the disk itself.
+    """Write a file of a batch folder atomically, and sync it to disk.
 
     Raises:
         BadInput: If it cannot be written; what was written before stays.
@@ -187,7 +191,7 @@ def write(path: Path, content: bytes) -> None:
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """A file of a batch folder to be written, which appears when it is whole.
+    """A draft of a file of a batch folder, which replaces it when the block ends.
 
     Raises:
         BadInput: If it cannot be written; what was written before stays.
@@ -203,5 +207,5 @@ def writing(path: Path) -> Iterator[Path]:
 def _unwritable(place: Path, error: OSError) -> BadInput:
     way_out = "make room and go on with --resume" if error.errno in (errno.ENOSPC, errno.EDQUOT) else \
         "make it writable and go on with --resume"
-    return BadInput(f"{place}: cannot be written to ({why(error)}); what is done is kept: {way_out}, or choose "
+    return BadInput(f"{place}: cannot be written to ({reason_of(error)}); what is done is kept: {way_out}, or choose "
                     "another folder with --out")

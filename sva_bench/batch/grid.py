@@ -1,4 +1,4 @@
-"""The grid of a batch: worlds and their variants, seeds, and the units that they come to."""
+"""The grid of a batch: worlds and their variants, seeds, and units of trials."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from sva_bench.world.load import world_as_dict, world_of
 from sva_bench.world.model import World
 
 MOST_POINTS, MOST_UNITS = 10_000, 200_000
-"""Shards that a folder holds with ease; worlds with all their variants that are kept in memory."""
+"""Most worlds with variants, which are kept in memory; most units, which are files of one folder."""
 
 
-_HASH = 10  # digits that tell ten thousand variants apart; of six, two of them would be alike
+_HASH = 10  # hexadecimal digits, without collisions among ten thousand variants; six would have some
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Point:
-    """A world as it is measured.
+    """A world variant with a path planner.
 
     Attributes:
         world: The world, with its variations.
         planner: How its paths are planned.
-        variant: What a sweep varied, e.g. ``robots.uv2.fuel_capacity_s=200``; empty without a sweep.
+        variant: The varied settings, e.g. ``robots.uv2.fuel_capacity_s=200``; empty without a sweep.
     """
 
     world: World
@@ -41,16 +41,16 @@ class Point:
 
     @property
     def name(self) -> str:
-        """Part of file names: the world's name, and a hash of the variation, long enough to tell millions apart."""
+        """Its name in file names: the world's name, and a hash of the variant."""
         return f"{self.world.name}-{digest(self.variant)[:_HASH]}" if self.variant else self.world.name
 
     @property
     def label(self) -> str:
-        """For a person."""
+        """Its name as shown to users."""
         return f"{self.world.name} ({self.variant})" if self.variant else self.world.name
 
     def entry(self) -> PointEntry:
-        """As a manifest holds it."""
+        """Its entry in the manifest."""
         source = self.world.map_source
         return PointEntry(variant=self.variant, planner=self.planner, world=world_as_dict(self.world),
                           files=None if source is None else source.digests())
@@ -58,13 +58,13 @@ class Point:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Grid:
-    """Everything that a batch is to measure: every point with every seed, trials cut into units.
+    """Every point with every seed, with trials divided into units.
 
     Attributes:
         points: Worlds and variants.
         seeds: Seeds of failures and noise.
-        options: All else; its seed and planner are those of seeds and points.
-        unit_trials: Trials of one unit at most.
+        options: Options of all runs, without seed and planner.
+        unit_trials: Most trials of a unit.
     """
 
     points: Sequence[Point]
@@ -74,10 +74,10 @@ class Grid:
 
     def settings(self) -> BatchSettings:
         """Everything that the rows and shards of a batch depend on."""
-        told = self.options
+        stored = self.options
         options = OptionsEntry(
-            trials=told.trials, rollouts=told.rollouts, fidelity=told.fidelity, informed=False, assumptions=False,
-            time_limit_s=told.limits.time_limit_s, gap=told.limits.gap, evpi=told.evpi)
+            trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, informed=False, assumptions=False,
+            time_limit_s=stored.limits.time_limit_s, gap=stored.limits.gap, evpi=stored.evpi)
         return BatchSettings(version=__version__, seeds=tuple(self.seeds), options=options,
                              unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points})
 
@@ -110,10 +110,10 @@ class Grid:
 
 
 def checked(grid: Grid) -> Grid:
-    """The grid, refused if two of its points would write the same files, or if it is larger than any batch.
+    """The grid, if the names of its points are unique and its size is within the limits.
 
     Raises:
-        BadInput: Says which, and the number.
+        BadInput: If not.
     """
     known: dict[str, Point] = {}
     for point in grid.points:
@@ -126,7 +126,11 @@ def checked(grid: Grid) -> Grid:
 
 
 def refuse_too_many(points: int, seeds: int, trials: int, unit_trials: int) -> None:
-    """Refuse a grid of more points or units than a batch can go through."""
+    """Refuse a grid beyond the limits of points and units.
+
+    Raises:
+        BadInput: If it has too many.
+    """
     if points > MOST_POINTS:
         raise BadInput(f"{points} worlds, variants and planners in all; a batch has {MOST_POINTS} at most")
     ranges = -(-trials // unit_trials)
@@ -137,16 +141,16 @@ def refuse_too_many(points: int, seeds: int, trials: int, unit_trials: int) -> N
 
 
 def grid_of(document: Part, settings: BatchSettings) -> Grid:
-    """The grid that gave the settings in a batch's manifest.
+    """The grid of the settings in a batch's manifest.
 
     Raises:
-        BadFile: If a world there is wrong, or stands under another name than its own.
-        BadInput: If there are more units than any batch of ours has.
+        BadFile: If a world there is invalid, or has another name than its key.
+        BadInput: If it has too many units.
     """
-    told = settings.options
+    stored = settings.options
     options = Options(
-        trials=told.trials, rollouts=told.rollouts, fidelity=told.fidelity, evpi=told.evpi,
-        limits=SolveLimits(time_limit_s=told.time_limit_s, gap=told.gap))
+        trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, evpi=stored.evpi,
+        limits=SolveLimits(time_limit_s=stored.time_limit_s, gap=stored.gap))
     points = []
     for name, entry in settings.points.items():
         at = ("points", name)

@@ -1,4 +1,4 @@
-"""A batch from its grid to its summary; only this process writes."""
+"""The execution of a batch, from its grid to its summary; only this process writes."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from sva_bench.workers.engine import Engine
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BatchProgress:
-    """How far a batch is.
+    """The progress of a batch.
 
     Attributes:
-        done, failed, units: Units measured, given up, and all.
-        before: Units that were measured before this process began.
-        seconds: Time since it began.
-        vss: The VSS over maps so far, when it is asked for.
+        done, failed, units: Units completed, failed for good, and all.
+        before: Units completed before this process started.
+        seconds: Time since the start [s].
+        vss: Computes the VSS over maps so far.
     """
 
     done: int
@@ -57,7 +57,7 @@ class BatchProgress:
 
     @property
     def left_s(self) -> float | None:
-        """Time left at this rate."""
+        """Estimated time left [s]; ``None`` before the first unit."""
         return None if self.rate is None else (self.units - self.done - self.failed) / self.rate
 
 
@@ -65,19 +65,19 @@ def run_batch(
     grid: Grid, folder: Path, engine: Callable[[], AbstractContextManager[Engine]], cache: Cache,
     report: Callable[[BatchProgress], None], *, resume: bool, retry: bool = False,
 ) -> BatchSummary:
-    """Measure every unit of a grid that is not measured yet, and sum up.
+    """Execute every remaining unit of a grid, and write the summary.
 
     Args:
-        grid: What to measure.
+        grid: The grid.
         folder: The batch folder.
-        engine: Makes the place where jobs run; not called if nothing is left.
-        cache: Travel times, plans and drives.
-        report: Called every half a second or so.
-        resume: Go on with what the folder holds.
-        retry: Take up again the units that were given up.
+        engine: Opens the engine that runs the jobs; not called if nothing is left.
+        cache: Cache of travel times, plans and drives.
+        report: Called about twice a second.
+        resume: Continue a batch in the folder.
+        retry: Retry the units that failed.
 
     Returns:
-        What it comes to.
+        The summary.
 
     Raises:
         BadInput: If the folder holds something else, is in use, or cannot be written to.
@@ -85,22 +85,22 @@ def run_batch(
     with locked(folder):
         begin(folder, grid.settings(), resume=resume or retry)
         write_maps(folder, grid.map_files())
-        books = _Books(grid, folder, retry=retry)
-        report(books.progress())
-        if books.left:
+        state = _BatchState(grid, folder, retry=retry)
+        report(state.progress())
+        if state.left:
             with engine() as running:
                 Conductor(running, cache, Hooks(
-                    shard=books.keep, unit_failed=books.unit_failed, strand_failed=books.strand_failed,
-                    tick=lambda: report(books.progress()))).run(books.strands())
-        summary = summary_of(grid, folder, books.done, books.failures)
+                    shard=state.keep, unit_failed=state.unit_failed, strand_failed=state.strand_failed,
+                    tick=lambda: report(state.progress()))).run(state.strands())
+        summary = summary_of(grid, folder, state.done, state.failures)
         write(folder / "summary.json", pretty_json(as_dict(summary)).encode())
         with writing(folder / "report.html") as draft:
             write_batch_report(draft, summary)
         return summary
 
 
-class _Books:
-    """What is done, what was given up, and what it comes to so far."""
+class _BatchState:
+    """Completed and failed units, and the joined notes so far."""
 
     def __init__(self, grid: Grid, folder: Path, *, retry: bool) -> None:
         self._grid, self._folder, self._begun = grid, folder, time.monotonic()
@@ -112,51 +112,51 @@ class _Books:
         if self.failures != held:
             write_failures(folder, self.failures)
         self._before = len(self.done)
-        self._so_far: dict[tuple[str, int], Note] = {}
+        self._totals: dict[tuple[str, int], Note] = {}
         for unit, (point, seed, first) in self._owner.items():
             if unit in self.done:
                 self._add(point.name, seed, read_note(shard_path(folder, unit), unit_of(grid, point, seed, first)))
 
     @property
     def left(self) -> bool:
-        """Whether there is something to do."""
+        """Whether units are left."""
         return len(self.done) + len(self.failures) < len(self._owner)
 
     def strands(self) -> Iterator[tuple[Point, int, Strand]]:
-        """The work that is left."""
-        over = frozenset(self.done | {failure.unit for failure in self.failures})
+        """The strands with units left."""
+        finished = frozenset(self.done | {failure.unit for failure in self.failures})
         for point, seed in self._grid.strands():
-            yield point, seed, strand(self._grid, point, seed, over)
+            yield point, seed, strand(self._grid, point, seed, finished)
 
     def keep(self, unit: str, shard: Shard) -> None:
-        """Write a unit's rows."""
+        """Write a unit's shard."""
         write(shard_path(self._folder, unit), shard.content)
         self.done.add(unit)
         point, seed, _ = self._owner[unit]
         self._add(point.name, seed, shard.note)
 
     def unit_failed(self, unit: str, reason: str, attempts: int) -> None:
-        """Put down that a unit was given up."""
+        """Record that a unit failed for good."""
         point, seed, _ = self._owner[unit]
-        self._put_down([(unit, point, seed)], reason, attempts)
+        self._add_failures([(unit, point, seed)], reason, attempts)
 
     def strand_failed(self, point: Point, seed: int, reason: str, attempts: int) -> None:
-        """Put down that all that was left of a point and seed was given up."""
-        over = self.done | {failure.unit for failure in self.failures}
+        """Record that the remaining units of a point and seed failed for good."""
+        finished = self.done | {failure.unit for failure in self.failures}
         names = [self._grid.unit_name(point, seed, first) for first, _ in self._grid.ranges()]
-        self._put_down([(name, point, seed) for name in names if name not in over], reason, attempts)
+        self._add_failures([(name, point, seed) for name in names if name not in finished], reason, attempts)
 
     def progress(self) -> BatchProgress:
-        """How far the batch is."""
+        """The progress of the batch."""
         return BatchProgress(done=len(self.done), failed=len(self.failures), units=len(self._owner),
                              before=self._before, seconds=time.monotonic() - self._begun,
-                             vss=lambda: aggregate([unit_summary(note) for note in self._so_far.values()]))
+                             vss=lambda: aggregate([unit_summary(note) for note in self._totals.values()]))
 
-    def _put_down(self, units: list[tuple[str, Point, int]], reason: str, attempts: int) -> None:
+    def _add_failures(self, units: list[tuple[str, Point, int]], reason: str, attempts: int) -> None:
         self.failures += [GivenUp(unit=unit, world=point.label, seed=seed, reason=reason, attempts=attempts)
                           for unit, point, seed in units]
         write_failures(self._folder, self.failures)
 
     def _add(self, point: str, seed: int, note: Note) -> None:
-        known = self._so_far.get((point, seed))
-        self._so_far[point, seed] = note if known is None else joined(known, note)
+        known = self._totals.get((point, seed))
+        self._totals[point, seed] = note if known is None else joined(known, note)

@@ -1,4 +1,4 @@
-"""What the files of a batch folder hold, key by key."""
+"""Schemas of the files of a batch folder."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from sva_bench.analysis.over_maps import GivenUp
-from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, two
+from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, low_and_high
 from sva_bench.analysis.summaries import Facts
-from sva_bench.analysis.unseen import UNHAPPY
+from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.choices import ENDS, Fidelity, Objective, PathPlanner
-from sva_bench.files.fields import Name, Number, Seed, WholeNumber
+from sva_bench.files.fields import Name, NonNegativeInt, Number, Seed
 from sva_bench.files.records import Record
 
 MANIFEST: Literal["sva-bench/batch-manifest@1"] = "sva-bench/batch-manifest@1"
@@ -26,7 +26,7 @@ _Count = Annotated[int, Field(strict=True, ge=0, le=10**12)]
 
 @dataclass(frozen=True, kw_only=True)
 class OptionsEntry(Record):
-    """What all runs of a batch were told."""
+    """The options of all runs of a batch."""
 
     informed: Literal[False]
     assumptions: Literal[False]
@@ -40,7 +40,7 @@ class OptionsEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PointEntry(Record):
-    """A world as it is measured; it is checked as any world is."""
+    """A point of the grid; its world is validated as any world file."""
 
     variant: Words
     planner: PathPlanner
@@ -69,18 +69,18 @@ class BatchManifest(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class GivenUpUnits(Record):
-    """``failures.json``: units that were given up."""
+    """``failures.json``: units that failed for good."""
 
     format: Literal["sva-bench/batch-failures@1"] = FAILURES
     failures: tuple[GivenUp, ...]
 
 
-_Bounds = Annotated[tuple[_Sum, _Sum], BeforeValidator(two)]
+_Bounds = Annotated[tuple[_Sum, _Sum], BeforeValidator(low_and_high)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class StoredFigure(Record):
-    """A figure (``analysis.moments``) as a shard holds it: its drawn part, and what was taken by noise draw."""
+    """A figure (``analysis.moments``) in a shard: its drawn part, and the losses by noise draw."""
 
     count: Annotated[_Count, Field(ge=1)]
     mean: _Sum
@@ -101,18 +101,18 @@ class StoredFigure(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class StoredPlan(Record):
-    """A plan's trials, added up."""
+    """Sums over a plan's trials."""
 
     total: StoredFigure
     by_robot: tuple[_Sum, ...]
     ends: Annotated[tuple[_Count, ...], Field(min_length=len(ENDS), max_length=len(ENDS))]
-    charged: Annotated[tuple[_Sum, ...], Field(min_length=len(UNHAPPY), max_length=len(UNHAPPY))]
+    charged: Annotated[tuple[_Sum, ...], Field(min_length=len(EXECUTION_LOSSES), max_length=len(EXECUTION_LOSSES))]
     statistics: Mapping[Name, StoredFigure] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
 class StoredTally(Record):
-    """A scenario's trials, added up."""
+    """Sums over a scenario's trials."""
 
     difference: StoredFigure
     plans: Mapping[Objective, StoredPlan]
@@ -120,12 +120,12 @@ class StoredTally(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class StoredNote(Record):
-    """What a shard says of itself, in the metadata of its table."""
+    """The note of a shard, in the metadata of its table."""
 
     facts: Facts
     variant: Words
     robots: Annotated[tuple[Name, ...], Field(min_length=1)]
-    first: WholeNumber
+    first: NonNegativeInt
     trials: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
     tallies: Mapping[Name, StoredTally]
 

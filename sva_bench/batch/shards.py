@@ -29,7 +29,7 @@ _REMOVE = "remove it and --resume"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Unit:
-    """What a shard is of: a point and a seed of a grid, and a range of trials under so many noise draws."""
+    """A unit of a grid: a point, a seed, a range of trials, and the number of noise draws."""
 
     point: Point
     seed: int
@@ -44,7 +44,7 @@ class Shard:
 
     Attributes:
         content: The Parquet file.
-        note: What its metadata say.
+        note: The note in its metadata.
     """
 
     content: bytes
@@ -53,12 +53,12 @@ class Shard:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Note:
-    """What a shard says of itself.
+    """The note of a shard.
 
     Attributes:
-        facts: What was known before any trial.
+        facts: Modelled values, known before any trial.
         tallies: Its trials by scenario.
-        variant: What a sweep varied.
+        variant: The varied settings.
         robots: Names of the robots.
         first, trials: The range of trials.
     """
@@ -94,10 +94,10 @@ def shard_of(world: World, variant: str, executed: Sequence[Executed], settings:
 
 
 def read_note(path: Path, unit: Unit) -> Note:
-    """What the shard of a unit says of itself.
+    """The note in the shard of a unit.
 
     Raises:
-        BadFile: If it is no shard of ours, or one of another unit.
+        BadFile: If it is no valid shard, or of another unit.
     """
     try:
         words = json.loads(read_note_of(path, _KEY))
@@ -125,7 +125,7 @@ def read_note(path: Path, unit: Unit) -> Note:
 
 
 def _rows(run: Executed, robots: Sequence[str], world: str, variant: str, settings: Settings) -> pa.Table:
-    """The rows of a run's table, and what they belong to."""
+    """The rows of a run's table, with world, seed and variant."""
     rows = outcome_table(run, robots, settings)
     for name, column in (("world", constant(world, len(rows))), ("seed", np.full(len(rows), settings.seed)),
                          ("variant", constant(variant, len(rows)))):

@@ -1,4 +1,4 @@
-"""The way from a world and a seed to its trials: each step asks for jobs and is given their results."""
+"""Strands: the steps from a world and a seed to its trials, each of which requests jobs and receives their results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sva_bench.workers.engine import Job
 from sva_bench.world.model import World
 
 Strand = Generator[Sequence[Job], Sequence[Any], None]
-"""Yields jobs, is sent their results in the same order."""
+"""A generator that yields the jobs of a step, and is sent their results in the same order."""
 
 
 def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
@@ -48,7 +48,7 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
 def facts_at(
     world: World, options: Options, costs: Mapping[str, FuelCosts], planned: Mapping[str, Planned]
 ) -> Facts:
-    """What is known of a world before any trial."""
+    """The modelled values of a world, known before any trial."""
     head = head_of(world, settings_of(world, options), costs, reproducible=proved(planned))
     return Facts(**vars(head), reach=reach_of(world, costs), scenarios=tuple(
         facts_of(world, scenario, planned[scenario.name]) for scenario in world.scenarios))

@@ -1,4 +1,4 @@
-"""Sweeps: what the command line or a ``sweep.yaml`` asks for, as a grid of worlds, variants and seeds."""
+"""Sweeps: the grid of worlds, variants and seeds given by the command line or a ``sweep.yaml``."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 KIND = "sva-bench/sweep@1"
 UNIT_TRIALS = 10_000
 UNIT_TRIALS_PHYSICS = 10
-"""A trial in physics takes seconds, a settled one microseconds; a unit should take seconds."""
+"""A unit should take seconds: a trial in physics takes seconds, a settled one microseconds."""
 
 MOST_SEEDS = 100_000
 _MANY = 100  # worlds and variants from which on reading them takes seconds
@@ -42,20 +42,20 @@ _MANY = 100  # worlds and variants from which on reading them takes seconds
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """What a batch is asked for; ``None`` = not said.
+    """The settings of a batch; ``None`` = default.
 
     Attributes:
         worlds: World files.
         seeds: Seeds of failures and noise.
         trials, rollouts, fidelity, unit_trials: As for ``Options`` and ``Grid``.
         planners: How paths are planned.
-        scenarios: Only these.
+        scenarios: Names of the scenarios to execute.
         margin, plan_failure, execute_failure: In place of the worlds' own.
-        evpi: Work out the value of perfect information however long it takes.
+        evpi: Compute the value of perfect information for any number of outcomes.
         time_limit_s, gap: When a solve may stop.
         vary: Values by dotted key of a world file.
-        file: The sweep file, of which ``vary`` and ``scenarios`` are, unless told otherwise.
-        told: Names of the settings that the command line told.
+        file: The sweep file that the settings are from, if any.
+        from_options: Names of the settings given on the command line.
     """
 
     worlds: tuple[Path, ...] = ()
@@ -74,11 +74,11 @@ class Sweep:
     gap: float | None = None
     vary: Mapping[str, Sequence[Any]] | None = None
     file: Document | None = None
-    told: frozenset[str] = frozenset()
+    from_options: frozenset[str] = frozenset()
 
     def wrong(self, setting: str, loc: Loc, option: str, problem: str) -> SvaBenchError:
-        """What is wrong with a setting, said of the option, or of the place in the file that asks for it."""
-        if self.file is None or setting in self.told:
+        """The error of a setting, attributed to its option, or to its location in the sweep file."""
+        if self.file is None or setting in self.from_options:
             return BadInput(f"{option}: {problem}")
         return self.file.error(loc, problem)
 
@@ -102,14 +102,19 @@ class _SweepFile(Section):
     set: dict[str, list[Any]] | None = None
 
 
-def sweep_of(paths: Sequence[Path], told: Sweep) -> Sweep:
-    """The sweep of these files, worlds or one ``sweep.yaml``; what is told beside them comes first."""
+def sweep_of(paths: Sequence[Path], from_options: Sweep) -> Sweep:
+    """The sweep of these files, worlds or one ``sweep.yaml``; options override the file.
+
+    Raises:
+        BadFile: If the sweep file is invalid.
+        BadInput: If a pattern matches no file, or too many.
+    """
     if len(paths) == 1 and paths[0].is_file() and (read := read_yaml(paths[0])).data is not None \
             and isinstance(read.data, dict) and str(read.data.get("format", "")).startswith("sva-bench/sweep"):
-        held = _from_file(read)
-        asked = {key: value for key, value in vars(told).items() if value not in (None, (), frozenset())}
-        return replace(held, **asked, told=frozenset(asked))
-    return replace(told, worlds=tuple(path for given in paths for path in _matching(given)))
+        from_file = _from_file(read)
+        settings = {key: value for key, value in vars(from_options).items() if value not in (None, (), frozenset())}
+        return replace(from_file, **settings, from_options=frozenset(settings))
+    return replace(from_options, worlds=tuple(path for given in paths for path in _matching(given)))
 
 
 def _from_file(document: Document) -> Sweep:
@@ -151,12 +156,16 @@ def _matching(given: Path) -> list[Path]:
 
 
 def seeds_of(words: Sequence[str], what: str = "--seed ") -> tuple[int, ...]:
-    """Seeds as told: ``3``, ``0-9``, ``1,5,7-9``."""
+    """Seeds of an option: ``3``, ``0-9``, ``1,5,7-9``.
+
+    Raises:
+        BadInput: If they are no seeds, too many, or duplicates.
+    """
     seeds: list[int] = []
     for part in ",".join(words).split(","):
         ends = part.strip().split("-")
         if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
-            raise BadInput(f"{what}{part.strip()!r}: expected a whole number, or a range like 0-9")
+            raise BadInput(f"{what}{part.strip()!r}: expected an integer, or a range like 0-9")
         if any(len(end) > 100 or int(end) > MOST_SEED for end in ends):
             raise BadInput(f"{what}{shown(part.strip())}: a seed is {MOST_SEED} at most (2^63 - 1)")
         first, last = int(ends[0]), int(ends[-1])
@@ -166,14 +175,18 @@ def seeds_of(words: Sequence[str], what: str = "--seed ") -> tuple[int, ...]:
         seeds += range(first, last + 1)
         if len(seeds) > MOST_SEEDS:
             raise BadInput(f"{what}{part.strip()!r}: more than {MOST_SEEDS} seeds in all")
-    twice = next((seed for seed, count in Counter(seeds).items() if count > 1), None)
-    if twice is not None:  # the same trials again would pass for more of them
-        raise BadInput(f"{what}{shown(','.join(words))}: the seed {twice} is given twice; give each once")
+    duplicate = next((seed for seed, count in Counter(seeds).items() if count > 1), None)
+    if duplicate is not None:  # the same trials again would pass for more of them
+        raise BadInput(f"{what}{shown(','.join(words))}: the seed {duplicate} is given twice; give each once")
     return tuple(seeds)
 
 
 def planners_of(words: Sequence[str]) -> tuple[PathPlanner, ...]:
-    """Planners as told."""
+    """Path planners of an option, in their canonical order.
+
+    Raises:
+        BadInput: If one is unknown or a duplicate.
+    """
     known = get_args(PathPlanner)
     for word in words:
         if word not in known:
@@ -184,7 +197,11 @@ def planners_of(words: Sequence[str]) -> tuple[PathPlanner, ...]:
 
 
 def varied(words: Sequence[str]) -> dict[str, list[Any]]:
-    """Values by key as told: ``robots.uv2.fuel_capacity_s=200,250,300``, in the syntax of a world file."""
+    """Values by key of options such as ``robots.uv2.fuel_capacity_s=200,250,300``, in the syntax of a world file.
+
+    Raises:
+        BadInput: If one has another form, or a key is a duplicate.
+    """
     vary: dict[str, list[Any]] = {}
     for word in words:
         key, equals, values = word.partition("=")
@@ -202,11 +219,11 @@ def varied(words: Sequence[str]) -> dict[str, list[Any]]:
 
 
 def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
-    """The grid that a sweep comes to.
+    """The grid of a sweep.
 
     Args:
-        sweep: What is asked for.
-        progress: Told of the worlds that are read: with all their variants they may be thousands.
+        sweep: The sweep.
+        progress: Called as worlds are read: with all variants they may be thousands.
 
     Raises:
         BadFile: If a world is wrong, as it is or varied.
@@ -216,22 +233,22 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
     planners = sweep.planners or ("prmstar",)
     for key, values in vary.items():
         if len({json.dumps(value) for value in values}) < len(values):
-            raise sweep.wrong("vary", ("set", key), f"--set {key}", "a value stands there twice")
+            raise sweep.wrong("vary", ("set", key), f"--set {key}", "a value is a duplicate")
     if len(set(planners)) < len(planners):
-        raise sweep.wrong("planners", ("planners",), "--planner", "a planner stands there twice; name each once")
+        raise sweep.wrong("planners", ("planners",), "--planner", "a planner is a duplicate; name each once")
     options = _options_of(sweep)
     unit_trials = sweep.unit_trials or (UNIT_TRIALS_PHYSICS if options.fidelity == "physics" else UNIT_TRIALS)
     seeds = sweep.seeds or (0,)
-    # Before anything is read or multiplied out: a few lines can ask for more than there are atoms.
+    # Before anything is read or expanded: a few lines can define an astronomically large grid.
     count = len(sweep.worlds) * math.prod(map(len, vary.values()))
     refuse_too_many(count * len(planners), len(seeds), options.trials, unit_trials)
     points: list[Point] = []
-    alike: dict[tuple[int, str], str] = {}
-    told: set[str] = set()
+    first_with_effect: dict[tuple[int, str], str] = {}
+    from_options: set[str] = set()
     for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
-        before = alike.setdefault(_effective(world), "; ".join(variant))
-        if before != "; ".join(variant) and world.name not in told:  # once: there may be thousands
-            told.add(world.name)
+        before = first_with_effect.setdefault(_effective(world), "; ".join(variant))
+        if before != "; ".join(variant) and world.name not in from_options:  # once: there may be thousands
+            from_options.add(world.name)
             _log.warning("%s: %s changes nothing against %s: its scenarios, or other keys, say otherwise", world.name,
                          "; ".join(variant), before)
         if count >= _MANY:
@@ -252,9 +269,9 @@ def _options_of(sweep: Sweep) -> Options:
 
 
 def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tuple[World, list[str]]]:
-    """Each world of a sweep with each choice of values, and how that is told."""
+    """Each world of a sweep with each combination of values, and the variant's parts."""
     files: dict[str, Path] = {}
-    held: dict[str, World] = {}
+    from_file: dict[str, World] = {}
     for path in sweep.worlds:
         document = read_yaml(path)
         for chosen in product(*vary.values()):
@@ -277,12 +294,12 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
                     raise sweep.wrong("scenarios", ("scenarios", number), f"--scenario {name}",
                                       "given twice; give it once")
             yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure),
-                            held),
+                            from_file),
                    [f"{key}={json.dumps(value)}" for key, value in values.items()])
 
 
 def _effective(world: World) -> tuple[int, str]:
-    """What of a world trials depend on; equal obstacles are one object (``_sharing``).
+    """A key of all that trials depend on in a world; equal obstacles are one object (``_sharing``).
 
     Availabilities under ``robots:`` are those of scenarios that don't say otherwise, and of nothing else.
     """
@@ -291,10 +308,10 @@ def _effective(world: World) -> tuple[int, str]:
                                        world.execute_failure, world.margin, world.noise)
 
 
-def _sharing(world: World, held: dict[str, World]) -> World:
-    """The world; obstacles and map files are those of an earlier one where they are equal, so thousands fit."""
+def _sharing(world: World, from_file: dict[str, World]) -> World:
+    """The world, sharing equal obstacles and map files with earlier ones, so that thousands fit in memory."""
     source = world.map_source
-    first = held.setdefault(digest(world.obstacles, None if source is None else source.digests()), world)
+    first = from_file.setdefault(digest(world.obstacles, None if source is None else source.digests()), world)
     if source is not None and first.map_source is not None:
         source = replace(source, files=first.map_source.files)
     return replace(world, obstacles=first.obstacles, map_source=source)

@@ -1,4 +1,4 @@
-"""Trials counted and added up, so that ranges of them can be joined: all that a batch keeps of its rows in memory."""
+"""Tallies: sums over trials, which can be joined over ranges; a batch keeps nothing else of its rows in memory."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from sva_bench.execution.execute import Executed
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanTally:
-    """One plan's trials under one scenario, added up: incentive of the team and by robot, ends, and what they cost.
+    """Sums over one plan's trials under one scenario.
 
     Attributes:
-        total: What the team collected.
-        by_robot: What each robot collected in all trials, shape (robots,).
-        ends: How often missions ended which way, shape (5,).
-        charged: What each unhappy end cost in all trials, shape (3,).
-        statistics: Those that are measured trial by trial.
+        total: Incentive of the team.
+        by_robot: Incentive of each robot in all trials, shape (robots,).
+        ends: Number of robot missions with each end, shape (5,).
+        charged: Incentive lost to each end in ``EXECUTION_LOSSES`` in all trials, shape (3,).
+        statistics: The measured statistics, by key.
     """
 
     total: Figure
@@ -40,7 +40,7 @@ class PlanTally:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tally:
-    """Both plans' trials under one scenario, and what one collected beyond the other."""
+    """Sums over both plans' trials under one scenario, and over their differences."""
 
     plans: Mapping[Objective, PlanTally]
     difference: Figure
@@ -58,7 +58,7 @@ def tally_of(stochastic: Executed, deterministic: Executed, *, noisy: bool) -> T
 
 
 def join(a: Tally, b: Tally) -> Tally:
-    """Both ranges of trials together."""
+    """The tally of two ranges of trials."""
     return Tally(difference=joined(a.difference, b.difference),
                  plans={name: _join(plan, b.plans[name]) for name, plan in a.plans.items()})
 
@@ -71,7 +71,7 @@ def _join(a: PlanTally, b: PlanTally) -> PlanTally:
 
 
 def scenario_of(facts: ScenarioFacts, tally: Tally, robots: Sequence[str]) -> ScenarioFigures:
-    """A scenario of a summary, from what was known ahead and what came of the trials."""
+    """The results of a scenario, from its modelled values and its tally."""
     count = tally.difference.drawn.count
     plans: dict[str, PlanFigures] = {name: plan_figures(
         facts.plans[name], estimate(plan.total),
@@ -87,7 +87,7 @@ def scenario_of(facts: ScenarioFacts, tally: Tally, robots: Sequence[str]) -> Sc
 
 
 def stored_tally(tally: Tally) -> StoredTally:
-    """As a shard holds it."""
+    """As stored in a shard."""
     return StoredTally(difference=stored_figure(tally.difference), plans={
         name: StoredPlan(
             total=stored_figure(plan.total), by_robot=tuple(plan.by_robot.tolist()), ends=tuple(plan.ends.tolist()),
@@ -97,7 +97,7 @@ def stored_tally(tally: Tally) -> StoredTally:
 
 
 def tally_from(stored: StoredTally) -> Tally:
-    """The tally that a shard holds."""
+    """The tally stored in a shard."""
     return Tally(difference=figure_from(stored.difference), plans={
         name: PlanTally(total=figure_from(plan.total), by_robot=np.array(plan.by_robot),
                         ends=np.array(plan.ends), charged=np.array(plan.charged),
@@ -106,7 +106,7 @@ def tally_from(stored: StoredTally) -> Tally:
 
 
 def stored_figure(figure: Figure) -> StoredFigure:
-    """As a shard holds it."""
+    """As stored in a shard."""
     return StoredFigure(
         count=figure.drawn.count, mean=figure.drawn.mean, squares=figure.drawn.squares,
         drawn_bounds=figure.drawn_bounds, taken_bounds=figure.taken_bounds,
@@ -114,7 +114,7 @@ def stored_figure(figure: Figure) -> StoredFigure:
 
 
 def figure_from(stored: StoredFigure) -> Figure:
-    """The figure that a shard holds."""
+    """The figure stored in a shard."""
     return Figure(
         drawn=Moments(count=stored.count, mean=stored.mean, squares=stored.squares),
         drawn_bounds=stored.drawn_bounds, taken_bounds=stored.taken_bounds,

@@ -1,1 +1,1 @@
-"""Files of ours and of others: read and checked at the door, written whole or not at all."""
+"""Reading and validation of files of any origin, and atomic writing."""

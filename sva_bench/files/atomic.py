@@ -1,7 +1,7 @@
-"""Files and folders that appear whole or not at all, whatever is killed, and whenever.
+"""Atomic writing of files and folders: complete or absent, even if the process is killed.
 
-What is written is a draft beside its place, brought to the disk and renamed. Its writer holds a lock of the kernel on
-it, which ends with the process: a draft that nobody holds was left behind, and the next writer removes it.
+Content is written to a draft beside the target, synced to disk and renamed. The writer holds a kernel lock on
+the draft, which ends with the process: a draft without a lock is stale, and the next writer removes it.
 """
 
 from __future__ import annotations
@@ -20,80 +20,80 @@ from pathlib import Path
 from sva_bench.errors import BadInput
 from sva_bench.interrupts import hear_ctrl_c, holding_back_ctrl_c
 
-_LEFT = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d+)(?:-\d+)?\.(?P<kind>tmp|old)", re.DOTALL)
-_LONGEST = 200  # of a name's bytes in a draft's name, which is at most 255 long
+_DRAFT_NAME = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d+)(?:-\d+)?\.(?P<kind>tmp|old)", re.DOTALL)
+_MOST_NAME_BYTES = 200  # of a target's name within the draft's name, which is limited to 255 bytes
 
 _TRIAL = "sva-bench-trial"
-_TRIAL_BYTES = 1 << 16  # of a disk with less room nothing is to be expected
+_TRIAL_BYTES = 1 << 16  # least free space that is required
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 _UNKNOWN_TO_THE_FILE_SYSTEM = (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP)
 
 
-def why(error: OSError) -> str:
-    """What the system says, in a few words; libraries raise errors that have no number."""
+def reason_of(error: OSError) -> str:
+    """The system's message of an error, or the first line of a library's error without a number."""
     return error.strerror or (str(error).splitlines() or [type(error).__name__])[0][:120]
 
 
 @contextmanager
 def draft_file(path: Path, way_out: str = "choose another place") -> Iterator[Path]:
-    """A file to be written that takes the place of another only when it is whole, and on the disk.
+    """A draft file that replaces the target atomically when the block ends without an error.
 
     Args:
-        path: Where it belongs; of a link, the file that it leads to is replaced.
-        way_out: What to change if it can't be written.
+        path: The target; of a link, its destination is replaced.
+        way_out: What to change if it can't be written, for the message.
 
     Raises:
         BadInput: If it can't be written; an older file stays as it was.
     """
     target = Path(os.path.realpath(path))
-    begun: _Draft | None = None
+    draft_held: _Draft | None = None
     try:
-        with holding_back_ctrl_c():  # or a draft is left that nobody knows
-            remove_left_behind(target.parent, lambda name: name == _short(target.name))
-            begun = _Draft(target, folder=False)
-        yield begun.path
-        hear_ctrl_c()  # a library that writes may have swallowed it, and left something out
-        _to_disk(begun.path)
-        os.replace(begun.path, target)
-        _to_disk(target.parent)
+        with holding_back_ctrl_c():  # else an interrupt could leave a draft without a reference to it
+            remove_left_behind(target.parent, lambda name: name == _shortened(target.name))
+            draft_held = _Draft(target, folder=False)
+        yield draft_held.path
+        hear_ctrl_c()  # a library may have swallowed it and written incomplete content
+        _sync(draft_held.path)
+        os.replace(draft_held.path, target)
+        _sync(target.parent)
     except OSError as error:
-        raise BadInput(f"{path}: cannot be written ({why(error)}); {way_out}") from None
+        raise BadInput(f"{path}: cannot be written ({reason_of(error)}); {way_out}") from None
     finally:
-        if begun is not None:
-            begun.close()
+        if draft_held is not None:
+            draft_held.close()
 
 
 @contextmanager
 def draft_folder(target: Path, way_out: str = "choose another place") -> Iterator[Path]:
-    """A folder to be filled that takes the place of another, in one step, only when it is complete.
+    """A draft folder that replaces the target atomically when the block ends without an error.
 
     Raises:
         BadInput: If it can't be written; an older folder stays as it was.
     """
-    begun: _Draft | None = None
+    draft_held: _Draft | None = None
     try:
         with holding_back_ctrl_c():
             target.parent.mkdir(parents=True, exist_ok=True)
-            begun = _Draft(target, folder=True)
-        yield begun.path
+            draft_held = _Draft(target, folder=True)
+        yield draft_held.path
         hear_ctrl_c()
-        for folder, _, names in os.walk(begun.path, topdown=False):
+        for folder, _, names in os.walk(draft_held.path, topdown=False):
             for name in names:
-                _to_disk(Path(folder, name))
-            _to_disk(Path(folder))
+                _sync(Path(folder, name))
+            _sync(Path(folder))
         with holding_back_ctrl_c():
-            _take_the_place_of(begun.path, target)
-        _to_disk(target.parent)
+            _replace(draft_held.path, target)
+        _sync(target.parent)
     except OSError as error:
-        raise BadInput(f"{target.parent}: cannot be written to ({why(error)}); {way_out}") from None
+        raise BadInput(f"{target.parent}: cannot be written to ({reason_of(error)}); {way_out}") from None
     finally:
-        if begun is not None:
-            begun.close()
+        if draft_held is not None:
+            draft_held.close()
 
 
 def write_file(path: Path, content: bytes, way_out: str = "choose another place") -> None:
-    """Write a file, whole or not at all.
+    """Write a file atomically.
 
     Raises:
         BadInput: If it can't be written; an older file stays as it was.
@@ -104,14 +104,14 @@ def write_file(path: Path, content: bytes, way_out: str = "choose another place"
 
 @contextmanager
 def by_way_of(draft: Path, path: Path) -> Iterator[None]:
-    """A draft of a given name, written in this block, becomes a file: for folders with one writer at a time.
+    """A block that writes a draft of a given name, which then replaces a file; for folders with a single writer.
 
     Raises:
-        OSError: If it can't be written; the draft is gone, and an older file stays as it was.
+        OSError: If it can't be written; the draft is removed, and an older file stays as it was.
     """
     try:
         yield
-        _to_disk(draft)
+        _sync(draft)
         os.replace(draft, path)
     finally:
         with holding_back_ctrl_c(), suppress(OSError):
@@ -119,10 +119,10 @@ def by_way_of(draft: Path, path: Path) -> Iterator[None]:
 
 
 def try_out(folder: Path) -> None:
-    """Write something into a folder and take it away again: permissions and free space tell less than the attempt.
+    """Test whether files can be written to a folder, by writing and removing one.
 
     Raises:
-        OSError: If it can't be done.
+        OSError: If they can't.
     """
     remove_left_behind(folder, lambda name: name == _TRIAL)
     with holding_back_ctrl_c():
@@ -137,22 +137,22 @@ def try_out(folder: Path) -> None:
 
 
 def remove_left_behind(folder: Path, of: Callable[[str], bool]) -> None:
-    """Remove the drafts that killed processes left in a folder, and put back what they had moved away.
+    """Remove stale drafts from a folder, and restore folders that a killed process had moved away.
 
     Args:
-        folder: Where to look; nothing is done if it can't be read.
-        of: Whether a file or folder of this name is ours to look after.
+        folder: The folder; nothing is done if it can't be read.
+        of: Whether a target of this name is to be cleaned up.
     """
     try:
         entries = [entry.name for entry in os.scandir(folder)]
     except OSError:
         return
     for entry in entries:
-        found = _LEFT.fullmatch(entry)
-        if found is None or not of(found["name"]) or _at_work(folder / entry, int(found["pid"][:12])):
+        found = _DRAFT_NAME.fullmatch(entry)
+        if found is None or not of(found["name"]) or _is_held(folder / entry, int(found["pid"][:12])):
             continue
         place = folder / found["name"]
-        with suppress(OSError):  # somebody else's then; what stands there is in nobody's way
+        with suppress(OSError):  # without permission it belongs to another user, and does no harm
             if found["kind"] == "old" and not os.path.lexists(place):
                 os.rename(folder / entry, place)
             else:
@@ -160,12 +160,12 @@ def remove_left_behind(folder: Path, of: Callable[[str], bool]) -> None:
 
 
 class _Draft:
-    """A draft that this process is at work on, and holds locked."""
+    """A draft that this process writes, and holds locked."""
 
     def __init__(self, target: Path, *, folder: bool) -> None:
-        for number in range(1000):  # another process may have our id, in another container
+        for number in range(1000):  # a process in another container may have the same id
             again = f"-{number}" if number else ""
-            self.path = target.with_name(f".{_short(target.name)}.{os.getpid()}{again}.tmp")
+            self.path = target.with_name(f".{_shortened(target.name)}.{os.getpid()}{again}.tmp")
             try:
                 if folder:
                     self.path.mkdir()
@@ -180,20 +180,20 @@ class _Draft:
         raise FileExistsError(errno.EEXIST, "a thousand drafts are there already", str(self.path))
 
     def close(self) -> None:
-        """Remove what is left of it: all, or the older folder whose place it took."""
+        """Remove the draft, or the older folder that it was exchanged with, and release the lock."""
         with holding_back_ctrl_c(), suppress(OSError):
             _remove(self.path)
         os.close(self._handle)
 
 
-def _short(name: str) -> str:
-    """A name that a draft's can be made of."""
+def _shortened(name: str) -> str:
+    """A target's name, or its hash if it is too long for a draft's name."""
     raw = os.fsencode(name)
-    return name if len(raw) <= _LONGEST else sha256(raw).hexdigest()
+    return name if len(raw) <= _MOST_NAME_BYTES else sha256(raw).hexdigest()
 
 
-def _at_work(draft: Path, pid: int) -> bool:
-    """Whether the writer of a draft lives. Both are asked: ids are used again, and some file systems know no locks."""
+def _is_held(draft: Path, pid: int) -> bool:
+    """Whether the writer of a draft is alive, by process id and lock: ids are reused, and locks may be unsupported."""
     if pid != os.getpid():
         try:
             os.kill(pid, 0)
@@ -206,7 +206,7 @@ def _at_work(draft: Path, pid: int) -> bool:
     try:
         handle = os.open(draft, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
-        return False  # a link that we never make, or gone
+        return False  # removed, or a link, which is never a draft
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -225,8 +225,8 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _take_the_place_of(draft: Path, target: Path) -> None:
-    """Let the draft have the target's name. What stood there has the draft's name then, if there was anything."""
+def _replace(draft: Path, target: Path) -> None:
+    """Rename the draft to the target; an existing target gets the draft's name."""
     if not os.path.lexists(target):
         os.rename(draft, target)
         return
@@ -235,7 +235,7 @@ def _take_the_place_of(draft: Path, target: Path) -> None:
     except OSError as error:
         if error.errno not in _UNKNOWN_TO_THE_FILE_SYSTEM:
             raise
-        # In two steps. Killed between them, the next start puts the older one back.
+        # In two steps. If killed between them, the next writer restores the older one.
         old = draft.with_suffix(".old")
         os.rename(target, old)
         os.rename(draft, target)
@@ -243,22 +243,22 @@ def _take_the_place_of(draft: Path, target: Path) -> None:
 
 
 def _exchange(one: Path, other: Path) -> None:
-    """Exchange two names in one step of the kernel (Linux 3.15)."""
+    """Exchange two names atomically (renameat2, Linux 3.15)."""
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if rename is None:  # a C library of before 2018
+    if rename is None:  # a C library from before 2018
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     if rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), ctypes.c_uint(_RENAME_EXCHANGE)):
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number), str(other))
 
 
-def _to_disk(path: Path) -> None:
-    """Bring a file or folder to the disk: else a power cut could leave a renamed file empty."""
+def _sync(path: Path) -> None:
+    """Sync a file or folder to disk: else a power failure could leave a renamed file empty."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
     except OSError:
-        if not path.is_dir():  # which some file systems can't
+        if not path.is_dir():  # some file systems can't sync folders
             raise
     finally:
         os.close(handle)

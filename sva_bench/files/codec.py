@@ -1,7 +1,7 @@
-"""Results as bytes and back, guided by their declared types: what lies on disk is data, and never runs.
+"""Serialisation of results by their declared types: files are data, never code.
 
-Plain values go into a JSON header, arrays follow it as they are in memory. What is read must be exactly of the type
-that is expected, field by field; anything else is refused. Pickle would run whatever a planted file tells it to.
+Plain values go into a JSON header, followed by arrays as raw bytes. What is read must be exactly of the expected
+type, field by field; anything else is refused. Pickle would run code from a manipulated file.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ class NotOfType(ValueError):
 
 
 class _Codec(NamedTuple):
-    """How values of one type become JSON data, their arrays kept aside in order, and back."""
+    """Encoding of values of one type to JSON data, with arrays appended to a list, and decoding."""
 
     encode: Callable[[Any, list[bytes]], Any]
     decode: Callable[[Any, _Body], Any]
 
 
 class _Body:
-    """The arrays of a file, handed out one after the other."""
+    """The arrays of a file, read in order."""
 
     def __init__(self, content: memoryview) -> None:
         self._content, self._at = content, 0
 
     def take(self, shape: tuple[int, ...], dtype: str) -> np.ndarray[Any, Any]:
-        count = math.prod(shape)  # of Python's integers: nothing overflows
+        count = math.prod(shape)  # Python integers don't overflow
         end = self._at + count * np.dtype(dtype).itemsize
         if end > len(self._content):
             raise NotOfType("an array is cut off")
@@ -52,22 +52,22 @@ class _Body:
             raise NotOfType("there is more than was expected")
 
 
-def encoded(value: Any, form: Any) -> bytes:
+def encoded(value: Any, declared_type: Any) -> bytes:
     """A value as bytes.
 
     Args:
         value: A value of that type.
-        form: A dataclass, or a type made of dataclasses, arrays, plain values, tuples, mappings and sets.
+        declared_type: A dataclass, or a type made of dataclasses, arrays, plain values, tuples, mappings and sets.
 
     Raises:
-        NotOfType: If the value holds something that the type doesn't tell of.
+        NotOfType: If the value is not of the declared type.
     """
     arrays: list[bytes] = []
-    header = json.dumps(_codec(form).encode(value, arrays), separators=(",", ":")).encode()
+    header = json.dumps(_codec(declared_type).encode(value, arrays), separators=(",", ":")).encode()
     return b"".join((len(header).to_bytes(_LENGTH_BYTES, "little"), header, *arrays))
 
 
-def decoded(content: bytes, form: Any) -> Any:
+def decoded(content: bytes, declared_type: Any) -> Any:
     """The value that ``encoded`` wrote; its arrays are read-only.
 
     Raises:
@@ -79,7 +79,7 @@ def decoded(content: bytes, form: Any) -> Any:
     try:
         tree = json.loads(content[_LENGTH_BYTES:end])
         body = _Body(memoryview(content)[end:])
-        value = _codec(form).decode(tree, body)
+        value = _codec(declared_type).decode(tree, body)
     except RecursionError:
         raise NotOfType("nested too deep") from None
     except ValueError as error:  # no JSON, or figures that a dataclass of ours refuses
@@ -89,11 +89,11 @@ def decoded(content: bytes, form: Any) -> Any:
 
 
 @functools.cache
-def _codec(form: Any) -> _Codec:
+def _codec(declared_type: Any) -> _Codec:
     """The codec of a type."""
-    origin, inner = get_origin(form), get_args(form)
-    if is_dataclass(form) and isinstance(form, type):
-        return _of_dataclass(form)
+    origin, inner = get_origin(declared_type), get_args(declared_type)
+    if is_dataclass(declared_type) and isinstance(declared_type, type):
+        return _of_dataclass(declared_type)
     if origin is np.ndarray:
         return _of_arrays(get_args(inner[1])[0])
     if origin is NDArray:  # with a name of its own from NumPy 2.5 on, where Python (3.12) has such aliases
@@ -101,20 +101,20 @@ def _codec(form: Any) -> _Codec:
     if origin in (Union, types.UnionType) and len(inner) == 2 and type(None) in inner:
         return _optional(_codec(inner[0] if inner[1] is type(None) else inner[1]))
     if origin is Literal:
-        return _plain(lambda value: isinstance(value, str) and value in inner)
+        return _plain_codec(lambda value: isinstance(value, str) and value in inner)
     if origin is tuple:
         return _list_of(_codec(inner[0]), tuple) if inner[1:] == (...,) else _row_of([_codec(part) for part in inner])
     if origin is frozenset:
         return _list_of(_codec(inner[0]), frozenset, ordered=sorted)
     if isinstance(origin, type) and issubclass(origin, Mapping):
         return _pairs_of(_codec(inner[0]), _codec(inner[1]))
-    if form in _PLAIN:
-        return _plain(_PLAIN[form])
-    raise TypeError(f"no codec for {form}")
+    if declared_type in _PLAIN:
+        return _plain_codec(_PLAIN[declared_type])
+    raise TypeError(f"no codec for {declared_type}")
 
 
 def _json_data(value: Any) -> bool:
-    """Whether JSON gives a value back as it is."""
+    """Whether a value survives a JSON round trip unchanged."""
     if isinstance(value, dict):
         return all(type(key) is str and _json_data(item) for key, item in value.items())
     if isinstance(value, list):
@@ -123,7 +123,7 @@ def _json_data(value: Any) -> bool:
 
 
 def _number(value: Any) -> bool:
-    """An integer where a float is meant stays one, so that a result from the cache prints as a new one does."""
+    """Whether a value is a number but NaN; integers stay integers, so cached results print as new ones do."""
     return type(value) is int or (isinstance(value, float) and not math.isnan(value))
 
 
@@ -132,9 +132,9 @@ _PLAIN: dict[Any, Callable[[Any], bool]] = {
     int: lambda value: type(value) is int, float: _number, Any: _json_data}
 
 
-def _plain(belongs: Callable[[Any], bool]) -> _Codec:
+def _plain_codec(accepts: Callable[[Any], bool]) -> _Codec:
     def same(value: Any, _: Any) -> Any:
-        if not belongs(value):
+        if not accepts(value):
             raise NotOfType(f"unexpected {type(value).__name__}")
         return value
 
@@ -143,7 +143,7 @@ def _plain(belongs: Callable[[Any], bool]) -> _Codec:
 
 def _optional(codec: _Codec) -> _Codec:
     return _Codec(lambda value, arrays: None if value is None else [codec.encode(value, arrays)],
-                  lambda tree, body: None if tree is None else codec.decode(_exactly(tree, 1)[0], body))
+                  lambda tree, body: None if tree is None else codec.decode(_list_with(tree, 1)[0], body))
 
 
 def _list_of(codec: _Codec, kind: type, ordered: Callable[[Any], list[Any]] = list) -> _Codec:
@@ -152,7 +152,7 @@ def _list_of(codec: _Codec, kind: type, ordered: Callable[[Any], list[Any]] = li
             raise NotOfType(f"unexpected {type(value).__name__}")
         return [codec.encode(item, arrays) for item in ordered(value)]
 
-    return _Codec(encode, lambda tree, body: kind(codec.decode(item, body) for item in _exactly(tree)))
+    return _Codec(encode, lambda tree, body: kind(codec.decode(item, body) for item in _list_with(tree)))
 
 
 def _row_of(codecs: list[_Codec]) -> _Codec:
@@ -162,7 +162,7 @@ def _row_of(codecs: list[_Codec]) -> _Codec:
         return [codec.encode(item, arrays) for codec, item in zip(codecs, value, strict=True)]
 
     return _Codec(encode, lambda tree, body: tuple(
-        codec.decode(item, body) for codec, item in zip(codecs, _exactly(tree, len(codecs)), strict=True)))
+        codec.decode(item, body) for codec, item in zip(codecs, _list_with(tree, len(codecs)), strict=True)))
 
 
 def _pairs_of(keys: _Codec, values: _Codec) -> _Codec:
@@ -172,10 +172,10 @@ def _pairs_of(keys: _Codec, values: _Codec) -> _Codec:
         return [[keys.encode(key, arrays), values.encode(item, arrays)] for key, item in value.items()]
 
     def decode(tree: Any, body: _Body) -> dict[Any, Any]:
-        pairs = [_exactly(pair, 2) for pair in _exactly(tree)]
+        pairs = [_list_with(pair, 2) for pair in _list_with(tree)]
         found = {keys.decode(key, body): values.decode(item, body) for key, item in pairs}
         if len(found) < len(pairs):
-            raise NotOfType("a key stands twice")
+            raise NotOfType("a key is a duplicate")
         return found
 
     return _Codec(encode, decode)
@@ -191,7 +191,7 @@ def _of_arrays(scalar: Any) -> _Codec:
         return list(value.shape)
 
     def decode(tree: Any, body: _Body) -> np.ndarray[Any, Any]:
-        shape = tuple(_exactly(tree))
+        shape = tuple(_list_with(tree))
         if not all(type(length) is int and length >= 0 for length in shape):
             raise NotOfType("no shape of an array")
         array = body.take(shape, dtype)
@@ -202,24 +202,25 @@ def _of_arrays(scalar: Any) -> _Codec:
     return _Codec(encode, decode)
 
 
-def _of_dataclass(form: Any) -> _Codec:
-    hints = get_type_hints(form)
-    names = [field.name for field in fields(form)]
+def _of_dataclass(declared_type: Any) -> _Codec:
+    hints = get_type_hints(declared_type)
+    names = [field.name for field in fields(declared_type)]
     codecs = [_codec(hints[name]) for name in names]
 
     def encode(value: Any, arrays: list[bytes]) -> list[Any]:
-        if type(value) is not form:
+        if type(value) is not declared_type:
             raise NotOfType(f"unexpected {type(value).__name__}")
         return [codec.encode(getattr(value, name), arrays) for name, codec in zip(names, codecs, strict=True)]
 
     def decode(tree: Any, body: _Body) -> Any:
-        items = _exactly(tree, len(names))
-        return form(**{name: codec.decode(item, body) for name, codec, item in zip(names, codecs, items, strict=True)})
+        items = _list_with(tree, len(names))
+        return declared_type(**{
+            name: codec.decode(item, body) for name, codec, item in zip(names, codecs, items, strict=True)})
 
     return _Codec(encode, decode)
 
 
-def _exactly(tree: Any, length: int | None = None) -> list[Any]:
+def _list_with(tree: Any, length: int | None = None) -> list[Any]:
     if not isinstance(tree, list) or length not in (None, len(tree)):
         raise NotOfType(f"unexpected {type(tree).__name__}")
     return tree

@@ -1,4 +1,4 @@
-"""What pydantic says of its own types, said of the file: which key, and what to change."""
+"""Messages for validation errors of pydantic: which key of the file, and what to change."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ Loc = tuple[str | int, ...]
 def first_complaint(
     data: Any, schema: type[Any], error: ValidationError, written: Callable[[Loc], str | None] | None = None,
 ) -> tuple[Loc, str]:
-    """Where the first thing to mend stands, and what to change there.
+    """Location of the first problem in a document, and what to change there.
 
     Args:
         data: The document's data.
-        schema: The dataclass or pydantic model that refused it.
-        error: How it did.
-        written: How a YAML file writes the scalar at a place; ``None`` where there is none. Of JSON, nothing.
+        schema: The dataclass or pydantic model that it was validated against.
+        error: The validation error.
+        written: The text of the scalar at a location of a YAML file; ``None`` for JSON.
     """
-    # An unknown key explains a missing one beside it better than the other way round.
-    details = sorted(_as_meant(data, error.errors()), key=lambda d: d["type"] not in _UNKNOWN)
+    # An unknown key first: it usually explains a missing one beside it.
+    details = sorted(_most_likely(data, error.errors()), key=lambda d: d["type"] not in _UNKNOWN)
     detail = details[0]
     loc = _existing(data, detail["loc"])
     if detail["type"] in _UNKNOWN:
         key = str(detail["loc"][-1])
         known = _keys_at(schema, detail["loc"][:-1])
-        if key in known:  # of another alternative
+        if key in known:  # a key of another alternative of the union
             return loc, f"the key {shown(key)} doesn't go with the other keys here; remove one or the other"
         if key.isdecimal() and detail["input"] is None:  # {size_m: 0,5} has a key 5
             return loc, f"unknown key {shown(key)}; if it is what follows a decimal comma, write a decimal point"
@@ -43,7 +43,7 @@ def first_complaint(
     if detail["type"] == "string_pattern_mismatch":
         name = shown(detail["input"])
         return loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit"
-    message = _plainly(detail)
+    message = _in_plain_words(detail)
     found = detail["input"]
     text = (written(loc) if written else None) or (None if found is None else str(found).lower())
     if detail["type"] == "string_type" and not isinstance(found, dict | list) and text is not None:
@@ -61,30 +61,30 @@ def first_complaint(
 
 
 def of_an_option(error: ValidationError) -> str:
-    """What is wrong with the value of an option, and the value."""
+    """The message for the value of an option, with the value."""
     detail = error.errors()[0]
-    message = _plainly(detail)
+    message = _in_plain_words(detail)
     found = str(detail["input"])
     if detail["type"] == "value_error":  # ours or typer's, which say the value
         return message
     return f"{message}, found {found if found.isalnum() else shown(found)}{_comma(found)}"
 
 
-def _plainly(detail: Any) -> str:
+def _in_plain_words(detail: Any) -> str:
     kind = detail["type"]
     if kind in ("too_short", "too_long"):
         least, most = detail["ctx"].get("min_length"), detail["ctx"].get("max_length")
         bound = f"least {counted(least, 'entry', 'entries')}" if kind == "too_short" else \
             f"most {counted(most, 'entry', 'entries')}"
         return f"expected at {bound}, found {detail['ctx']['actual_length']}"
-    if kind in _PLAINLY:
-        return _PLAINLY[kind].format(**detail.get("ctx", {}))
-    said: str = detail["msg"]
-    return said.removeprefix("Value error, ")
+    if kind in _PLAIN_WORDS:
+        return _PLAIN_WORDS[kind].format(**detail.get("ctx", {}))
+    message_text: str = detail["msg"]
+    return message_text.removeprefix("Value error, ")
 
 
 def _comma(text: str) -> str:
-    """What to change in a number with a decimal comma; nothing of other text."""
+    """The hint for a number with a decimal comma; empty for other text."""
     return f": write a decimal point, {text.replace(',', '.')}" if text.count(",") == 1 and len(text) <= 40 \
         and _numeric(text.replace(",", ".")) else ""
 
@@ -97,48 +97,48 @@ def _numeric(text: str) -> bool:
 
 
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
-"""What pydantic says of an unknown key: of its models, and of dataclasses."""
+"""Pydantic's error types for an unknown key: of models, and of dataclasses."""
 
-_PLAINLY = {  # what pydantic says of its own types, said of the file
+_PLAIN_WORDS = {  # messages by pydantic's error types
     "dict_type": "expected a mapping", "model_type": "expected a mapping",
     "dataclass_type": "expected a mapping", "tuple_type": "expected a list", "list_type": "expected a list",
     "less_than_equal": "expected at most {le}", "greater_than_equal": "expected at least {ge}",
     "less_than": "expected less than {lt}", "greater_than": "expected more than {gt}",
-    "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected a whole number",
-    "float_parsing": "expected a number", "int_parsing": "expected a whole number",
-    "int_from_float": "expected a whole number",
+    "string_type": "expected a word", "float_type": "expected a number", "int_type": "expected an integer",
+    "float_parsing": "expected a number", "int_parsing": "expected an integer",
+    "int_from_float": "expected an integer",
 }
 
 
-def _as_meant(data: Any, details: list[Any]) -> list[Any]:
-    """The complaints of those alternatives of unions that the writer most likely meant.
+def _most_likely(data: Any, details: list[Any]) -> list[Any]:
+    """The errors of the alternative of a union that was most likely intended.
 
-    A box that is no box is no cylinder and no wall either; only what is wrong with the box is worth telling.
+    An invalid box fails as a cylinder and as a wall too; only the errors of the box are useful.
     """
-    place, depth = _until_union(data, details[0]["loc"])
+    place, depth = _prefix_in_data(data, details[0]["loc"])
     if depth == len(details[0]["loc"]):
         return details
     tags: dict[str | int, list[Any]] = {}
     for detail in details:
-        if _until_union(data, detail["loc"]) == (place, depth) and len(detail["loc"]) > depth:
+        if _prefix_in_data(data, detail["loc"]) == (place, depth) and len(detail["loc"]) > depth:
             tags.setdefault(detail["loc"][depth], []).append(detail)
 
-    def strangeness(tag: str | int) -> tuple[int, bool]:
-        odd = 0
+    def implausibility(tag: str | int) -> tuple[int, bool]:
+        score = 0
         for detail in tags[tag]:
-            whole = len(detail["loc"]) == depth + 1  # the value as a whole
+            whole = len(detail["loc"]) == depth + 1  # the error is about the whole value
             holds = isinstance(detail["input"], dict | list)
             other = detail["type"].endswith("_type") or (detail["type"] == "literal_error" and holds)
-            odd += 100 if whole and other else 0
-            odd += 3 if holds and other else 0  # a list where a number belongs
-            odd += detail["type"] in (*_UNKNOWN, "missing")
-        return odd, str(tag).startswith("dict[")
+            score += 100 if whole and other else 0
+            score += 3 if holds and other else 0  # a list where a number belongs
+            score += detail["type"] in (*_UNKNOWN, "missing")
+        return score, str(tag).startswith("dict[")
 
-    return tags[min(tags, key=strangeness)] if len(tags) > 1 else details
+    return tags[min(tags, key=implausibility)] if len(tags) > 1 else details
 
 
-def _until_union(data: Any, loc: Loc) -> tuple[Loc, int]:
-    """How far a location follows the data; what comes next is the name of an alternative, or a missing key."""
+def _prefix_in_data(data: Any, loc: Loc) -> tuple[Loc, int]:
+    """The longest prefix of a location that exists in the data; next is an alternative's name, or a missing key."""
     for depth, part in enumerate(loc):
         inside = part in data if isinstance(data, dict) else (
             isinstance(data, list) and isinstance(part, int) and part < len(data))
@@ -149,13 +149,13 @@ def _until_union(data: Any, loc: Loc) -> tuple[Loc, int]:
 
 
 def shown(value: object) -> str:
-    """A value as a complaint quotes it, cut short."""
+    """A value as quoted in messages, truncated."""
     text = "nothing" if value is None else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _existing(data: Any, loc: Loc) -> Loc:
-    """``loc`` without the parts that pydantic adds for unions, keys of mappings and the like."""
+    """``loc`` without the parts that pydantic adds for unions and keys of mappings."""
     kept: list[str | int] = []
     for number, part in enumerate(loc):
         if isinstance(data, dict) and part in data:
@@ -170,7 +170,7 @@ def _existing(data: Any, loc: Loc) -> Loc:
 
 
 def _keys_at(schema: type[Any], loc: Loc) -> list[str]:
-    """Keys that the schema knows at ``loc``; those of every alternative of a union."""
+    """The schema's keys at ``loc``, of every alternative of a union."""
     found: set[type[Any]] = {schema}
     for part in loc:
         inner: set[type[Any]] = set()
@@ -181,7 +181,7 @@ def _keys_at(schema: type[Any], loc: Loc) -> list[str]:
 
 
 def _keys_of(form: type[Any]) -> dict[str, Any]:
-    """The keys of a dataclass or model, and what each holds."""
+    """The keys of a dataclass or model, and the type of each."""
     if issubclass(form, BaseModel):
         return {field.alias or name: field.annotation for name, field in form.model_fields.items()}
     hints = get_type_hints(form)

@@ -1,4 +1,4 @@
-"""Content hashes: equal content, equal hash, in any process and on any machine."""
+"""Content hashes, equal for equal content in any process and on any machine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from sva_bench.files.versions import library_versions
 
 
 def digest(*parts: Any) -> str:
-    """SHA-256 of data: plain values, arrays, mappings, sequences, and dataclasses of such."""
+    """SHA-256 of data: plain values, arrays, mappings, sequences, sets, and dataclasses of these.
+
+    Raises:
+        TypeError: If a value is of another type.
+    """
     hashed = hashlib.sha256()
     for part in parts:
         for piece in _pieces(part):
@@ -26,7 +30,7 @@ def digest(*parts: Any) -> str:
 
 
 def _pieces(value: Any) -> Iterator[bytes]:
-    """Every piece says what it is and how long, so that different content never reads alike."""
+    """The bytes to hash; each piece is prefixed by its type and length, so that different content differs."""
     if isinstance(value, np.ndarray):
         yield f"a{value.dtype.str}{value.shape}:".encode()
         yield np.ascontiguousarray(value).tobytes()
@@ -55,7 +59,7 @@ def _pieces(value: Any) -> Iterator[bytes]:
 
 @functools.cache
 def code_digest() -> str:
-    """What computes: our own code and the libraries that results depend on. A changed line is another program."""
+    """SHA-256 of the package's source and of the versions of the libraries that results depend on."""
     package = Path(__file__).parents[1]
     files = {str(path.relative_to(package)): hashlib.sha256(path.read_bytes()).hexdigest()
              for path in package.rglob("*.py")}

@@ -1,7 +1,7 @@
-"""YAML and JSON files in, checked data out: every complaint names file, line and key.
+"""Reading and validation of YAML and JSON files; every error names file, line and key.
 
-Aliases, duplicate keys and oversized files are refused at the door:
-no document of ours needs them, and an alias bomb can fill any memory.
+Aliases, duplicate keys and oversized files are refused: no valid document needs them, and an alias bomb can exhaust
+memory.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sva_bench.errors import BadFile, nearest
 from sva_bench.files.complaints import Loc as Loc
 from sva_bench.files.complaints import dotted, first_complaint, shown
 from sva_bench.files.json_lines import json_line
-from sva_bench.files.mistaken import what_it_is, what_the_bytes_are
+from sva_bench.files.mistaken import describe_bytes, what_it_is
 from sva_bench.files.printable import counted
 from sva_bench.files.records import FormT, from_dict
 from sva_bench.files.yaml_text import MAX_DEPTH, Node, compose, line_in, plain_data, written_in
@@ -32,13 +32,13 @@ MAX_JSON_BYTES = 200_000_000  # 2000 sites, written with ten digits, stay below 
 
 
 class Document:
-    """Plain data read from a file, which knows the line of each key."""
+    """Plain data read from a file, with the line of each key."""
 
     def __init__(self, path: Path, data: Any, text: str, root: Node | None = None) -> None:
         self.path, self.data, self.text, self._root, self.is_json = path, data, text, root, root is None
 
     def error(self, loc: Loc, problem: str) -> BadFile:
-        """A complaint about the value at ``loc``, e.g. ``("sites", "pois", "p1")``."""
+        """An error about the value at ``loc``, e.g. ``("sites", "pois", "p1")``."""
         return BadFile(self.path, self.line(loc), dotted(loc), problem)
 
     def line(self, loc: Loc) -> int | None:
@@ -48,18 +48,18 @@ class Document:
         return line_in(self._root, loc)
 
     def written(self, loc: Loc) -> str | None:
-        """How a YAML file writes the scalar at ``loc``; ``None`` where none stands there."""
+        """The text of the scalar at ``loc`` of a YAML file; ``None`` if there is none."""
         return None if self._root is None else written_in(self._root, loc)
 
     def changed(self, key: str, value: Any, named: Mapping[Loc, str] | None = None) -> Document:
-        """The same with another value at a dotted key, e.g. ``robots.uv2.fuel_capacity_s``; lines stay those read.
+        """A copy with another value at a dotted key, e.g. ``robots.uv2.fuel_capacity_s``; lines are those of the file.
 
-        Names may hold dots themselves: the longest name that is there counts.
+        Names may contain dots: the longest existing name is used.
 
         Args:
-            key: The key; sections on the way that aren't there are made.
+            key: The key; missing sections are created.
             value: The value.
-            named: Sections that are not made, since their keys are names that the file gives: what they are names of.
+            named: Sections whose keys are names given in the file, which are not created; and what they are names of.
         """
         data = copy.deepcopy(self.data)
         at, words = data, key.split(".")
@@ -82,7 +82,7 @@ class Document:
 
 
 def _next_name(at: Any, words: list[str]) -> tuple[Any, list[str]]:
-    """The next step of a dotted key, and what is left of it."""
+    """The next name of a dotted key, and the remaining words."""
     if isinstance(at, list):
         return int(words[0]) if words[0].isdecimal() else words[0], words[1:]
     for count in range(len(words), 0, -1):
@@ -102,7 +102,7 @@ def read_yaml(path: Path) -> Document:
 
 
 def parse_yaml(text: str, path: Path) -> Document:
-    """What the text of such a file says, read from ``path`` or about to be written there.
+    """The document of a YAML text, read from ``path`` or about to be written there.
 
     Raises:
         BadFile: If it is not plain YAML.
@@ -114,7 +114,7 @@ def parse_yaml(text: str, path: Path) -> Document:
 
 
 def read_json(path: Path, most: int = MAX_JSON_BYTES) -> Document:
-    """Read a JSON file of so many bytes at most; NaN, infinities and duplicate keys are refused.
+    """Read a JSON file of at most ``most`` bytes; NaN, infinities and duplicate keys are refused.
 
     Raises:
         BadFile: If it cannot be read, is too large, or is not JSON.
@@ -126,7 +126,7 @@ def read_json(path: Path, most: int = MAX_JSON_BYTES) -> Document:
         if len(found) < len(pairs):
             keys = [key for key, _ in pairs]
             key = next(key for key in keys if keys.count(key) > 1)
-            raise BadFile(path, _last_line_of(text, f'"{key}"'), dotted((key,)), "this key stands twice; remove one")
+            raise BadFile(path, _last_line_of(text, f'"{key}"'), dotted((key,)), "this key is a duplicate; remove one")
         return found
 
     def refuse(constant: str) -> float:
@@ -173,7 +173,7 @@ def validate(document: Document, schema: type[FormT], kind: str) -> FormT:
         kind: The format that the file must declare, e.g. ``sva-bench/world@1``.
 
     Raises:
-        BadFile: For the first complaint, with file, line, key and what to change.
+        BadFile: For the first error, with file, line, key and what to change.
     """
     check_kind(document, kind)
     try:
@@ -184,7 +184,11 @@ def validate(document: Document, schema: type[FormT], kind: str) -> FormT:
 
 
 def check_kind(document: Document, kind: str) -> None:
-    """Refuse a document that is not a mapping of the declared kind."""
+    """Check that a document is a mapping that declares a format.
+
+    Raises:
+        BadFile: If it isn't.
+    """
     line = f'"format": "{kind}"' if document.is_json else f"'format: {kind}'"
     if not isinstance(document.data, dict):
         raise document.error((), what_it_is(document.data) or f"expected a mapping that starts with {line}")
@@ -198,15 +202,15 @@ def check_kind(document: Document, kind: str) -> None:
 
 
 def read_bytes(path: Path, limit: int) -> bytes:
-    """The bytes of a regular file, of at most so many; pipes and devices are refused unopened.
+    """The bytes of a regular file, at most ``limit``; pipes and devices are refused without opening them.
 
     Raises:
-        BadFile: If it is no such file.
+        BadFile: If it is missing, unreadable, too large or no regular file.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             raise BadFile(path, None, "", "not a file")
-        # Whatever has become of it since then: no waiting for a writer, and never more than asked for.
+        # The file may have been replaced since: never block on a pipe, never read beyond the limit.
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             state = os.fstat(file.fileno())
             if not stat.S_ISREG(state.st_mode):
@@ -228,10 +232,10 @@ def _read(path: Path, limit: int) -> str:
     content = read_bytes(path, limit)
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise BadFile(path, None, "", "UTF-16 text; save it as UTF-8")
-    if (known := what_the_bytes_are(content)) is not None:
+    if (known := describe_bytes(content)) is not None:
         raise BadFile(path, None, "", known)
     try:
-        text = content.decode("utf-8-sig")  # a byte-order mark, as editors write it, is no part of the text
+        text = content.decode("utf-8-sig")  # without the byte-order mark that some editors write
     except UnicodeDecodeError as error:
         raise BadFile(path, None, "", f"not UTF-8 text (byte {error.start}); save it as UTF-8") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")

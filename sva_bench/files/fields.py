@@ -1,4 +1,4 @@
-"""Types of the values in files, and the sections that they stand in."""
+"""Types of values in files, and the base class of sections."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Name = Annotated[str, StringConstraints(pattern=NAME)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]
-"""Times [s] and incentives: sums of more than 1e9 would lose the feasibility tolerance to rounding."""
+"""Times [s] and incentives: beyond 1e9 the feasibility tolerance is below the rounding of sums."""
 Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
-WholeNumber = Annotated[int, Field(strict=True, ge=0)]
+NonNegativeInt = Annotated[int, Field(strict=True, ge=0)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=MOST_SEED)]
 
 

@@ -1,4 +1,4 @@
-"""Lines of the values of a JSON text: one walk to the place that is asked for, whatever lies before it is skipped."""
+"""Line numbers of values in a JSON text, by a walk to the value's location."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def json_line(text: str, loc: Loc) -> int | None:
 
 
 def _inside(text: str, at: int, part: str | int) -> tuple[int, int] | None:
-    """Where the key, or the item, and its value begin in the object or list that begins at ``at``."""
+    """Offsets of a key (or item) and of its value in the object or list that begins at ``at``; ``None`` if absent."""
     named = text[at:at + 1] == "{"
     if not named and not (text[at:at + 1] == "[" and isinstance(part, int)):
         return None

@@ -1,4 +1,4 @@
-"""Files that are something else than is asked for: what they are, and which command takes them."""
+"""Files of another kind than expected: what they are, and which command reads them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _FROM_MAP = "`sva-bench world from-map MAP -o WORLD.yaml` makes a world of it"
 
 
 def what_it_is(data: Any) -> str | None:
-    """What a document's data are, and which command takes such a thing; ``None`` if nobody knows."""
-    if isinstance(data, str):  # a text that YAML takes for one word over many lines
-        return what_the_text_is(data)
+    """A description of a document of another kind, with the command that reads it; ``None`` if it is unknown."""
+    if isinstance(data, str):  # text that YAML reads as one multi-line scalar
+        return describe_text(data)
     if not isinstance(data, Mapping):
         return None
     form = data.get("format")
@@ -32,18 +32,18 @@ def what_it_is(data: Any) -> str | None:
     return None
 
 
-def what_the_text_is(text: str) -> str | None:
-    """What a file is that is neither YAML nor JSON, by how it begins."""
+def describe_text(text: str) -> str | None:
+    """A description of text that is neither YAML nor JSON, by its beginning; ``None`` if it is unknown."""
     return f"this is a MovingAI map: {_FROM_MAP}" if text.lstrip().startswith("type octile") else None
 
 
-def what_is_no_yaml(text: str, number: int, problem: str) -> str:
-    """What is wrong with text that is no YAML, and what to change where that is known.
+def describe_yaml_error(text: str, number: int, problem: str) -> str:
+    """The message for text that is no valid YAML, with what to change where that is known.
 
     Args:
         text: The text.
         number: The line at which the parser stopped, counted from 0.
-        problem: What it says.
+        problem: The parser's message.
     """
     line = "".join(text.split("\n")[number:number + 1])
     if "\t" in line[:len(line) - len(line.lstrip())]:
@@ -53,8 +53,8 @@ def what_is_no_yaml(text: str, number: int, problem: str) -> str:
     return f"not valid YAML: {problem}"
 
 
-def what_the_bytes_are(content: bytes) -> str | None:
-    """What a file is that is no text, by how it begins; ``None`` if nobody knows."""
+def describe_bytes(content: bytes) -> str | None:
+    """A description of a binary file, by its signature; ``None`` if it is unknown."""
     kind = next((kind for start, kind in _SIGNATURES.items() if content.startswith(start)), None)
     if kind is None and content.startswith(b"BM") and b"\0" in content[:16]:
         kind = "BMP"

@@ -1,4 +1,4 @@
-"""Where results go: refused before any work where nothing can be written, and written whole or not at all."""
+"""Destinations of results: checked before any work, and written atomically."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ import sys
 from pathlib import Path
 
 from sva_bench.errors import BadInput
-from sva_bench.files.atomic import try_out, why, write_file
+from sva_bench.files.atomic import reason_of, try_out, write_file
 from sva_bench.files.streams import CLOSED, output_is_closed
 
 ANOTHER_PLACE = "choose another place with -o"
 
 
 def is_standard_output(path: Path | None) -> bool:
-    """Whether a result goes to standard output: no place is told, or ``-``."""
+    """Whether a result goes to standard output: no path is given, or ``-``."""
     return path is None or str(path) == "-"
 
 
 def check_output(path: Path | None, *sources: Path, way_out: str = ANOTHER_PLACE) -> None:
-    """Refuse a place for a result where nothing can be written, or one that would write over what it is made of.
+    """Check that a result can be written to a path, and would not overwrite its sources.
 
     Args:
         path: The file; ``None`` = standard output.
-        sources: What the result is made of.
+        sources: Files that the result is made from.
         way_out: What to change.
 
     Raises:
@@ -47,14 +47,14 @@ def check_output(path: Path | None, *sources: Path, way_out: str = ANOTHER_PLACE
         _refuse_frozen(target)
         try_out(target.parent)
     except OSError as error:
-        raise BadInput(f"{path}: cannot be written ({why(error)}); {way_out}") from None
+        raise BadInput(f"{path}: cannot be written ({reason_of(error)}); {way_out}") from None
 
 
 def check_folder(folder: Path, option: str) -> None:
-    """Refuse a folder for results that can't be made, or takes none.
+    """Check that a folder for results can be created and written to.
 
     Args:
-        folder: The folder, which need not be there yet.
+        folder: The folder, which need not exist.
         option: The option that names it.
 
     Raises:
@@ -69,11 +69,11 @@ def check_folder(folder: Path, option: str) -> None:
                            f"with {option}")
         try_out(there)
     except OSError as error:
-        raise BadInput(f"{folder}: cannot be written to ({why(error)}); choose another with {option}") from None
+        raise BadInput(f"{folder}: cannot be written to ({reason_of(error)}); choose another with {option}") from None
 
 
 def write_result(path: Path | None, content: str | bytes) -> None:
-    """Write a result to a file, whole or not at all, or to standard output; pipes and devices are written through.
+    """Write a result to a file, atomically, or to standard output; to pipes and devices directly.
 
     Raises:
         BadInput: If it can't be written.
@@ -96,15 +96,15 @@ def write_result(path: Path | None, content: str | bytes) -> None:
         try:
             target.write_bytes(data)
         except BrokenPipeError:
-            return  # whoever read it wants no more
+            return  # the reader has closed the pipe
         except OSError as error:
-            raise BadInput(f"{path}: cannot be written ({why(error)}); {ANOTHER_PLACE}") from None
+            raise BadInput(f"{path}: cannot be written ({reason_of(error)}); {ANOTHER_PLACE}") from None
     else:
         write_file(path, data, ANOTHER_PLACE)
 
 
 def write_beside(path: Path, name: str, content: bytes) -> None:
-    """Write a file that belongs to another, by its name relative to the other's folder.
+    """Write a file by its name relative to the folder of another file.
 
     Raises:
         BadInput: If it can't be written.
@@ -113,7 +113,7 @@ def write_beside(path: Path, name: str, content: bytes) -> None:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(f"{target.parent}: cannot be made ({why(error)}); {ANOTHER_PLACE}") from None
+        raise BadInput(f"{target.parent}: cannot be made ({reason_of(error)}); {ANOTHER_PLACE}") from None
     write_result(target, content)
 
 
@@ -123,7 +123,7 @@ def _refuse_closed() -> None:
 
 
 def _refuse_frozen(target: Path) -> None:
-    """Meet beforehand what replacing a file will meet: one that may not be changed at all, whoever asks."""
+    """Raise the error that replacing an immutable file, or one on a read-only file system, will raise."""
     if not target.exists():
         return
     try:

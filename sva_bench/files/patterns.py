@@ -1,4 +1,4 @@
-"""Files by patterns such as ``maps/**/*.yaml``, within bounds: ``/**`` would walk through the whole machine."""
+"""File patterns such as ``maps/**/*.yaml``, with a bound on the entries visited."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from sva_bench.errors import BadInput
 
 MOST_LOOKED_AT = 100_000
-"""Entries of folders that a pattern may lead through; a second's work or two."""
+"""Most folder entries that a pattern may visit: one or two seconds."""
 _MAGIC = re.compile(r"[*?[]")
 
 
@@ -26,7 +26,7 @@ def matching(pattern: Path, most: int) -> list[Path]:
     Hidden names are matched only by patterns that begin with a dot; links to folders are not followed by ``**``.
 
     Raises:
-        BadInput: If more than so many match, or too many entries would have to be looked at.
+        BadInput: If more than ``most`` match, or too many entries would have to be visited.
     """
     found: set[str] = set()
     walk = _Walk(pattern)
@@ -38,13 +38,13 @@ def matching(pattern: Path, most: int) -> list[Path]:
 
 
 class _Walk:
-    """A walk through folders that counts what it looks at."""
+    """A walk through folders that counts the entries it visits."""
 
     def __init__(self, pattern: Path) -> None:
         self._pattern, self._seen = pattern, 0
 
     def below(self, folder: str, parts: tuple[str, ...]) -> Iterator[str]:
-        """What matches these parts below a folder; an empty name stands for the current one."""
+        """The paths below a folder that match these parts; an empty name is the current folder."""
         if not parts:
             if folder:
                 yield folder
@@ -57,7 +57,7 @@ class _Walk:
             return
         if head == "**":
             folders = [folder]
-            while folders:  # not by calling itself: folders can be nested deeper than Python calls
+            while folders:  # no recursion: folders can be nested deeper than Python's stack
                 at = folders.pop()
                 yield from self.below(at, rest)
                 for entry in self._entries(at):
@@ -80,5 +80,5 @@ class _Walk:
                         raise BadInput(f"{self._pattern}: this leads through more than {MOST_LOOKED_AT} files and "
                                        "folders; narrow the pattern")
                     yield entry
-        except OSError:  # not ours to read, or gone meanwhile: nothing there matches
+        except OSError:  # unreadable, or removed meanwhile: nothing matches
             return

@@ -1,4 +1,4 @@
-"""JSON that a person can read."""
+"""Readable JSON."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sva_bench.files.complaints import Loc as Loc
 
 
 def pretty_json(data: Any, indent: int = 0, width: int = 116) -> str:
-    """JSON that a person can read: what fits on a line stays on it."""
+    """Readable JSON: values that fit on a line are on one line."""
     flat = json.dumps(data, ensure_ascii=False, allow_nan=False)
     if len(flat) + indent <= width or not isinstance(data, dict | list) or not data:
         return flat + ("\n" if indent == 0 else "")
@@ -24,5 +24,5 @@ def pretty_json(data: Any, indent: int = 0, width: int = 116) -> str:
 
 
 def _deep(item: Any) -> bool:
-    """Whether an item of a list holds more than numbers and words."""
+    """Whether an item of a list contains a mapping, or a list of more than scalars."""
     return isinstance(item, dict) or (isinstance(item, list) and any(isinstance(x, dict | list) for x in item))

@@ -1,23 +1,23 @@
-"""Foreign text made fit to be shown: names in files from elsewhere, names of files, what was typed."""
+"""Untrusted text made safe to print: names in files of any origin, file names, arguments."""
 
 from __future__ import annotations
 
 import re
 from typing import Any
 
-_OBEYED = re.compile(  # controls but for line feed and tab; marks that turn the direction of writing; half characters
+_CONTROLS = re.compile(  # control characters but line feed and tab; bidirectional marks; lone surrogates
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 def printable(text: str) -> str:
-    """The text, with what a terminal would obey or cannot show spelt out: an escape is ``\\x1b``.
+    """The text with control characters and undisplayable ones escaped, such as ``\\x1b``.
 
-    Bytes of a file name that are no UTF-8 are shown as what they are.
+    Bytes of a file name that are no UTF-8 are escaped as bytes.
     """
-    return text if text.isascii() and text.isprintable() else _OBEYED.sub(_spelt, text)
+    return text if text.isascii() and text.isprintable() else _CONTROLS.sub(_escaped, text)
 
 
-def _spelt(found: re.Match[str]) -> str:
+def _escaped(found: re.Match[str]) -> str:
     code = ord(found[0])
     if 0xDC80 <= code <= 0xDCFF:  # as Python keeps such a byte
         code -= 0xDC00
@@ -30,12 +30,12 @@ def is_text(name: str) -> bool:
 
 
 def is_name(name: str) -> bool:
-    """Whether a name can stand in tables, charts and pages as it is: it is text, of one line."""
+    """Whether a name can be shown in tables, charts and pages unchanged: one line of printable text."""
     return printable(name) == name and not {"\n", "\t"} & set(name)
 
 
 def all_text(data: Any) -> bool:
-    """Whether all words in JSON data can be written as UTF-8."""
+    """Whether all strings in JSON data can be written as UTF-8."""
     if isinstance(data, dict):
         return all(is_text(key) and all_text(item) for key, item in data.items())
     if isinstance(data, list):

@@ -1,7 +1,7 @@
-"""Frozen dataclasses that files hold: checked as they are read, plain data as they are written.
+"""Records: frozen dataclasses that are validated when read from files, and written as plain data.
 
-Code builds and reads them as any dataclass; only here, at a file's door, are they mappings. A field whose default is
-``None`` or empty is left out of the file where it holds that.
+Code uses them as any dataclass; only here are they converted from and to mappings. A field whose default is
+``None`` or empty is omitted from the file when it has that value.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ class Record:
 
 
 def stands_after(key: str) -> dict[str, str]:
-    """Metadata of a subclass's field: it stands after another key in files, not after all those of the base."""
+    """Metadata of a subclass's field: in files it follows this key, not all those of the base class."""
     return {"after": key}
 
 
 def as_dict(record: Record) -> dict[str, Any]:
-    """A record as a file holds it: mappings, lists and plain values."""
+    """A record as the content of a file: mappings, lists and plain values."""
     form: Any = type(record)
     return {item.name: _plain(getattr(record, item.name)) for item in _in_order(form)
             if not _left_out(item, getattr(record, item.name))}
 
 
 def from_dict(form: type[FormT], data: Any) -> FormT:
-    """The record, or the pydantic model, that data of a file stand for.
+    """The record, or the pydantic model, of a file's data.
 
     Raises:
-        ValidationError: If they are not as its fields say.
+        ValidationError: If the data are invalid.
     """
     known: Any = form
     record: FormT = _adapter(known).validate_python(data)

@@ -1,4 +1,4 @@
-"""World files that a command wrote: whether somebody has edited one since, whose work would be lost."""
+"""Detection of edits in generated world files, so that they are not overwritten."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from sva_bench.errors import BadInput
 
 _LINE = re.compile(r"^# as written: ([0-9a-f]{16})\n", re.MULTILINE)
-_MOST_BYTES = 16_000_000  # a world that is larger is none that we read
+_MOST_BYTES = 16_000_000  # larger files are no worlds
 _WORLD = "sva-bench/world"
 
 
@@ -22,24 +22,24 @@ def sealed(text: str) -> str:
 
 
 def refuse_edited(path: Path, *, force: bool) -> None:
-    """Refuse to write over a world that isn't as a command wrote it.
+    """Refuse to overwrite a world that was edited since it was generated.
 
     Args:
         path: Where a world is to be written.
-        force: Write over it all the same.
+        force: Overwrite it in any case.
 
     Raises:
-        BadInput: If there is a world without a digest, or whose digest is of another text.
+        BadInput: If there is a world without a digest, or with the digest of another text.
     """
     if force or not path.is_file():
         return
     try:
         if path.stat().st_size > _MOST_BYTES:
             return
-        # Python's line ends: a version control system may have changed them.
+        # Universal newlines: a version control system may have changed the line ends.
         text = path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError:
-        return  # it can't be read; whether it can be written is another check's question
+        return  # unreadable; whether it can be written is checked elsewhere
     if _WORLD not in text:
         return
     found = _LINE.search(text)
@@ -49,11 +49,11 @@ def refuse_edited(path: Path, *, force: bool) -> None:
 
 
 def refuse_others(world: Path, files: Mapping[str, bytes]) -> None:
-    """Refuse to write over a map that belongs to another world: ``a.yaml`` and ``a.yml`` would share ``a-map/``.
+    """Refuse to overwrite a map that belongs to another world: ``a.yaml`` and ``a.yml`` would share ``a-map/``.
 
     Args:
-        world: Where the world is to be written. If it is there already, the map beside it is its own.
-        files: What its map's files hold, by their names beside it.
+        world: Where the world is to be written. If it exists already, the map beside it is its own.
+        files: Content of its map's files, by their names beside it.
 
     Raises:
         BadInput: If there is no such world yet, but another map of its name.

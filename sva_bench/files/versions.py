@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 LIBRARIES = (("numpy",), ("scipy",), ("numba",), ("pybullet", "pybullet-arm64"), ("ompl",), ("highspy",), ("networkx",),
              ("rerun-sdk",), ("pyarrow",))
-"""Each by the names of the packages that bring it: which of them is installed depends on the Python."""
+"""Each by the names of the packages that provide it: which one is installed depends on the Python version."""
 
 
 def library_versions() -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""YAML text to plain data and back: the only importer of ruamel.yaml."""
+"""YAML text to plain data and back. The only importer of ruamel.yaml."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ruamel.yaml.nodes import Node as Node
 from sva_bench.errors import BadFile
 from sva_bench.files.complaints import Loc as Loc
 from sva_bench.files.complaints import dotted, shown
-from sva_bench.files.mistaken import what_is_no_yaml, what_the_text_is
+from sva_bench.files.mistaken import describe_text, describe_yaml_error
 
 MAX_DEPTH = 32
 MAX_YAML_VALUES = 200_000  # keys and values; a world of 10 000 obstacles has 120 000, which take 5 s to read
@@ -51,13 +51,13 @@ def compose(text: str, path: Path) -> Node | None:
     try:
         node: Node | None = yaml.compose(text)
     except YAMLError as error:
-        if (known := what_the_text_is(text)) is not None:
+        if (known := describe_text(text)) is not None:
             raise BadFile(path, None, "", known) from None
         if not isinstance(error, MarkedYAMLError):
             raise BadFile(path, None, "", f"not valid YAML: {str(error).splitlines()[0]}; remove it") from None
         mark = error.problem_mark or error.context_mark
-        said = what_is_no_yaml(text, mark.line if mark else 0, str(error.problem))
-        raise BadFile(path, mark.line + 1 if mark else None, "", said) from None
+        problem = describe_yaml_error(text, mark.line if mark else 0, str(error.problem))
+        raise BadFile(path, mark.line + 1 if mark else None, "", problem) from None
     except RecursionError:
         raise BadFile(path, None, "", f"nested deeper than {MAX_DEPTH} levels") from None
     except (ValueError, OverflowError):
@@ -78,7 +78,7 @@ def plain_data(node: Node, path: Path, loc: Loc) -> Any:
             key = str(key_node.value)
             if key in data:
                 raise BadFile(path, key_node.start_mark.line + 1, dotted((*loc, key)),
-                              "this key stands twice; remove one")
+                              "this key is a duplicate; remove one")
             data[key] = plain_data(value_node, path, (*loc, key))
         return data
     if isinstance(node, SequenceNode):
@@ -101,7 +101,7 @@ def _scalar(node: Node, path: Path, loc: Loc) -> Any:
     return value
 
 
-def _whole(text: str) -> int:
+def _integer(text: str) -> int:
     if len(text) > 400:  # far beyond any float, and Python prints none of more than 4300 digits
         raise ValueError(text)
     return int(text, 0) if text[:2].lower() in ("0x", "0o") else int(text)
@@ -109,24 +109,26 @@ def _whole(text: str) -> int:
 
 def _number(text: str) -> float:
     return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+
+
 _SCALARS: dict[str, Callable[[str], Any]] = {
     "str": str,
     "timestamp": str,
     "null": lambda _: None,
     "bool": lambda text: text.lower() == "true",
-    "int": _whole,
+    "int": _integer,
     "float": _number,
 }
 
 
 def pretty_yaml(data: Mapping[str, Any], remarks: Mapping[Loc, str], width: int = 116) -> str:
-    """YAML that a person can read: what holds no mapping inside stands on one line.
+    """Readable YAML: values without a mapping inside are on one line.
 
     Args:
         data: The content.
-        remarks: Comments by the key or list item that they stand above; ``()`` is the head of the file. One that
-            begins with a newline has an empty line above it.
-        width: Where long lines are broken.
+        remarks: Comments by the key or list item above which they are written; ``()`` is the head of the file. One that
+            begins with a newline is preceded by an empty line.
+        width: Width at which lines are broken.
     """
     yaml = YAML()
     yaml.width = width
@@ -179,7 +181,7 @@ def line_in(root: Node, loc: Loc) -> int:
 
 
 def written_in(root: Node, loc: Loc) -> str | None:
-    """How the scalar at ``loc`` is written; ``None`` where none stands there."""
+    """The text of the scalar at ``loc``; ``None`` if there is none."""
     node: Any = root
     for part in loc:
         if isinstance(node, MappingNode):

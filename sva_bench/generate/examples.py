@@ -36,7 +36,7 @@ def example_plans(name: str) -> tuple[Path, ...]:
 
 
 def example_title(name: str) -> str:
-    """What a shipped world says of itself in its first line."""
+    """The title of a shipped world, from the comment in its first line."""
     return example_world(name).read_text(encoding="utf-8").partition("\n")[0].removeprefix("#").strip()
 
 

@@ -22,9 +22,9 @@ from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import unless_interrupted
 from sva_bench.robot.model import USUAL_MODEL
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.solver.routes.fronts import tables_of
+from sva_bench.solver.routes.fronts import leg_tables
 from sva_bench.solver.routes.heuristic import VisitOrders, search
-from sva_bench.solver.routes.refuelling import quickest, road_of
+from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.solver.two_stage import SolveLimits, plan_nominal
 from sva_bench.world.model import Site
 
@@ -40,7 +40,7 @@ _PROOF = 0.2  # gap to which that is proved: 0.8 x 1.2 is still less than everyt
 _PAYS = 1.05  # worth of the certain robots' best plan where all others fail, in what they collect otherwise
 _DRAWS = 8  # draws of incentives tried until that is so
 _STEP_S = 5.0  # capacities and limits are multiples of it, or of its doubles where missions are long
-_STEPS = 50  # ... so that about so many make the way to the remotest POI and back
+_STEPS = 50  # about this number of steps is the time to the remotest POI and back
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,7 +61,7 @@ class Proposal:
     incentives: tuple[Mapping[str, int], ...]
 
     def sections(self) -> dict[str, Any]:
-        """The sections of a world file that say this."""
+        """The sections of a world file for this mission."""
         uncertain = self.robots[self.certain:]
         return {
             "robots": {name: {
@@ -72,7 +72,7 @@ class Proposal:
             "scenarios": {name: dict.fromkeys(uncertain, share) for name, share in SCENARIOS.items()}}
 
     def remarks(self) -> dict[tuple[str | int, ...], str]:
-        """What to say above those sections and robots."""
+        """Comments above those sections and robots."""
         one, others = self.certain == 1, len(self.robots) - self.certain == 1
         return {
             ("robots", self.robots[0]): ("The reliable robot earns less, and nothing" if one else
@@ -95,7 +95,7 @@ def propose_mission(
         fuel_s: Planning cost from site to site [s], shape (n, n).
         robots: Number of robots.
         seed: Seed of the incentives.
-        key: What else they depend on: another world's are independent of these.
+        key: Key of the random stream, so that incentives of different worlds are independent.
 
     Raises:
         BadInput: If there are too few robots or POIs for a choice.
@@ -117,11 +117,11 @@ def propose_mission(
                         incentives=incentives)
         proposal = _limited(free, sites, fuel_s)
         instance = _instance(proposal, sites, fuel_s)
-        if _hopeless(instance):
+        if _is_hopeless(instance):
             continue
-        if _trivial(instance):
+        if _is_trivial(instance):
             continue
-        if _pays(instance, certain):
+        if _planning_pays(instance, certain):
             return proposal
         first = first or proposal
     if first is None:
@@ -139,13 +139,13 @@ def _incentives(pois: Sequence[str], certain: bool, rng: np.random.Generator) ->
 
 def _limited(free: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> Proposal:
     """The proposal with the longest mission limit in which not too much is collected, and a capacity to go with it."""
-    alone = _instance(free, sites, fuel_s)
-    there_and_back = max(_alone_s(alone, math.inf))
-    step = 1.0 if there_and_back < 4 * _STEP_S else _STEP_S
-    while there_and_back > _STEPS * step:
+    single = _instance(free, sites, fuel_s)
+    round_trip_s = max(_single_visit_s(single, math.inf))
+    step = 1.0 if round_trip_s < 4 * _STEP_S else _STEP_S
+    while round_trip_s > _STEPS * step:
         step *= 2
-    least_capacity = next(step * k for k in itertools.count(1) if math.isfinite(max(_alone_s(alone, step * k))))
-    everything = float(_weights(alone).max(axis=0).sum())
+    least_capacity = next(step * k for k in itertools.count(1) if math.isfinite(max(_single_visit_s(single, step * k))))
+    everything = float(_weights(single).max(axis=0).sum())
 
     def limited(steps: int) -> Proposal:
         return replace(free, mission_limit_s=step * steps, fuel_capacity_s=min(
@@ -156,7 +156,7 @@ def _limited(free: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> Propo
         weights, worth = _weights(instance), _COLLECTED * everything
         return _worth(weights, _good_orders(instance, weights, lambda value: value > worth)) > worth
 
-    low, high = 1, math.ceil(there_and_back / step)
+    low, high = 1, math.ceil(round_trip_s / step)
     while not enough(high):
         low, high = high, math.ceil(1.5 * high)
     while high - low > 1:
@@ -165,16 +165,16 @@ def _limited(free: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> Propo
     return limited(low)
 
 
-def _hopeless(instance: Instance) -> bool:
-    """Whether a robot can collect nothing."""
+def _is_hopeless(instance: Instance) -> bool:
+    """Whether some robot can collect nothing."""
     for vehicle in instance.vehicles:
-        road = road_of(instance, vehicle)
-        if not any(quickest(road, (poi,)) for poi in instance.pois if vehicle.incentives[poi] > 0):
+        own_legs = vehicle_legs(instance, vehicle)
+        if not any(quickest_route(own_legs, (poi,)) for poi in instance.pois if vehicle.incentives[poi] > 0):
             return True
     return False
 
 
-def _trivial(instance: Instance) -> bool:
+def _is_trivial(instance: Instance) -> bool:
     """Whether all incentives can be collected, or that can't be ruled out.
 
     For that, each robot must visit the POIs where it alone earns most, and no tour is shorter than a spanning tree.
@@ -191,17 +191,17 @@ def _trivial(instance: Instance) -> bool:
     return nominal.bound is None or nominal.bound >= float(most.sum()) * (1 - 1e-6)
 
 
-def _pays(instance: Instance, certain: int) -> bool:
+def _planning_pays(instance: Instance, certain: int) -> bool:
     """Whether the certain robots would do better than in a plan for all, if the others all failed.
 
     Judged by good plans, not by proved ones: that is quick, and seldom wrong.
     """
     weights = _weights(instance)
     for_all = _good_orders(instance, weights, lambda value: False)  # noqa: ARG005
-    alone = weights.copy()
-    alone[certain:] = 0.0
-    otherwise = _worth(alone, for_all)
-    return _worth(alone, _good_orders(instance, alone, lambda value: value >= _PAYS * otherwise)) >= _PAYS * otherwise
+    single = weights.copy()
+    single[certain:] = 0.0
+    otherwise = _worth(single, for_all)
+    return _worth(single, _good_orders(instance, single, lambda value: value >= _PAYS * otherwise)) >= _PAYS * otherwise
 
 
 def _instance(proposal: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> Instance:
@@ -214,10 +214,10 @@ def _instance(proposal: Proposal, sites: Sequence[Site], fuel_s: FloatArray) -> 
             for name, earned in zip(proposal.robots, proposal.incentives, strict=True)))
 
 
-def _alone_s(instance: Instance, capacity_s: float) -> list[float]:
+def _single_visit_s(instance: Instance, capacity_s: float) -> list[float]:
     """Least time to visit each POI alone and come home on such fillings [s]; ``inf`` where they don't last."""
-    road = road_of(instance, replace(instance.vehicles[0], fuel_capacity_s=capacity_s))
-    drives = [quickest(road, (poi,)) for poi in instance.pois]
+    own_legs = vehicle_legs(instance, replace(instance.vehicles[0], fuel_capacity_s=capacity_s))
+    drives = [quickest_route(own_legs, (poi,)) for poi in instance.pois]
     return [math.inf if drive is None else drive.time_s for drive in drives]
 
 
@@ -226,9 +226,9 @@ def _weights(instance: Instance) -> FloatArray:
 
 
 def _good_orders(instance: Instance, weights: FloatArray, stop: Callable[[float], bool]) -> VisitOrders:
-    """A good plan; any one whose worth is enough to stop."""
+    """A good plan, or the first for whose value ``stop`` is true."""
     robots = len(weights)
-    return search(tables_of(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), starts=1,
+    return search(leg_tables(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), starts=1,
                   stop=stop).orders
 
 

@@ -10,7 +10,7 @@ Line = tuple[tuple[float, float], tuple[float, float]]
 
 _DOOR_M = (1.1, 1.5)  # widths of doors
 _JAMB_M = 0.4  # from a door to the nearest corner of a room
-_LOOPS = 0.35  # share of the doors beyond those that it takes to get everywhere
+_LOOPS = 0.35  # probability of each door beyond those of a spanning tree
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class _Room:
 
 @dataclass(frozen=True)
 class _Border:
-    """What two rooms have in common: a stretch of a wall, at x (axis 0) or y (axis 1) = ``at``."""
+    """The common part of two rooms' walls, at x (axis 0) or y (axis 1) = ``at``."""
 
     axis: int
     at: float
@@ -32,7 +32,7 @@ class _Border:
 
 
 def room_walls(size_m: float, least_m: float, rng: np.random.Generator) -> list[Line]:
-    """Inner walls of a square, as lines with gaps for doors; from each room there is a way to each other.
+    """Inner walls of a square, as lines with gaps for doors that connect all rooms.
 
     Rooms are halved, not in the middle, until they are small. Doors are made where two rooms have enough wall in
     common, first those of a random spanning tree, then some more.
@@ -68,27 +68,27 @@ def _halve(room: _Room, least: float, rooms: list[_Room], walls: list[_Border], 
     else:
         walls.append(_Border(1, at, room.x0, room.x1))
         parts = (_Room(room.x0, room.y0, room.x1, at), _Room(room.x0, at, room.x1, room.y1))
-    for part in parts:
-        _halve(part, least, rooms, walls, rng)
+    for component in parts:
+        _halve(component, least, rooms, walls, rng)
 
 
 def _doors(rooms: list[_Room], rng: np.random.Generator) -> list[_Border] | None:
-    """Doors by which all rooms hang together; ``None`` if some have too little wall in common."""
+    """Doors that connect all rooms; ``None`` if some have too little wall in common."""
     borders = [(a, b, border) for a in range(len(rooms)) for b in range(a)
                if (border := _border(rooms[a], rooms[b])) is not None]
-    part = list(range(len(rooms)))
+    component = list(range(len(rooms)))
     doors = []
     for k in rng.permutation(len(borders)):
         a, b, border = borders[int(k)]
-        loop = part[a] == part[b]
+        loop = component[a] == component[b]
         if not loop:
-            part = [part[a] if p == part[b] else p for p in part]
+            component = [component[a] if p == component[b] else p for p in component]
         elif rng.random() >= _LOOPS:
             continue
         width = round(float(rng.uniform(*_DOOR_M)), 1)
         start = round(float(rng.uniform(border.low + _JAMB_M, border.high - _JAMB_M - width)), 1)
         doors.append(_Border(border.axis, border.at, start, round(start + width, 1)))
-    return doors if len(set(part)) == 1 else None
+    return doors if len(set(component)) == 1 else None
 
 
 def _border(one: _Room, other: _Room) -> _Border | None:
@@ -105,7 +105,7 @@ def _border(one: _Room, other: _Room) -> _Border | None:
 
 
 def _pieces(wall: _Border, doors: list[_Border]) -> list[Line]:
-    """What a wall's doors leave of it."""
+    """The parts of a wall between its doors."""
     inside = sorted((door.low, door.high) for door in doors
                     if (door.axis, door.at) == (wall.axis, wall.at) and wall.low <= door.low and door.high <= wall.high)
     ends = [wall.low, *(end for door in inside for end in door), wall.high]

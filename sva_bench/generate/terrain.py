@@ -1,7 +1,7 @@
-"""Random terrain with sites: rooms, a field, aisles or a maze, which any built-in robot can drive all over.
+"""Random terrain with sites: rooms, a field, aisles or a maze, whose free space is connected for any built-in robot.
 
 That holds by construction. Walls leave doors, or are those of a maze without closed cells; whatever else stands there
-keeps a passage free around itself, so it can be driven round, and cuts nothing off.
+keeps a passage free around itself, so it disconnects nothing.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def random_terrain(family: WorldFamily, *, size_m: float, density: float, seed: 
         seed: Seed; each family, size and density draws otherwise from it.
 
     Raises:
-        BadInput: If so much does not fit with passages between.
+        BadInput: If the density is too high for passages between the obstacles.
     """
     which = key_of(family, repr(float(size_m)), repr(float(density)))
     rng = rng_for(seed, Stream.RANDOM_WORLD, _STREAMS["terrain"], *which)
@@ -96,16 +96,16 @@ def random_terrain(family: WorldFamily, *, size_m: float, density: float, seed: 
     if family == "aisles":
         return Terrain(bounds_m=bounds, shapes=_racks(size_m, density, scale, rng), remarks={0: "racks"})
     walls = _walls(room_walls(size_m, 4.2 * scale, rng)) if family == "rooms" else ()
-    things = _scattered(bounds, walls, density * size_m**2, scale * (_FURNITURE if walls else 1.0), rng)
-    covered = sum(map(_area_m2, things)) / size_m**2
+    scattered = _scattered(bounds, walls, density * size_m**2, scale * (_FURNITURE if walls else 1.0), rng)
+    covered = sum(map(_area_m2, scattered)) / size_m**2
     if density - covered > _MISSING:
         raise BadInput(f"a density of {density:g} does not fit {'rooms' if walls else 'a field'} of {size_m:g} m with "
                        f"passages of {PASSAGE_M:g} m between the obstacles: there was no more room at {covered:.2f}; "
                        "choose a lower one")
     remarks = {0: "inner walls, with doors"} if walls else {}
-    if things and walls:
+    if scattered and walls:
         remarks[len(walls)] = "furniture"
-    return Terrain(bounds_m=bounds, shapes=(*walls, *things), remarks=remarks)
+    return Terrain(bounds_m=bounds, shapes=(*walls, *scattered), remarks=remarks)
 
 
 def random_places(obstacles: Obstacles, *, stations: int, pois: int, seed: int) -> Places:
@@ -150,7 +150,7 @@ def _free_place(obstacles: Obstacles, others: Sequence[Point], rng: np.random.Ge
     """A random place with room for a robot and away from others; ``None`` if none turns up."""
     low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
     for _ in range(_TRIES):
-        x, y = (_on_grid(value) for value in rng.uniform(low, high))
+        x, y = (_to_grid(value) for value in rng.uniform(low, high))
         if all(math.dist((x, y), other) >= APART_M for other in others) and clearance(obstacles, x, y) >= SITE_ROOM_M:
             return x, y
     return None
@@ -167,7 +167,7 @@ def _racks(size_m: float, density: float, scale: float, rng: np.random.Generator
     """
     edge, cross, narrowest = 1.4 * scale, 1.6 * scale, 1.2 * math.sqrt(scale)
     cuts = int(rng.integers(1, max(round(size_m / scale / 8), 1) + 1))
-    length = _on_grid((size_m - 2 * edge - cuts * cross) / (cuts + 1))
+    length = _to_grid((size_m - 2 * edge - cuts * cross) / (cuts + 1))
     wanted_m2, depth = density * size_m**2, float(rng.uniform(0.7, 1.1)) * scale
     ideal = wanted_m2 / (depth * length * (cuts + 1))
     missing = rng.random((200, cuts + 1)) < 0.1
@@ -185,9 +185,9 @@ def _racks(size_m: float, density: float, scale: float, rng: np.random.Generator
                        f"{'lower' if ideal > 1 else 'higher'} one")
     shapes = []
     for row in range(rows):
-        across = _tidy(aisle + row * (deep + aisle) + deep / 2)
+        across = _rounded(aisle + row * (deep + aisle) + deep / 2)
         for bay in range(cuts + 1):
-            along = _tidy(edge + bay * (length + cross) + length / 2)
+            along = _rounded(edge + bay * (length + cross) + length / 2)
             if not missing[row, bay]:
                 shapes.append({"box": [across, along] if turned else [along, across],
                                "size_m": [deep, length] if turned else [length, deep]})
@@ -202,15 +202,15 @@ def _scattered(
     area_m2 = min(area_m2, _FULL * (bounds[2] - bounds[0]) * (bounds[3] - bounds[1]))
     drawn: list[Shape] = []
     while (left := area_m2 - sum(map(_area_m2, drawn))) > 0.1:
-        drawn.append(_thing(left, scale, rng))
-    todo = sorted(drawn, key=_area_m2, reverse=True)  # the large ones while there is room
+        drawn.append(_random_shape(left, scale, rng))
+    remaining = sorted(drawn, key=_area_m2, reverse=True)  # the large ones while there is room
     placed: list[Shape] = []
     failed = 0
-    while todo:
+    while remaining:
         obstacles = _obstacles(bounds, [*walls, *placed])
-        shape = todo.pop(0)
+        shape = remaining.pop(0)
         for _ in range(_TRIES):
-            at = [_on_grid(value) for value in rng.uniform(bounds[:2], bounds[2:])]
+            at = [_to_grid(value) for value in rng.uniform(bounds[:2], bounds[2:])]
             moved = {**shape, next(iter(shape)): at}
             if _gap_m(obstacles, moved) >= PASSAGE_M:
                 placed.append(moved)
@@ -219,30 +219,30 @@ def _scattered(
             failed += 1
             if _area_m2(shape) < 0.2 or failed == _FAILED:
                 break
-            todo = sorted([*todo, *_halves(shape)], key=_area_m2, reverse=True)
+            remaining = sorted([*remaining, *_halves(shape)], key=_area_m2, reverse=True)
     return tuple(sorted(placed, key=lambda shape: ("cylinder" in shape, -_area_m2(shape))))
 
 
-def _thing(most_m2: float, scale: float, rng: np.random.Generator) -> Shape:
-    """A box or a post somewhere, not much larger than an area."""
-    radius = _tidy(float(rng.uniform(0.3, 0.7)) * scale, 0.05)
-    size = [_tidy(float(rng.uniform(*sides)) * scale, 0.1) for sides in ((0.8, 2.6), (0.6, 1.6))]
+def _random_shape(most_m2: float, scale: float, rng: np.random.Generator) -> Shape:
+    """A random box or post of at most about a given area."""
+    radius = _rounded(float(rng.uniform(0.3, 0.7)) * scale, 0.05)
+    size = [_rounded(float(rng.uniform(*sides)) * scale, 0.1) for sides in ((0.8, 2.6), (0.6, 1.6))]
     yaw = 5 * int(rng.integers(-17, 19))
     post = bool(rng.random() < 0.4)
     shape: Shape = {"cylinder": [0.0, 0.0], "radius_m": radius} if post else {
         "box": [0.0, 0.0], "size_m": size, "yaw_deg": yaw}
     if _area_m2(shape) > most_m2 + 0.2:
-        shape = {"cylinder": [0.0, 0.0], "radius_m": max(_tidy(math.sqrt(most_m2 / math.pi), 0.05), 0.1)}
+        shape = {"cylinder": [0.0, 0.0], "radius_m": max(_rounded(math.sqrt(most_m2 / math.pi), 0.05), 0.1)}
     return shape
 
 
 def _halves(shape: Shape) -> tuple[Shape, Shape]:
-    """Two shapes that cover together what one does, to the rounding."""
+    """Two shapes of half the area each, but for rounding."""
     if "cylinder" in shape:
-        half = {**shape, "radius_m": _tidy(shape["radius_m"] / math.sqrt(2))}
+        half = {**shape, "radius_m": _rounded(shape["radius_m"] / math.sqrt(2))}
     else:
         long, short = max(shape["size_m"]), min(shape["size_m"])
-        half = {**shape, "size_m": [_tidy(long / 2), short]}
+        half = {**shape, "size_m": [_rounded(long / 2), short]}
     return half, half
 
 
@@ -257,9 +257,9 @@ def _gap_m(obstacles: Obstacles, shape: Shape) -> float:
     if "cylinder" in shape:
         return clearance(obstacles, *shape["cylinder"]) - float(shape["radius_m"])
     (x, y), (length, width), yaw = shape["box"], shape["size_m"], math.radians(shape["yaw_deg"])
-    quickly = clearance(obstacles, x, y) - float(min(length, width)) / 2
-    if quickly < PASSAGE_M:
-        return quickly  # no exact distance, but an upper bound, and too little
+    upper_bound = clearance(obstacles, x, y) - float(min(length, width)) / 2
+    if upper_bound < PASSAGE_M:
+        return upper_bound  # no exact distance, but an upper bound, and too little
     turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
     half = np.array([[length, width], [-length, width], [-length, -width], [length, -width]]) / 2
     corners: FloatArray = half @ turn.T + (x, y)
@@ -272,10 +272,10 @@ def _obstacles(bounds: tuple[float, float, float, float], shapes: Sequence[Shape
     return obstacles_of(Shapes.model_validate({"bounds_m": list(bounds), "obstacles": [dict(s) for s in shapes]}))
 
 
-def _on_grid(value: float) -> float:
-    return _tidy(value, _GRID_M)
+def _to_grid(value: float) -> float:
+    return _rounded(value, _GRID_M)
 
 
-def _tidy(value: float, step: float = 0.01) -> float:
-    """The nearest multiple of a step, without the last digits that floats leave."""
+def _rounded(value: float, step: float = 0.01) -> float:
+    """The nearest multiple of a step, without floating-point residue."""
     return round(round(value / step) * step, 6)

@@ -17,7 +17,7 @@ from sva_bench.files.documents import Loc, parse_yaml
 from sva_bench.files.fields import NAME
 from sva_bench.files.yaml_text import pretty_yaml
 from sva_bench.generate.terrain import DENSITY, random_places, random_terrain
-from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
+from sva_bench.geometry.cells import MAX_BOXES, TooManyBoxes, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -29,7 +29,7 @@ from sva_bench.world.load import world_of
 from sva_bench.world.maps.files import MapFile
 from sva_bench.world.maps.formats import format_of
 from sva_bench.world.model import MapSource
-from sva_bench.world.places import NoRoom, Point, enclosed_beside, field_of, find_places
+from sva_bench.world.places import NoRoom, Places, Point, enclosed_beside, field_of, find_places
 from sva_bench.world.schema import KIND
 
 _log = logging.getLogger(__name__)
@@ -56,7 +56,7 @@ def random_world(
     Args:
         family: What stands there.
         size_m: Side of the square.
-        density: How full it is (``random_terrain``); default: the family's.
+        density: Density (``random_terrain``); default: the family's.
         pois, stations, robots: How many of each.
         seed: Seed of everything.
         progress: Told how far it is.
@@ -114,11 +114,40 @@ def world_from_map(
     section: dict[str, Any] = {form.key: {**told, "file": f"{name}-map/{read[0].name}"}}
     try:
         obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes_of(cells), cylinders=np.empty((0, 3)), cells=cells)
-    except TooRagged:
+    except TooManyBoxes:
         raise BadInput(f"{source}: its occupied cells take more than the {MAX_BOXES} boxes that physics holds; clean "
                        "the map of speckles, or cut it") from None
-    radius = BUILT_IN[USUAL_MODEL].radius_m
     progress("placing the sites", 0, 1)
+    places, spacing = _placed(source, obstacles, base=base, pois=pois, stations=stations, spacing_m=spacing_m,
+                              seed=seed)
+    progress("placing the sites", 1, 1)
+    asked = "" if base is None else f" --base {base[0]:g} {base[1]:g}"
+    asked += "".join(f" --{key.replace('_', '-')} {value if isinstance(value, str) else f'{value:g}'}"
+                     for key, value in told.items() if key != "file")
+    asked += "" if spacing_m is None else f" --min-spacing {spacing_m:g}"
+    remarks: dict[Loc, str] = {
+        (): f"A mission on a map: sva-bench world from-map {source.name}\n"
+            f"--pois {pois} --stations {stations} --robots {robots} --seed {seed}{asked}",
+        ("sites", "base"): "in the middle of the largest region that walls enclose" if base is None else "as asked for",
+        ("sites", "stations"): "each as far as can be from base and stations before it, by path length",
+        ("sites", "pois"): f"drawn from what is reached from the base, {spacing:g} m from each other at least"}
+    data = {"map": section, "sites": sites_section(places.base, places.stations, places.pois)}
+    files = tuple(replace(file, name=f"{name}-map/{file.name}") for file in read)
+    ground = (obstacles, MapSource(section=section, files=files))
+    text = with_mission(name, data, remarks, robots=robots, seed=seed, path=target, progress=progress, ground=ground)
+    return text, files
+
+
+def _placed(
+    source: Path, obstacles: Obstacles, *, base: Point | None, pois: int, stations: int, spacing_m: float | None,
+    seed: int,
+) -> tuple[Places, float]:
+    """Places of a mission's sites on a map, and their spacing [m]; warns if they may be outside the building.
+
+    Raises:
+        BadInput: If they don't fit.
+    """
+    radius = BUILT_IN[USUAL_MODEL].radius_m
     try:
         if base is not None and clearance(obstacles, *base) < radius:
             raise NoRoom("base", 0, 0.0)
@@ -130,26 +159,11 @@ def world_from_map(
         said = f"there is no room {where}" if error.kind == "base" else str(error)
         raise BadInput(f"{source}: for a robot of radius {radius} m, {said}; choose fewer sites, another base, or "
                        "another map") from None
-    progress("placing the sites", 1, 1)
     if (beside := enclosed_beside(field, places.base, radius)) is not None:
         area, (x, y) = beside
         _log.warning("%s: the sites are in a region that reaches the map's rim, maybe outside of all walls; the "
                      "largest that walls enclose has %.3g m2: --base %g %g", source, area, x, y)
-    asked = "" if base is None else f" --base {base[0]:g} {base[1]:g}"
-    asked += "".join(f" --{key.replace('_', '-')} {value if isinstance(value, str) else f'{value:g}'}"
-                     for key, value in told.items() if key != "file")
-    asked += "" if spacing_m is None else f" --min-spacing {spacing_m:g}"
-    remarks: dict[Loc, str] = {
-        (): f"A mission on a map: sva-bench world from-map {source.name}\n"
-            f"--pois {pois} --stations {stations} --robots {robots} --seed {seed}{asked}",
-        ("sites", "base"): "in the middle of the largest region that walls enclose" if base is None else "as asked for",
-        ("sites", "stations"): "each as far as can be from base and stations before it, by the way there",
-        ("sites", "pois"): f"drawn from what is reached from the base, {spacing:g} m from each other at least"}
-    data = {"map": section, "sites": sites_section(places.base, places.stations, places.pois)}
-    files = tuple(replace(file, name=f"{name}-map/{file.name}") for file in read)
-    ground = (obstacles, MapSource(section=section, files=files))
-    text = with_mission(name, data, remarks, robots=robots, seed=seed, path=target, progress=progress, ground=ground)
-    return text, files
+    return places, spacing
 
 
 def sites_section(base: Point, stations: tuple[Point, ...], pois: tuple[Point, ...]) -> dict[str, Any]:

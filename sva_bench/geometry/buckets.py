@@ -1,7 +1,7 @@
 """Whether points and segments keep a clearance, exactly and fast among thousands of obstacles.
 
-A grid of buckets knows which solids come near each: a segment is held against those of the buckets that it runs
-through. Everything lies in one array, since handing over an array costs a compiled function more than the check.
+A uniform grid of buckets lists the solids near each bucket: a segment is checked against those of the buckets that it
+crosses. All is packed into one array, since passing an array costs a compiled function more than the check.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.geometry.distances import point_box, point_segment, segment_box
 from sva_bench.geometry.obstacles import Obstacles
 
-_BUCKETS = 65_536  # at most about so many
-_HEAD = 14  # numbers before the arrays: bounds, clearance, slack, side, columns, rows, boxes, cylinders, 3 offsets
+_BUCKETS = 65_536  # about the greatest number of buckets
+_HEAD = 14  # numbers before the arrays: 4 bounds, clearance, side, columns, rows, boxes, cylinders, 3 offsets, 0
 
 
 def clearance_checker(obstacles: Obstacles, clearance_m: float, slack_m: float = 0.0) -> FloatArray:
-    """What ``keeps_clear`` asks: obstacles in buckets, packed into one array.
+    """Obstacles in buckets, packed into one array for ``keeps_clear``.
 
     Args:
-        obstacles: What stands in the way.
-        clearance_m: Distance to keep from them.
-        slack_m: By how much less still counts.
+        obstacles: The obstacles.
+        clearance_m: Distance to keep from them [m].
+        slack_m: Violation that is accepted [m].
     """
     needed = clearance_m - slack_m
     x0, y0, x1, y1 = obstacles.bounds_m.tolist()
@@ -45,7 +45,7 @@ def clearance_checker(obstacles: Obstacles, clearance_m: float, slack_m: float =
 def _buckets(
     boxes: FloatArray, cylinders: FloatArray, x0: float, y0: float, side: float, columns: int, rows: int, reach: float
 ) -> tuple[IntArray, IntArray]:
-    """Which solids come within reach of each bucket: boxes by number, then cylinders."""
+    """The solids within reach of each bucket, in compressed rows: where each bucket's begin, and their numbers."""
     half = 0.5 * side * math.sqrt(2.0) * (1 + 1e-9)  # of the bucket's circle
     starts = np.zeros(columns * rows + 1, dtype=np.int64)
     items = np.empty(0, dtype=np.int64)
@@ -87,12 +87,12 @@ def _buckets(
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def keeps_clear(checker: FloatArray, ax: float, ay: float, bx: float, by: float) -> bool:
     """Whether a segment keeps the checker's clearance from all obstacles and the bounds; equal ends make it a point."""
-    return bool(solids_passed(checker, ax, ay, bx, by) > 0)
+    return bool(checks_made(checker, ax, ay, bx, by) > 0)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def solids_passed(checker: FloatArray, ax: float, ay: float, bx: float, by: float) -> int:
-    """The same, and what it took: 1 + the solids and buckets that a segment was held against, negative if too near."""
+def checks_made(checker: FloatArray, ax: float, ay: float, bx: float, by: float) -> int:
+    """The same with the work done: 1 + the number of solids and buckets checked; negative if too near."""
     passed = 1
     x0, y0, x1, y1, needed, side = checker[:6]
     if min(min(ax, bx) - x0, min(ay, by) - y0, x1 - max(ax, bx), y1 - max(ay, by)) < needed:
@@ -103,12 +103,12 @@ def solids_passed(checker: FloatArray, ax: float, ay: float, bx: float, by: floa
         ax, ay, bx, by = bx, by, ax, ay
     along_x, along_y, mx, my = bx - ax, by - ay, 0.5 * (ax + bx), 0.5 * (ay + by)
     long = math.sqrt(along_x * along_x + along_y * along_y)
-    # A steep one is held against all rows between its ends: few columns, and no rounding blown up by the slope.
+    # A steep segment is checked against all rows between its ends: few columns, and no rounding amplified by the slope.
     slope = (by - ay) / (bx - ax) if bx - ax > 1e-3 * abs(by - ay) else 0.0
     first = min(max(math.floor((ax - x0) / side - 1e-6), 0), columns - 1)
     last = min(max(math.floor((bx - x0) / side + 1e-6), 0), columns - 1)
     for column in range(first, last + 1):
-        # The stretch of the segment within this column, and the rows that it runs through.
+        # The part of the segment within this column, and the rows that it crosses.
         ya, yb = ay, by
         if slope != 0.0:
             if column > first:
@@ -126,8 +126,8 @@ def solids_passed(checker: FloatArray, ax: float, ay: float, bx: float, by: floa
                 if k < boxes:
                     b = _HEAD + 6 * k
                     cx, cy, hx, hy = checker[b], checker[b + 1], checker[b + 2], checker[b + 3]
-                    # Most boxes lie far from the segment's line, or from the circle about it: said at once, without
-                    # roots, with more to spare than rounding takes.
+                    # Quick rejection, without square roots: most boxes are far from the segment's line, or from the
+                    # circle about it, by more than rounding.
                     far = (hx + hy + needed) * (1 + 1e-9) + 1e-9
                     if abs(along_x * (cy - ay) - along_y * (cx - ax)) > far * long:
                         continue
@@ -144,7 +144,7 @@ def solids_passed(checker: FloatArray, ax: float, ay: float, bx: float, by: floa
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def clear_points(checker: FloatArray, points: FloatArray) -> BoolArray:
-    """Which points keep the clearance, shape (n,)."""
+    """Which points keep the checker's clearance, shape (n,)."""
     found = np.empty(len(points), dtype=np.bool_)
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
@@ -153,7 +153,13 @@ def clear_points(checker: FloatArray, points: FloatArray) -> BoolArray:
 
 
 def keeps_clearance(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> BoolArray:
-    """Which points of the world are at least so far from every obstacle and the bounds, shape (n,)."""
+    """Which points keep a distance from every obstacle and the bounds, shape (n,).
+
+    Args:
+        obstacles: The obstacles.
+        points: The points [m], shape (n, 2).
+        clearance_m: The distance [m].
+    """
     found: BoolArray = clear_points(clearance_checker(obstacles, clearance_m),
                                     np.ascontiguousarray(points, dtype=np.float64))
     return found
@@ -161,7 +167,7 @@ def keeps_clearance(obstacles: Obstacles, points: FloatArray, clearance_m: float
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _distances(checker: FloatArray, points: FloatArray) -> FloatArray:
-    """Exact distances from points to what is nearest, looking from bucket to bucket outwards; 0 inside a solid."""
+    """Exact distances from points to the nearest solid or bound [m], searching buckets outwards; 0 inside a solid."""
     x0, y0, x1, y1, _, side = checker[:6]
     columns, rows, boxes = int(checker[6]), int(checker[7]), int(checker[8])
     at_cylinders, at_starts, at_items = int(checker[10]), int(checker[11]), int(checker[12])
@@ -174,7 +180,7 @@ def _distances(checker: FloatArray, points: FloatArray) -> FloatArray:
         ring = 0
         while nearest > (ring - 1 - 1e-6) * side and nearest > 0:
             for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
-                # The ring's whole lowest and highest row, and of those between the two ends.
+                # All of the ring's lowest and highest row; of the rows between, the two ends.
                 step = 1 if abs(r - row) == ring else max(2 * ring, 1)
                 for c in range(column - ring, column + ring + 1, step):
                     if c < 0 or c >= columns:
@@ -200,30 +206,31 @@ def clearances(obstacles: Obstacles, points: FloatArray) -> FloatArray:
     return found
 
 
-def open_heading(obstacles: Obstacles, x: float, y: float, checker: FloatArray | None = None) -> float:
-    """The heading with the longest free view from a point [rad], in steps of 5 degrees.
+def longest_view_heading(obstacles: Obstacles, x: float, y: float, checker: FloatArray | None = None) -> float:
+    """The heading of the longest free line of sight from a point [rad], in steps of 5 degrees.
 
-    A robot that stops so leaves without turning away from a wall first. Ties go to the smallest angle.
+    A robot that stops in it need not turn away from a wall to leave. Ties go to the smallest angle.
 
     Args:
-        obstacles: What blocks the view.
+        obstacles: The obstacles.
         x, y: The point [m].
-        checker: As ``view_checker`` makes it, where many points are asked for; ``None`` = made here.
+        checker: From ``sight_checker``, to be reused for many points; ``None`` = made here.
     """
     views = np.deg2rad(np.arange(0.0, 360.0, 5.0))
     x0, y0, x1, y1 = obstacles.bounds_m
-    lengths = _views(view_checker(obstacles) if checker is None else checker, x, y, views, math.hypot(x1 - x0, y1 - y0))
+    checker = sight_checker(obstacles) if checker is None else checker
+    lengths = _views(checker, x, y, views, math.hypot(x1 - x0, y1 - y0))
     return float(views[int(np.argmax(np.round(lengths, 6)))])
 
 
-def view_checker(obstacles: Obstacles) -> FloatArray:
-    """What ``open_heading`` asks: a line of sight keeps any distance at all."""
+def sight_checker(obstacles: Obstacles) -> FloatArray:
+    """The checker of ``longest_view_heading``: a line of sight keeps any positive distance."""
     return clearance_checker(obstacles, 1e-300)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _views(checker: FloatArray, x: float, y: float, angles: FloatArray, far: float) -> FloatArray:
-    """Lengths of the free straight lines from a point [m], to a millimetre."""
+    """Lengths of the free lines of sight from a point [m], to a millimetre, shape (angles,)."""
     lengths = np.empty(len(angles))
     for k in range(len(angles)):
         low, high = 0.0, far

@@ -1,4 +1,4 @@
-"""Occupancy grids: cells, the few boxes that cover them, distances to them, and what of them is connected."""
+"""Occupancy grids: cells, a small cover by boxes, the distance transform, and connected regions."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from scipy.ndimage import label
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray, frozen
 
-MAX_BOXES = 50_000  # a compound body of so many takes physics 1.5 s to build and 200 MB
+MAX_BOXES = 50_000  # a compound body of 50 000 boxes takes physics 1.5 s and 200 MB to build
 
 
-class TooRagged(ValueError):
-    """Occupied cells that few boxes don't cover."""
+class TooManyBoxes(ValueError):
+    """Occupied cells whose cover needs more than ``MAX_BOXES`` boxes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cells:
-    """An occupancy grid. All that lies outside it is occupied.
+    """An occupancy grid; everything outside it is occupied.
 
     Attributes:
         occupied: Shape (rows, columns); row 0 is the lowest, column 0 the leftmost in the grid's own frame.
-        cell_m: Side of a cell.
+        cell_m: Side of a cell [m].
         origin: x, y [m] of the grid's lower left corner, and the yaw [rad] of its own frame; shape (3,).
-        unknown: Which of the occupied cells only count as such, since nothing is known of them; for display.
-            ``None`` where the map makes no difference.
+        unknown: Which of the occupied cells are unknown, taken as occupied; for display, shape (rows, columns).
+            ``None`` where the map doesn't distinguish them.
     """
 
     occupied: BoolArray
@@ -54,21 +54,21 @@ class Cells:
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Length along the grid's own x and y."""
+        """Lengths along the grid's own x and y [m]."""
         rows, columns = self.occupied.shape
         return columns * self.cell_m, rows * self.cell_m
 
     def to_world(self, points: FloatArray) -> FloatArray:
-        """Points of the grid's own frame [m], shape (n, 2), in the world."""
+        """World coordinates of points in the grid's own frame; both [m], shape (n, 2)."""
         x, y, yaw = self.origin.tolist()
         c, s = math.cos(yaw), math.sin(yaw)
-        # Upright grids lie exactly where the file says, not to a rounding.
+        # Without yaw the origin is added alone, which is exact.
         turned = points if yaw == 0 else points @ np.array([[c, s], [-s, c]])
         result: FloatArray = turned + np.array([x, y])
         return result
 
     def from_world(self, points: FloatArray) -> FloatArray:
-        """Points of the world [m], shape (n, 2), in the grid's own frame."""
+        """Coordinates in the grid's own frame of points of the world; both [m], shape (n, 2)."""
         x, y, yaw = self.origin.tolist()
         c, s = math.cos(yaw), math.sin(yaw)
         result: FloatArray = (points - np.array([x, y])) @ np.array([[c, -s], [s, c]])
@@ -76,7 +76,7 @@ class Cells:
 
 
 def bounds_of(cells: Cells) -> FloatArray:
-    """The upright rectangle about a grid: x_min, y_min, x_max, y_max [m]."""
+    """The axis-aligned bounding box of a grid: x_min, y_min, x_max, y_max [m], shape (4,)."""
     width, height = cells.size_m
     corners = cells.to_world(np.array([[0.0, 0], [width, 0], [width, height], [0, height]]))
     bounds: FloatArray = np.concatenate([corners.min(axis=0), corners.max(axis=0)])
@@ -84,9 +84,12 @@ def bounds_of(cells: Cells) -> FloatArray:
 
 
 def boxes_of(cells: Cells) -> FloatArray:
-    """Boxes that cover exactly what of the grid's upright rectangle is not free, as in ``Obstacles``; shape (k, 5).
+    """Boxes that cover exactly the occupied part of the grid's bounding box, as in ``Obstacles``; shape (k, 5).
 
-    Where the grid stands askew, four boxes more fill what its rectangle has outside the grid.
+    For a rotated grid four more boxes fill the bounding box outside the grid.
+
+    Raises:
+        TooManyBoxes: If the cover needs more than ``MAX_BOXES``.
     """
     yaw = float(cells.origin[2])
     spans = cover(cells.occupied) * cells.cell_m  # x0, y0, x1, y1
@@ -101,19 +104,19 @@ def boxes_of(cells: Cells) -> FloatArray:
 
 
 def cover(occupied: BoolArray) -> FloatArray:
-    """Few disjoint rectangles that cover the occupied cells and nothing else.
+    """A small set of disjoint rectangles that covers exactly the occupied cells.
 
-    Runs of a row are merged with equal runs above them; the same along columns, and the fewer of both are taken.
+    Runs of a row are merged with equal runs above them; the same along columns; the smaller of the two is taken.
 
     Returns:
         x0, y0, x1, y1 in cells; shape (k, 4).
 
     Raises:
-        TooRagged: If there would be more than ``MAX_BOXES``.
+        TooManyBoxes: If there would be more than ``MAX_BOXES``.
     """
     across, along = _merged_runs(occupied, MAX_BOXES), _merged_runs(np.ascontiguousarray(occupied.T), MAX_BOXES)
     if min(len(across), len(along)) > MAX_BOXES:
-        raise TooRagged(f"more than {MAX_BOXES} boxes")
+        raise TooManyBoxes(f"more than {MAX_BOXES} boxes")
     best = across if len(across) <= len(along) else along[:, [1, 0, 3, 2]]
     spans: FloatArray = best.astype(np.float64)
     return spans
@@ -121,7 +124,7 @@ def cover(occupied: BoolArray) -> FloatArray:
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _merged_runs(occupied: BoolArray, most: int) -> IntArray:
-    """The rectangles; it stops when there is one more than ``most``."""
+    """The rectangles of merged runs, shape (k, 4); it stops at ``most`` + 1."""
     rows, columns = occupied.shape
     found = np.empty((16, 4), dtype=np.int64)
     count = 0
@@ -153,28 +156,28 @@ def _merged_runs(occupied: BoolArray, most: int) -> IntArray:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DistanceField:
-    """How far it is from places all over a grid to the nearest occupied cell, or to the grid's rim.
+    """Distances from the nodes of a lattice to the nearest occupied cell, or to the grid's boundary.
 
-    The places are the corners, the midpoints of the sides and the centres of all cells: a lattice of half cells. From
-    there the nearest point of a square cell is one of the lattice too, so the distances are exact; and between two
-    neighbours on the lattice nothing is nearer than at the nearer of the two.
+    The nodes are the corners, the midpoints of the sides and the centres of all cells: a lattice of half cells. The
+    nearest point of a square cell to a node is a node too, so the distances are exact; and on the line between two
+    neighbouring nodes no point is nearer to an obstacle than the nearer node.
 
     Attributes:
         cells: The grid.
-        distance_m: Shape (2 rows + 1, 2 columns + 1); 0 on occupied cells and their rims.
+        distance_m: Shape (2 rows + 1, 2 columns + 1) [m]; 0 on occupied cells and their boundaries.
     """
 
     cells: Cells
     distance_m: NDArray[np.float32]
 
     def index_of(self, points: FloatArray) -> IntArray:
-        """Nearest lattice place of points of the world, as row and column; shape (n, 2)."""
+        """Row and column of the node nearest to each point of the world [m], shape (n, 2)."""
         steps = np.round(self.cells.from_world(points) / (self.cells.cell_m / 2)).astype(np.int64)
         rows, columns = self.distance_m.shape
         return np.column_stack([np.clip(steps[:, 1], 0, rows - 1), np.clip(steps[:, 0], 0, columns - 1)])
 
     def places(self, index: IntArray) -> FloatArray:
-        """Lattice places given as rows and columns, in the world [m]."""
+        """World coordinates of nodes given as rows and columns [m], shape (n, 2)."""
         return self.cells.to_world(index[:, ::-1].astype(np.float64) * (self.cells.cell_m / 2))
 
 
@@ -182,7 +185,7 @@ def distance_field(cells: Cells) -> DistanceField:
     """Exact distances on the lattice of half cells.
 
     Source:
-        Felzenszwalb & Huttenlocher (2012), Distance transforms of sampled functions.
+        Felzenszwalb & Huttenlocher (2012), "Distance transforms of sampled functions".
     """
     squared = _squared_distances(cells.occupied)
     return DistanceField(cells=cells, distance_m=np.sqrt(squared) * np.float32(cells.cell_m / 2))
@@ -238,25 +241,30 @@ def _squared_distances(occupied: BoolArray) -> NDArray[np.float32]:
 
 
 def connected_region(field: DistanceField, point: FloatArray, radius_m: float) -> BoolArray:
-    """Places of the lattice that a robot surely reaches from a point, as ``DistanceField.distance_m``; shape (2,) in.
+    """Nodes that a robot can reach from a point along the lattice, of the shape of ``DistanceField.distance_m``.
 
-    A path through passages less than a cell wider than the robot may be overlooked; none is found that doesn't exist.
+    Conservative: passages less than a cell wider than the robot may be missed.
+
+    Args:
+        field: The distances.
+        point: The point [m], shape (2,).
+        radius_m: Radius of the robot [m].
     """
     row, column = field.index_of(np.asarray(point, dtype=np.float64)[None])[0].tolist()
-    # float32 rounds by 1e-7 of the distance; so much closer than the radius is not close.
+    # float32 rounds by 1e-7 of the distance; 1e-6 covers it.
     roomy = field.distance_m >= radius_m * (1 - 1e-6)
-    parts, _ = label(roomy)
-    mine = parts[row, column]
-    region: BoolArray = (parts == mine) & (mine > 0)
+    components, _ = label(roomy)
+    component = components[row, column]
+    region: BoolArray = (components == component) & (component > 0)
     return region
 
 
 def convex_corners(cells: Cells) -> FloatArray:
-    """Corners of the occupied area that stick out: where shortest paths bend.
+    """Convex corners of the occupied area, about which shortest paths bend.
 
     Returns:
-        Corner x, y in the grid's own frame [m], and the signs of the quadrant that is free of its cell: the corner's
-        cell lies at (-sx, -sy) of it; shape (k, 4).
+        Corner x, y in the grid's own frame [m], and the signs of the quadrant opposite to its cell: the corner's
+        cell lies in the direction (-sx, -sy); shape (k, 4).
     """
     solid = np.pad(cells.occupied, 1, constant_values=True)
     found = []

@@ -12,6 +12,7 @@ from sva_bench.geometry.obstacles import Obstacles
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Distance from the point p to the segment ab [m]."""
     dx, dy = bx - ax, by - ay
     squared = dx * dx + dy * dy
     t = 0.0 if squared == 0.0 else min(max(((px - ax) * dx + (py - ay) * dy) / squared, 0.0), 1.0)
@@ -20,12 +21,13 @@ def point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: flo
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def point_box(px: float, py: float, hx: float, hy: float) -> float:
+    """Distance from the point p to an axis-aligned box about the origin with half sides hx, hy [m]; 0 inside."""
     return math.hypot(max(abs(px) - hx, 0.0), max(abs(py) - hy, 0.0))
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _meets_box(ax: float, ay: float, bx: float, by: float, hx: float, hy: float) -> bool:
-    """Whether a segment meets a box about the origin (slab test)."""
+    """Whether the segment ab meets an axis-aligned box about the origin (slab test)."""
     low, high = 0.0, 1.0
     for start, move, half in ((ax, bx - ax, hx), (ay, by - ay, hy)):
         if move == 0.0:
@@ -42,14 +44,14 @@ def segment_box(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, hx: float, hy: float, c: float, s: float,
     far: float,
 ) -> float:
-    """Distance from a segment to a box [m]; ``inf`` if it is surely more than ``far``.
+    """Distance from a segment to a box [m]; ``inf`` if a bound shows that it exceeds ``far``.
 
     Args:
         ax, ay, bx, by: Ends of the segment [m].
         cx, cy, hx, hy, c, s: Centre, half length, half width [m], cosine and sine of the yaw.
-        far: Distance beyond which none is needed.
+        far: Distance beyond which the exact one is not needed [m].
     """
-    # Circles about both say quickly that most boxes are far away.
+    # Bounding circles reject most boxes quickly.
     mx, my, half = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * math.hypot(bx - ax, by - ay)
     if math.hypot(mx - cx, my - cy) - half - math.hypot(hx, hy) > far:
         return math.inf
@@ -75,7 +77,7 @@ def segment_distance(
     Args:
         bounds, boxes, cylinders: As in ``Obstacles``.
         ax, ay, bx, by: Ends of the segment [m]; equal ends make it a point.
-        enough: Stop looking once the distance is known to be below this; ``-inf`` for the exact distance.
+        enough: The search stops once the distance is below this [m]; ``-inf`` for the exact distance.
     """
     nearest = min(min(ax, bx) - bounds[0], min(ay, by) - bounds[1], bounds[2] - max(ax, bx), bounds[3] - max(ay, by))
     for k in range(len(cylinders)):

@@ -1,4 +1,4 @@
-"""What a robot can hit, as arrays."""
+"""Obstacles as arrays."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sva_bench.seeds import key_of
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Obstacles:
-    """Everything that a robot can hit.
+    """All obstacles of a world.
 
     Attributes:
-        bounds_m: x_min, y_min, x_max, y_max; walls stand around them. Shape (4,).
+        bounds_m: x_min, y_min, x_max, y_max [m], surrounded by walls; shape (4,).
         boxes: Centre x, y, half length, half width [m], yaw [rad]; shape (k, 5). Walls are boxes too.
         cylinders: Centre x, y, radius [m]; shape (c, 3).
-        cells: The occupancy grid that ``boxes`` cover, where there is one: what it holds, the boxes hold already.
+        cells: The occupancy grid that ``boxes`` cover exactly; ``None`` for obstacles given as shapes.
     """
 
     bounds_m: FloatArray
@@ -33,15 +33,19 @@ class Obstacles:
         object.__setattr__(self, "cylinders", frozen(self.cylinders, (None, 3)))
 
     def key(self) -> tuple[int, ...]:
-        """Index of random streams that belong to this ground: another ground has others."""
-        if self.cells is not None:  # however they are covered by boxes
+        """Key of random streams for these obstacles; other obstacles have other streams."""
+        if self.cells is not None:  # independent of how boxes cover them
             cells = self.cells
             return key_of(np.packbits(cells.occupied).tobytes(), repr(cells.occupied.shape),
                           repr(np.append(cells.origin, cells.cell_m).tolist()))
         return key_of(*(repr(part.tolist()) for part in (self.bounds_m, self.boxes, self.cylinders)))
 
     def walled(self, thickness_m: float) -> Obstacles:
-        """The same, with the walls about the bounds as boxes, the first four."""
+        """The same obstacles with the walls around the bounds as the first four boxes.
+
+        Args:
+            thickness_m: Thickness of these walls [m].
+        """
         x0, y0, x1, y1 = self.bounds_m.tolist()
         cx, cy, hx, hy, t = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2, thickness_m / 2
         walls = [(x0 - t, cy, t, hy + 2 * t, 0.0), (x1 + t, cy, t, hy + 2 * t, 0.0),

@@ -1,4 +1,4 @@
-"""How wide a robot may be and still get from place to place."""
+"""The widest clearance at which points are connected."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import distance_field
 from sva_bench.geometry.obstacles import Obstacles
 
-_FINEST_M, _PLACES = 0.02, 1_000_000  # finest lattice among shapes, and most places of it
-_STEPS = 16  # halvings of the range of radii
+_FINEST_M, _PLACES = 0.02, 1_000_000  # finest lattice step among shapes, and most nodes
+_STEPS = 16  # bisections of the range of clearances
 
 
 def widest_passage(obstacles: Obstacles, points: FloatArray) -> float:
-    """A clearance at which all points are connected [m]: the greatest, but for half a lattice step; 0 if there is none.
+    """The greatest clearance at which all points are connected [m], to half a lattice step below; 0 if there is none.
 
     Args:
-        obstacles: What stands in the way.
-        points: The places, shape (n, 2).
+        obstacles: The obstacles.
+        points: The points [m], shape (n, 2).
     """
     distance, at = _lattice(obstacles, points)
-    # The nearest lattice places are beside the points, not at them.
+    # The lattice nodes about a point may have another clearance than the point itself.
     low, high = 0.0, float(min(clearances(obstacles, points).min(), distance[at[..., 0], at[..., 1]].max(axis=1).min()))
     if high > 0 and _connects(distance, at, high):
         return high
@@ -35,10 +35,10 @@ def widest_passage(obstacles: Obstacles, points: FloatArray) -> float:
 
 
 def _lattice(obstacles: Obstacles, points: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Distances on a lattice, between whose neighbours nothing is nearer; and the four places about each point.
+    """Distances [m] at the nodes of a lattice, lower bounds on the lines between neighbours; the nodes about points.
 
     Returns:
-        Shapes (rows, columns) and (n, 4, 2).
+        Shapes (rows, columns) and (n, 4, 2): row and column of the four nodes about each point.
     """
     if obstacles.cells is not None:
         field = distance_field(obstacles.cells)
@@ -49,7 +49,7 @@ def _lattice(obstacles: Obstacles, points: FloatArray) -> tuple[FloatArray, IntA
         step = max(_FINEST_M, math.sqrt(float(np.prod(size)) / _PLACES))
         x, y = (low[axis] + np.arange(math.floor(size[axis] / step) + 1) * step for axis in (0, 1))
         places = np.stack(np.meshgrid(x, y), axis=-1)
-        # Halfway to a neighbour it may be nearer by half a step.
+        # Halfway to a neighbour an obstacle may be nearer by half a step.
         distance = clearances(obstacles, places.reshape(-1, 2)).reshape(places.shape[:2]) - step / 2
         steps = (points - low)[:, ::-1] / step
     corner = np.floor(steps).astype(np.int64)
@@ -58,8 +58,8 @@ def _lattice(obstacles: Obstacles, points: FloatArray) -> tuple[FloatArray, IntA
 
 
 def _connects(distance: FloatArray, at: IntArray, clearance_m: float) -> bool:
-    """Whether one part of what is so roomy comes near every point."""
-    parts, count = label(distance >= clearance_m)
+    """Whether one connected component with this clearance has a node about every point."""
+    components, count = label(distance >= clearance_m)
     near = np.zeros((len(at), count + 1), dtype=np.bool_)
-    near[np.arange(len(at))[:, None], parts[at[..., 0], at[..., 1]]] = True
+    near[np.arange(len(at))[:, None], components[at[..., 0], at[..., 1]]] = True
     return bool(near[:, 1:].all(axis=0).any())

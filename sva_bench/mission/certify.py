@@ -1,6 +1,6 @@
-"""Certificate: whether a plan is feasible and what it is worth, from the instance alone.
+"""Certificates: whether a plan is feasible, and its value, from the instance alone.
 
-Shares no code with the solver, so a bug there cannot hide here.
+Shares no code with the solver, so it also detects the solver's errors.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 from sva_bench.mission.plan import Plan, Route
 
 INFINITE = float("inf")
-VALUE_TOLERANCE = 1e-6  # relative; the gap at which a plan counts as optimal
+VALUE_TOLERANCE = 1e-6  # relative; the default gap of solves
 
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
-    """What an independent check says of a plan.
+    """The result of an independent check of a plan.
 
     Attributes:
         feasible: Whether every vehicle can drive its route within its fuel and limit, and no POI is visited twice.
         expected: Expected incentive under the instance's failure process; ``None`` if infeasible.
         nominal: Incentive if every vehicle is available; ``None`` if infeasible.
-        fuel_s: Fuel that each vehicle burns [s of driving], as far as its legs exist.
+        fuel_s: Fuel that each vehicle burns [s of driving]; ``inf`` if a leg does not exist.
         duration_s: Driving and stops of each vehicle [s].
-        reasons: Why it is infeasible, or which of its own claims are wrong.
+        reasons: Why it is infeasible; of a feasible plan, which of its claims are wrong.
     """
 
     feasible: bool
@@ -44,11 +44,11 @@ class Certificate:
 
 
 def certify(instance: Instance, plan: Plan) -> Certificate:
-    """Check a plan against its instance.
+    """The certificate of a plan for an instance.
 
     Args:
         instance: The instance.
-        plan: Any plan whose vehicles and sites the instance knows.
+        plan: The plan; its vehicles and sites must be the instance's.
 
     Source:
         Constraints (1), (2), (5), (7), (9), (11) and (14a) of the paper, read as rules for a sequence of sites.
@@ -61,21 +61,22 @@ def certify(instance: Instance, plan: Plan) -> Certificate:
     for vehicle in instance.vehicles:
         route = plan.route(vehicle.name)
         fuel[vehicle.name], duration[vehicle.name] = _drive(instance, vehicle, route, reasons)
-        earned, arrival, driven = [], [], _driving_times(instance, vehicle, route)
+        earned, arrival, driving_s = [], [], _driving_times(instance, vehicle, route)
         for number, name in enumerate(route):
             site = instance.sites.index(name)
             if site == instance.base or site in instance.stations:
                 continue
             if name in visited:
-                twice = f"{vehicle.name}: POI {name} is visited twice; name it once" \
+                reason = f"{vehicle.name}: POI {name} is visited twice; name it once" \
                     if visited[name] == vehicle.name else \
                     f"{vehicle.name}: POI {name} is visited already, by {visited[name]}; leave it to one of them"
-                reasons += [twice] if twice not in reasons else []
+                reasons += [reason] if reason not in reasons else []
             visited[name] = vehicle.name
             earned.append(float(vehicle.incentives[site]))
-            arrival.append(driven[number])
+            arrival.append(driving_s[number])
         expected += process.route_value(
-            RouteProfile(incentives=tuple(earned), arrival_s=tuple(arrival), home_s=driven[-1] if driven else 0.0),
+            RouteProfile(incentives=tuple(earned), arrival_s=tuple(arrival),
+                         home_s=driving_s[-1] if driving_s else 0.0),
             Reliability(availability=vehicle.availability, mission_limit_s=vehicle.mission_limit_s))
         nominal += sum(earned)
     if reasons:
@@ -87,7 +88,7 @@ def certify(instance: Instance, plan: Plan) -> Certificate:
 
 
 def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str]) -> tuple[float, float]:
-    """Fuel burnt and time taken on a route; what breaks a rule is added to ``reasons``."""
+    """Fuel burnt and duration of a route [s]; violations are appended to ``reasons``."""
     if not route:
         return 0.0, 0.0
     sites = [instance.sites.index(name) for name in route]
@@ -95,23 +96,23 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
     if sites[0] != instance.base or sites[-1] != instance.base or len(sites) < 2:
         reasons.append(f"{name}: the route must start and end at the base {instance.sites[instance.base]}")
     if instance.base in sites[1:-1]:
-        reasons.append(f"{name}: the base stands in the middle of the route; it is left and entered once")
+        reasons.append(f"{name}: the base is an intermediate stop of the route; it is left and entered once")
     since_refuel = fuel = duration = 0.0
     for i, j in itertools.pairwise(sites):
         leg = float(vehicle.fuel_s[i, j])
         where = f"{instance.sites[i]} -> {instance.sites[j]}"
-        if i == j:  # of POIs, and of the base in the middle, it is said that they stand there twice
+        if i == j:  # repeated POIs, and the base as an intermediate stop, have messages of their own
             if i in instance.stations or len(sites) == 2:
                 reasons.append(f"{name}: {instance.sites[i]} follows itself; name a stop once")
         elif leg == INFINITE:
-            reasons.append(f"{name}: there is no way {where}")
+            reasons.append(f"{name}: there is no leg {where}")
         since_refuel += leg
         fuel += leg
         duration += leg + float(instance.stop_s[j])
         if INFINITE > since_refuel > vehicle.fuel_capacity_s + TOLERANCE_S:
             reasons.append(f"{name}: {since_refuel:.3f} s of fuel burnt on arrival over {where}; "
                            f"the capacity is {vehicle.fuel_capacity_s:.3f} s")
-            since_refuel = 0.0  # one complaint per filling is enough
+            since_refuel = 0.0  # one message for each refuel interval
         if j in instance.stations:
             since_refuel = 0.0
     if duration > vehicle.mission_limit_s + TOLERANCE_S:
@@ -120,25 +121,30 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
 
 
 def _driving_times(instance: Instance, vehicle: Vehicle, route: Route) -> list[float]:
-    """Driving time until each stop of a route [s]; stops themselves take none of it."""
+    """Driving time until each stop of a route [s], without the time of stops."""
     sites = [instance.sites.index(name) for name in route]
     legs = (float(vehicle.fuel_s[i, j]) for i, j in itertools.pairwise(sites))
     return list(itertools.accumulate(legs, initial=0.0)) if route else []
 
 
 def _wrong_claims(plan: Plan, expected: float, nominal: float, fuel: dict[str, float]) -> list[str]:
+    """The claims of a plan, of value and fuel, that the check refutes."""
     claims = []
-    worth = nominal if plan.objective == "deterministic" else expected
+    true_value = nominal if plan.objective == "deterministic" else expected
     if plan.value is not None and plan.objective in ("stochastic", "deterministic") and \
-            abs(plan.value - worth) > VALUE_TOLERANCE * abs(worth):
-        claims.append(f"the plan claims a value of {plan.value:.6g}; it is worth {worth:.6g}")
+            abs(plan.value - true_value) > VALUE_TOLERANCE * abs(true_value):
+        claims.append(f"the plan claims a value of {plan.value:.6g}; it is worth {true_value:.6g}")
     claims += [f"{name}: the plan claims {claimed:.3f} s of fuel; it burns {fuel[name]:.3f} s"
                for name, claimed in plan.fuel_s.items() if name in fuel and abs(claimed - fuel[name]) > TOLERANCE_S]
     return claims
 
 
 def expected_value(instance: Instance, plan: Plan) -> float:
-    """Closed-form value of a plan under the instance's failure process, by the independent check."""
+    """Closed-form value of a plan under the instance's failure process, by the independent check.
+
+    Raises:
+        RuntimeError: If the plan is infeasible.
+    """
     certificate = certify(instance, replace(plan, value=None))
     if certificate.expected is None:
         raise RuntimeError(f"a plan for {instance.name} fails its check: {'; '.join(certificate.reasons)}")

@@ -1,4 +1,4 @@
-"""Instance: all that a solver needs, as arrays. It knows no world."""
+"""Instances: the data of the optimisation problem, as arrays."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sva_bench.choices import FailureProcess
 from sva_bench.mission.failures import JointState
 
 TOLERANCE_S = 1e-6
-"""Feasibility tolerance everywhere."""
+"""Feasibility tolerance of fuel and time [s]."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -18,10 +18,10 @@ class Vehicle:
 
     Attributes:
         name: Its name.
-        fuel_capacity_s: Driving time on one filling [s]; ``inf`` = no limit.
+        fuel_capacity_s: Fuel capacity [s of driving]; ``inf`` = no limit.
         mission_limit_s: Longest mission, driving and stops [s]; ``inf`` = no limit.
         availability: Probability that it is available, or that it survives each leg (``per_leg``).
-        incentives: What it earns at each site, shape (n,); 0 at base and stations.
+        incentives: Incentive of its visit to each site, shape (n,); 0 at base and stations.
         fuel_s: Fuel of the leg from site i to site j [s of driving], shape (n, n), zero diagonal; ``inf`` = no leg.
     """
 
@@ -46,8 +46,8 @@ class Instance:
         name: Its name.
         sites: Names of all sites, length n; an index into it is a site's identity.
         base: Index of the base.
-        stations: Indices of the refuelling stations; the base is none.
-        stop_s: Time that a stop takes [s], shape (n,); counts to the mission limit, burns no fuel.
+        stations: Indices of the refuelling stations, without the base.
+        stop_s: Duration of a stop [s], shape (n,); counts towards the mission limit, burns no fuel.
         vehicles: The vehicles.
         failure: The failure process that plans are made for.
         joint: Joint distribution of the availabilities; ``None`` = independent.

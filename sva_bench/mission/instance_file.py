@@ -24,7 +24,7 @@ KIND = "sva-bench/instance@1"
 MOST_BYTES = 64_000_000
 MOST_SITES, MOST_VEHICLES, MOST_STATES = 2000, 200, 10_000
 MOST_COSTS = 2 * MOST_SITES**2
-"""Of all matrices of fuel together: two of the most sites, or eight of a thousand."""
+"""Entries of all fuel matrices together: two of ``MOST_SITES`` sites, or eight of a thousand."""
 
 
 class _VehicleFile(Section):
@@ -58,7 +58,7 @@ def read_instance(path: Path) -> Instance:
     """Read an instance file.
 
     Raises:
-        BadFile: If it is no valid instance; names line and key.
+        BadFile: If it is no valid instance; with line and key.
     """
     document = read_json(path, MOST_BYTES)
     _refuse_too_large(path, document.data)
@@ -89,7 +89,7 @@ def read_instance(path: Path) -> Instance:
 
 
 def _refuse_too_large(path: Path, data: Any) -> None:
-    """Refuse what no solver could go through, before it is checked entry by entry; lines of it are not looked up."""
+    """Refuse an instance beyond the size limits before it is validated entry by entry; without line numbers."""
     if not isinstance(data, dict):
         return
     vehicles: Any = data.get("vehicles") if isinstance(data.get("vehicles"), list) else []
@@ -186,7 +186,7 @@ def _refuse_duplicates(document: Document, loc: tuple[str | int, ...], names: Se
 
 
 def instance_as_dict(instance: Instance) -> dict[str, Any]:
-    """The instance as its file's content."""
+    """The instance as the content of its file."""
     n = len(instance.sites)
     shared = all(np.array_equal(v.fuel_s, instance.vehicles[0].fuel_s) for v in instance.vehicles)
     data: dict[str, Any] = {
@@ -219,7 +219,7 @@ def write_instance(path: Path, instance: Instance) -> None:
 
 
 def instance_text(instance: Instance) -> str:
-    """The text of an instance file: a row of a matrix a line."""
+    """The text of an instance file, with each matrix row on a line."""
     return pretty_json(instance_as_dict(instance))
 
 

@@ -1,4 +1,4 @@
-"""Plan: which robot visits which sites in which order, and what was promised."""
+"""Plans: the route of each robot, and the claims of the planner."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ Route = tuple[str, ...]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
-    """Routes, and what their maker said of them.
+    """Routes, and the claims of their planner.
 
     Attributes:
         routes: Route of each robot, by its name.
         instance: Name of the instance it was made for.
-        objective: What it was made for.
-        method: How it was made.
-        status: How far the solver came.
-        value: What it promises, in its own objective.
+        objective: The objective it maximises.
+        method: The method that made it.
+        status: How its solve ended.
+        value: Its value under that objective, as claimed.
         bound: Upper bound on that objective.
         fuel_s: Fuel that each robot burns [s of driving].
         runtime_s: Wall-clock time of the solve [s]; the only figure that differs between equal runs.
         seed: Seed of the method.
-        details: Whatever else the maker wants to say.
+        details: Other data of the planner.
     """
 
     routes: Mapping[str, Route]
@@ -43,19 +43,19 @@ class Plan:
     details: Mapping[str, Any] = field(default_factory=dict)
 
     def route(self, robot: str) -> Route:
-        """The robot's route; empty if it isn't named."""
+        """The robot's route; empty if the plan has none."""
         return self.routes.get(robot, ())
 
     def drives_like(self, other: Plan) -> bool:
-        """Whether every robot has the same route in both: whatever happens, they collect the same."""
+        """Whether every robot has the same route in both plans."""
         return all(self.route(robot) == other.route(robot) for robot in {*self.routes, *other.routes})
 
 
 def unless_interrupted(plan: Plan) -> Plan:
-    """The plan; but if Ctrl-C ended its solve early, that goes on, for whom such a plan is of no use.
+    """The plan, for callers that need a complete solve.
 
     Raises:
-        KeyboardInterrupt: If the plan is the best until Ctrl-C.
+        KeyboardInterrupt: If Ctrl-C ended its solve early.
     """
     if plan.status == "interrupted":
         raise KeyboardInterrupt

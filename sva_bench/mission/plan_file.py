@@ -1,4 +1,4 @@
-"""Plans as JSON files, ours or anybody's."""
+"""Plans as JSON files, from this solver or any other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sva_bench.choices import PlanObjective, Status
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.complaints import dotted
 from sva_bench.files.documents import read_json, validate
-from sva_bench.files.fields import Name, Number, Section, WholeNumber
+from sva_bench.files.fields import Name, NonNegativeInt, Number, Section
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.printable import all_text
 from sva_bench.mission.instance import Instance
@@ -22,7 +22,7 @@ from sva_bench.mission.plan import Plan, Route
 KIND = "sva-bench/plan@1"
 MOST_BYTES = 20_000_000
 MOST_STOPS = 10_000
-"""Of a route: two thousand sites and as many visits of stations leave room."""
+"""Of a route: more than two thousand sites with a station after each."""
 
 
 class _PlanFile(Section):
@@ -36,7 +36,7 @@ class _PlanFile(Section):
     bound: Number | None = None
     fuel_s: dict[Name, Number] = Field(default_factory=dict)
     runtime_s: Number | None = None
-    seed: WholeNumber | None = None
+    seed: NonNegativeInt | None = None
     details: dict[str, Any] = Field(default_factory=dict)
 
 
@@ -58,7 +58,7 @@ def read_plan(path: Path, instance: Instance) -> Plan:
 
 
 def read_routes(path: Path, robots: Sequence[str], sites: Sequence[str]) -> dict[str, Route]:
-    """The routes of a plan file for these robots and sites, as they stand there.
+    """The routes of a plan file for these robots and sites, as written.
 
     Raises:
         BadFile: As ``read_plan``.
@@ -67,7 +67,7 @@ def read_routes(path: Path, robots: Sequence[str], sites: Sequence[str]) -> dict
 
 
 def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFile:
-    """A plan file, its names and its size checked."""
+    """A plan file, with names and size checked."""
     document = read_json(path, MOST_BYTES)
     routes = document.data.get("routes") if isinstance(document.data, dict) else None
     if isinstance(routes, dict) and len(routes) > MOST_VEHICLES:
@@ -90,7 +90,7 @@ def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFil
 
 
 def plan_as_dict(plan: Plan) -> dict[str, Any]:
-    """The plan as its file's content; what is unknown is left out."""
+    """The plan as the content of its file, without what is ``None``."""
     data: dict[str, Any] = {"format": KIND}
     if plan.instance is not None:
         data["instance"] = plan.instance

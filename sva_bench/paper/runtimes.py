@@ -23,7 +23,7 @@ _AGREE = 2e-6  # relative; each solve is proved within 1e-6
 _IDLE = 0.9  # of a core, from which on a machine counts as idle
 
 
-def reproduce(study: Study, folder: Path, tell: Callable[[int, int, Row], None] = lambda done, of, row: None) -> str:  # noqa: ARG005
+def reproduce(study: Study, folder: Path, on_row: Callable[[int, int, Row], None] = lambda done, of, row: None) -> str:  # noqa: ARG005
     """Solve what is not solved yet, and write rows, report and picture into a folder; the report.
 
     Files: ``paper-runtimes.csv`` (the rows), ``paper-runtimes.md``, ``paper-runtimes.png``.
@@ -31,7 +31,7 @@ def reproduce(study: Study, folder: Path, tell: Callable[[int, int, Row], None] 
     Args:
         study: What to solve.
         folder: Where; a second call goes on with what is missing there.
-        tell: Called after each solve with the cases done, all cases, and the new row.
+        on_row: Called after each solve with the cases done, all cases, and the new row.
 
     Raises:
         SvaBenchError: If the folder holds something else, or can't be written to.
@@ -39,7 +39,7 @@ def reproduce(study: Study, folder: Path, tell: Callable[[int, int, Row], None] 
     """
     path = folder / f"{NAME}.csv"
     try:
-        rows = run(study, path, tell)
+        rows = run(study, path, on_row)
     except KeyboardInterrupt:
         cases = set(study.cases())
         write_report([row for row in read_rows(path) if row.case in cases], study, folder)
@@ -89,7 +89,7 @@ def markdown(rows: Sequence[Row], study: Study, picture: str | None = None) -> s
         "BD: optimality cuts, SEC: subtour cuts, averages; up to the limit where a solve met it. The paper adds its "
         "cuts while CPLEX branches. HiGHS takes none there, so ours come between runs of the master program, and a "
         "limit that ends the first run leaves one optimality cut and no subtour cut. Ours count a subtour cut for each "
-        "POI of a part that does not hang together with the base, and for each vehicle; the paper has one a part.",
+        "POI of a component that is not connected with the base, and for each vehicle; the paper has one a component.",
         "## Runtime of the decomposition (Table 3)", runtime_table(rows),
         f"In seconds. A solve that met its limit counts with the time it took: {LIMIT_S:g} in the paper.",
         "## Gaps (Figure 3)", f"![Box plots of gaps]({picture})" if picture else "", gaps_table(rows),
@@ -163,22 +163,22 @@ def methods_table(rows: Sequence[Row], title: str, key: Callable[[Row], float]) 
 
 def checks(rows: Sequence[Row]) -> list[str]:
     """What must hold between rows, in words: methods agree, no plan beats a bound, limits are kept."""
-    apart, beaten, compared = 0.0, 0.0, 0
+    spread, excess, compared = 0.0, 0.0, 0
     for _, group in _groups(rows, lambda row: (row.pois, row.seed, row.fuel_multiple, row.availability)):
         proved = [row.value for row in group if row.status == "optimal"]
         compared += len(proved) > 1
         scale = max(1.0, *(row.value for row in group))
         if proved:
-            apart = max(apart, (max(proved) - min(proved)) / scale)
-        beaten = max(beaten, (max(row.value for row in group) - min(row.bound for row in group)) / scale)
+            spread = max(spread, (max(proved) - min(proved)) / scale)
+        excess = max(excess, (max(row.value for row in group) - min(row.bound for row in group)) / scale)
     slowest = max(rows, key=lambda row: row.wall_s - row.time_limit_s)
     over = slowest.wall_s - slowest.time_limit_s
     return [
         f"On {compared} instances two methods or more proved their plans; " + (
-            "these are worth the same." if apart <= _AGREE else
-            f"**THEY DIFFER by up to {apart:.2g} of their value: one of them is wrong.**"),
-        "No plan is worth more than another method's bound." if beaten <= _AGREE else
-        f"**A PLAN IS WORTH MORE THAN ANOTHER METHOD'S BOUND, by {beaten:.2g} of its value: that bound is wrong.**",
+            "these are worth the same." if spread <= _AGREE else
+            f"**THEY DIFFER by up to {spread:.2g} of their value: one of them is wrong.**"),
+        "No plan is worth more than another method's bound." if excess <= _AGREE else
+        f"**A PLAN IS WORTH MORE THAN ANOTHER METHOD'S BOUND, by {excess:.2g} of its value: that bound is wrong.**",
         "Every solve ended with a plan, which an independent check found feasible; the slowest "
         + (f"ran {over:.1f} s over its limit of {slowest.time_limit_s:g} s (`{slowest.method}`, {slowest.pois} POIs)."
            if over > 0 else "kept its limit."),

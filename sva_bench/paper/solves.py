@@ -183,13 +183,13 @@ def warm_up(study: Study) -> None:
                         SolveLimits(time_limit_s=study.time_limit_s), method=method)
 
 
-def run(study: Study, path: Path, tell: Callable[[int, int, Row], None] = lambda done, of, row: None) -> list[Row]:  # noqa: ARG005
+def run(study: Study, path: Path, on_row: Callable[[int, int, Row], None] = lambda done, of, row: None) -> list[Row]:  # noqa: ARG005
     """Solve all cases that a file has no rows of yet, and append a row as each ends.
 
     Args:
         study: What to solve.
         path: The file; it need not exist.
-        tell: Called after each solve with the cases done, all cases, and the new row.
+        on_row: Called after each solve with the cases done, all cases, and the new row.
 
     Returns:
         The rows of the study, in its order.
@@ -213,7 +213,7 @@ def run(study: Study, path: Path, tell: Callable[[int, int, Row], None] = lambda
         row = measure(case, study)
         append(path, row)
         known[case] = row
-        tell(sum(case in known for case in cases), len(cases), row)
+        on_row(sum(case in known for case in cases), len(cases), row)
     return [known[case] for case in cases]
 
 

@@ -1,4 +1,4 @@
-"""Stories written as Rerun recordings, and what of the Rerun viewer is driven from here."""
+"""Stories written as Rerun recordings, and screenshots by the viewer. The only importer of rerun."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.execution.outcome import Trace
 from sva_bench.files.atomic import by_way_of
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.recording.story import DEAD, Cast, Color, Marks, Series, Story, story_of
+from sva_bench.recording.story import DISABLED, Color, Marks, RobotView, Series, Story, story_of
 from sva_bench.world.model import World
 
 TIMELINE = "sim_time"
@@ -58,14 +58,14 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
     try:
         recording.set_log_time_enabled(False)
         recording.set_log_tick_enabled(False)
-        # In memory, for a full disk must not stop the library's own writer thread: it hangs.
+        # In memory: on a full disk the library's writer thread would hang.
         memory = recording.memory_recording()
         recording.send_blueprint(_layout(story), make_active=False)
         recording.send_recording_name(title)
         _write_solids(recording, story.solids)
         for marks in story.marks:
             _write_marks(recording, marks, story.solids)
-        for robot in story.cast:
+        for robot in story.views:
             _write_robot(recording, robot)
         _write_numbers(recording, story)
         _write_log(recording, story)
@@ -106,7 +106,7 @@ def photograph(port: int, path: Path, picture: Path, at_s: float) -> None:
 
 def _identity(story: Story) -> str:
     digest = hashlib.sha256(f"{story.world}\0{story.title}".encode())
-    for robot in story.cast:
+    for robot in story.views:
         digest.update(robot.name.encode())
         digest.update(robot.time_s.tobytes() + robot.pose.tobytes())
     for sentence in story.log:
@@ -190,7 +190,7 @@ def _write_names(
         at_m, radii=rr.Radius.ui_points(0.0), colors=[_NAMES], labels=names, show_labels=True))
 
 
-def _write_robot(recording: rr.RecordingStream, robot: Cast) -> None:
+def _write_robot(recording: rr.RecordingStream, robot: RobotView) -> None:
     here, r = f"world/robots/{robot.name}", robot.radius_m
     height = 2 * r
     # Place and heading apart: the name goes where the robot goes, but stays north of it.
@@ -200,10 +200,10 @@ def _write_robot(recording: rr.RecordingStream, robot: Cast) -> None:
     _constant(recording, f"{here}/hull/body", rr.Cylinders3D.from_fields(
         centers=[[0, 0, height / 2]], radii=[r], lengths=[height], fill_mode="solid"))
     times, colors = [0.0], [robot.color]
-    if robot.dies_s == 0:
-        colors = [DEAD]
-    elif robot.dies_s is not None:
-        times, colors = [0.0, robot.dies_s], [robot.color, DEAD]
+    if robot.disabled_s == 0:
+        colors = [DISABLED]
+    elif robot.disabled_s is not None:
+        times, colors = [0.0, robot.disabled_s], [robot.color, DISABLED]
     _column(recording, f"{here}/hull/body", times, rr.Cylinders3D.columns(colors=colors))
     # A white bar on top, from the centre to the front.
     _constant(recording, f"{here}/hull/heading", rr.Boxes3D(
@@ -224,9 +224,9 @@ def _write_numbers(recording: rr.RecordingStream, story: Story) -> None:
             names=name, colors=[color], widths=width, interpolation_mode="StepAfter" if steps else "Linear"))
         _column(recording, entity, series.time_s, rr.Scalars.columns(scalars=series.value))
 
-    if len(story.cast) > 1:
+    if len(story.views) > 1:
         line("collected/total", story.total, "all", _TOTAL, steps=True, width=3.0)
-    for robot in story.cast:
+    for robot in story.views:
         line(f"collected/{robot.name}", robot.collected, robot.name, robot.color, steps=True)
         if robot.fuel is not None:
             line(f"fuel/{robot.name}", robot.fuel, robot.name, robot.color, steps=False)
@@ -247,14 +247,14 @@ def _layout(story: Story) -> rrb.Blueprint:
         origin="world", name=story.title, background=rrb.Background(kind="SolidColor", color=_BACKGROUND),
         line_grid=False, eye_controls=rrb.EyeControls3D(
             kind="Orbital", position=story.eye_m, look_target=story.target_m, eye_up=(0, 0, 1)),
-        overrides={f"world/driven/{robot.name}": whole_trail for robot in story.cast if len(robot.trail)})
+        overrides={f"world/driven/{robot.name}": whole_trail for robot in story.views if len(robot.trail)})
     axis = rrb.TimeAxis(view_range=rr.TimeRange(
         start=rr.TimeRangeBoundary.absolute(seconds=0.0),
         end=rr.TimeRangeBoundary.absolute(seconds=max(story.duration_s, 1.0))))
-    most_fuel = max((float(robot.fuel.value.max()) for robot in story.cast if robot.fuel is not None), default=0.0)
+    most_fuel = max((float(robot.fuel.value.max()) for robot in story.views if robot.fuel is not None), default=0.0)
     right: list[rrb.View] = []
     shares = []
-    if any(robot.fuel is not None for robot in story.cast):
+    if any(robot.fuel is not None for robot in story.views):
         right.append(rrb.TimeSeriesView(origin="fuel", name="Fuel left [s of driving]", axis_x=axis,
                                         axis_y=_from_zero(most_fuel), plot_legend=rrb.Corner2D.LeftBottom))
         shares.append(3)

@@ -1,4 +1,4 @@
-"""What a recording shows, as arrays: solids, robots over time, series and sentences. Knows nothing of the viewer."""
+"""The content of a recording as arrays: obstacles, robots over time, series and log entries; independent of Rerun."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ GREEN: Color = (0, 158, 115)
 
 ROBOT_COLORS = (BLUE, VERMILLION, PURPLE, SKY_BLUE, ORANGE)  # the sixth robot has the first one's again
 SITE_COLORS: dict[SiteKind, Color] = {"base": BLACK, "station": GREEN, "poi": YELLOW}
-DEAD: Color = (45, 45, 45)  # a robot that goes nowhere any more
+DISABLED: Color = (45, 45, 45)  # a robot that has stopped for good
 
 _DASH_M, _GAP_M = 0.25, 0.2  # of planned paths
 _TRAIL_STEP_S = 0.25  # a robot at 0.65 m/s is 0.16 m past the end of its trail then: less than its radius
@@ -80,7 +80,7 @@ class Series:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Cast:
+class RobotView:
     """One robot over time.
 
     Attributes:
@@ -89,7 +89,7 @@ class Cast:
         color: Its colour.
         time_s: Mission clock of the poses, shape (n,).
         pose: x, y [m], yaw [rad], shape (n, 3).
-        dies_s: When it stopped for good, away from home; ``None`` = it didn't.
+        disabled_s: When it stopped for good away from the base [s]; ``None`` = it didn't.
         planned: Dashes of the path that was planned, each two ends [m], shape (d, 2, 2).
         trail_s: When each piece of its trail is complete, shape (t,).
         trail: Pieces of the driven path, each two ends [m], shape (t, 2, 2).
@@ -102,7 +102,7 @@ class Cast:
     color: Color
     time_s: FloatArray
     pose: FloatArray
-    dies_s: float | None
+    disabled_s: float | None
     planned: FloatArray
     trail_s: FloatArray
     trail: FloatArray
@@ -116,8 +116,8 @@ class Cast:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sentence:
-    """One line of the mission's log, in the colour of the robot it is about."""
+class LogEntry:
+    """An entry of the mission's log, in the colour of its robot."""
 
     time_s: float
     level: Level
@@ -127,19 +127,19 @@ class Sentence:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Story:
-    """All that a recording shows.
+    """The content of a recording.
 
     Attributes:
         title: What it is called.
         world: Name of the world.
-        duration_s: When the last robot came to its end.
+        duration_s: Time at which the last robot's mission ends [s].
         solids: What stands in the world.
         marks: The sites, one entry per kind that occurs.
-        cast: The robots.
+        views: The robots.
         total: Incentive collected by all robots together.
         log: What happened, in order of time.
-        eye_m: Where to look from, x, y, z.
-        target_m: Where to look at, x, y, z.
+        eye_m: Position of the camera, x, y, z [m].
+        target_m: Point that the camera looks at, x, y, z [m].
     """
 
     title: str
@@ -147,15 +147,15 @@ class Story:
     duration_s: float
     solids: Obstacles
     marks: tuple[Marks, ...]
-    cast: tuple[Cast, ...]
+    views: tuple[RobotView, ...]
     total: Series
-    log: tuple[Sentence, ...]
+    log: tuple[LogEntry, ...]
     eye_m: tuple[float, float, float]
     target_m: tuple[float, float, float]
 
 
 def story_of(world: World, traces: Sequence[Trace], title: str) -> Story:
-    """What a recording of one trial shows.
+    """The content of a recording of one trial.
 
     Args:
         world: The world.
@@ -175,14 +175,15 @@ def story_of(world: World, traces: Sequence[Trace], title: str) -> Story:
     traces = sorted(traces, key=lambda trace: known[trace.orders.robot])
     colors = {name: ROBOT_COLORS[k % len(ROBOT_COLORS)] for name, k in known.items()}
     duration_s = max(max(float(trace.time_s[-1]), trace.outcome.end_time_s) for trace in traces)
-    cast = tuple(
-        _cast(trace, world.robots[known[trace.orders.robot]].model.radius_m, colors[trace.orders.robot], duration_s)
+    views = tuple(
+        _robot_view(trace, world.robots[known[trace.orders.robot]].model.radius_m, colors[trace.orders.robot],
+                    duration_s)
         for trace in traces)
     gains = [_gains(trace) for trace in traces]
     eye, target = _eye(world.obstacles.bounds_m)
     return Story(
         title=title, world=world.name, duration_s=duration_s, solids=world.obstacles.walled(_WALL_M),
-        marks=_marks(world.sites, traces, colors), cast=cast,
+        marks=_marks(world.sites, traces, colors), views=views,
         total=_staircase(np.concatenate(gains), duration_s), log=_log(traces, colors), eye_m=eye, target_m=target)
 
 
@@ -213,7 +214,7 @@ def dashes(path: FloatArray, dash_m: float, gap_m: float) -> FloatArray:
 
 
 def corners(time_s: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
-    """Which points of a line chart it takes to draw the same lines, shape (n,).
+    """Which points of a line chart are needed to draw the same lines, shape (n,).
 
     Args:
         time_s: Ascending, shape (n,).
@@ -247,7 +248,7 @@ def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Col
     return tuple(marks)
 
 
-def _cast(trace: Trace, radius_m: float, color: Color, duration_s: float) -> Cast:
+def _robot_view(trace: Trace, radius_m: float, color: Color, duration_s: float) -> RobotView:
     outcome, time, pose = trace.outcome, trace.time_s, trace.pose
     # The first pose at or after each step, and the last pose: the trail is as long as the drive.
     marks = np.searchsorted(time, np.arange(time[0], time[-1], _TRAIL_STEP_S))
@@ -261,9 +262,9 @@ def _cast(trace: Trace, radius_m: float, color: Color, duration_s: float) -> Cas
             when, left = np.append(when, duration_s), np.append(left, left[-1])
         kept = corners(when, left)
         fuel = Series(time_s=when[kept], value=left[kept])
-    return Cast(
+    return RobotView(
         name=trace.orders.robot, radius_m=radius_m, color=color, time_s=time, pose=pose,
-        dies_s=outcome.end_time_s if outcome.end in ("failed", "out_of_fuel", "stuck") else None,
+        disabled_s=outcome.end_time_s if outcome.end in ("failed", "out_of_fuel", "stuck") else None,
         planned=dashes(trace.planned, _DASH_M, _GAP_M), trail_s=time[at[1:]][moved], trail=pieces, fuel=fuel,
         collected=_staircase(_gains(trace), duration_s))
 
@@ -287,15 +288,15 @@ def _events(traces: Sequence[Trace]) -> list[tuple[Event, Trace]]:
     return sorted(((event, trace) for trace in traces for event in trace.outcome.events), key=lambda e: e[0].time_s)
 
 
-def _log(traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[Sentence, ...]:
+def _log(traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[LogEntry, ...]:
     at_home = [
-        Sentence(time_s=0.0, level="INFO", text=f"{trace.orders.robot} stays home", color=colors[trace.orders.robot])
+        LogEntry(time_s=0.0, level="INFO", text=f"{trace.orders.robot} stays home", color=colors[trace.orders.robot])
         for trace in traces if not trace.outcome.events]
-    told = []
+    entries = []
     for event, trace in _events(traces):
         level, text = _sentence(event, trace)
-        told.append(Sentence(time_s=event.time_s, level=level, text=text, color=colors[trace.orders.robot]))
-    return (*at_home, *told)
+        entries.append(LogEntry(time_s=event.time_s, level=level, text=text, color=colors[trace.orders.robot]))
+    return (*at_home, *entries)
 
 
 def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
@@ -325,7 +326,7 @@ def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
 
 
 def _eye(bounds_m: FloatArray) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Where to stand and what to look at, from the south and above, so that the floor fills the view."""
+    """Camera position and target [m], from the south and above, so that the floor fills the view."""
     x0, y0, x1, y1 = bounds_m.tolist()
     back = np.array([0.0, -math.cos(_SLANT_RAD), math.sin(_SLANT_RAD)])
     up = np.array([0.0, math.sin(_SLANT_RAD), math.cos(_SLANT_RAD)])

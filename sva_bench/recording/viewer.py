@@ -25,11 +25,11 @@ _START_S = 30.0  # longest wait until the viewer listens; it takes about a secon
 _STOP_S = 5.0  # longest wait until it has ended, before it is killed
 _PICTURE_SIZE = "1600x900"
 
-_DISCREET = {"CI": "true"}  # where the viewer sends no usage statistics: nothing leaves this machine
+_DISCREET = {"CI": "true"}  # with it the viewer sends no usage statistics
 
 
 class NoVulkanDriver(SvaBenchError):
-    """No driver to draw a picture with, or none that works."""
+    """No working Vulkan driver for a picture."""
 
     exit_code = ExitCode.FAULT
 
@@ -42,7 +42,7 @@ class NoVulkanDriver(SvaBenchError):
 
 
 class ViewerFailed(SvaBenchError):
-    """The viewer ended, or gave no answer."""
+    """The viewer ended or did not answer."""
 
     exit_code = ExitCode.FAULT
 
@@ -202,7 +202,7 @@ def _free_port() -> int:
 def _running(
     command: Sequence[str], environment: Mapping[str, str], output: int | None
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that ends with the block, and with this program even if that is killed."""
+    """A process that is ended with the block, and with this program even if that is killed."""
     bound = ["setpriv", "--pdeathsig", "KILL"] if shutil.which("setpriv") else []
     process = subprocess.Popen([*bound, *command], env={**environment, **_DISCREET}, stdin=subprocess.DEVNULL,
                                stdout=output, stderr=output)

@@ -1,1 +1,1 @@
-"""What people see: words, pictures, pages."""
+"""Output for people: texts, charts, pictures and pages."""

@@ -35,7 +35,7 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
-        *(note(said) for said in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing])),
+        *(note(remark) for remark in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing])),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, fidelity {summary.fidelity}; 95 "
              "% intervals in brackets. Over maps, the maps are the sample."),
         *([heading("Given up"), table(["unit", "map", "seed", "reason"], failed, words=(0, 1, 3))] if failed else []),

@@ -1,4 +1,4 @@
-"""Charts of a summary: colours told apart by all eyes, and by hatching or shape beside."""
+"""Charts of a summary, in a colour-blind safe palette, with hatching or shape as a second cue."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ from matplotlib.ticker import MultipleLocator
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import SiteKind
-from sva_bench.geometry.cells import TooRagged, bounds_of, boxes_of
+from sva_bench.geometry.cells import TooManyBoxes, bounds_of, boxes_of
 from sva_bench.report.labels import place_labels
 from sva_bench.world.model import World
 
@@ -194,7 +194,7 @@ def _layers(world: World) -> list[tuple[FloatArray, str, float]]:
         return [(boxes, _GREY, 1.0)] if len(boxes) else []
     try:
         known = boxes_of(replace(cells, occupied=cells.occupied & ~cells.unknown, unknown=None))
-    except TooRagged:
+    except TooManyBoxes:
         return [(boxes, _LIGHT_GREY, 0.5)]
     # Where a grid stands askew, the first four fill what is outside it.
     return [(boxes, _LIGHT_GREY, 0.5), (known[4 if cells.origin[2] else 0:], _GREY, 1.0)]
@@ -347,8 +347,8 @@ def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> N
     box = legend.get_window_extent(figure.canvas.get_renderer())  # type: ignore[attr-defined]
     names = " | ".join(robot.name for robot in world.robots)
     robots = [f"{robot.name}: {_limits(robot.fuel_capacity_s, robot.mission_limit_s)}" for robot in world.robots]
-    said = ["Incentives below a point of interest:", *textwrap.wrap(names, 36), "", *robots]
-    figure.text(left / frame.width_in, box.y0 / DPI / frame.height_in - 0.18 / frame.height_in, "\n".join(said),
+    lines = ["Incentives below a point of interest:", *textwrap.wrap(names, 36), "", *robots]
+    figure.text(left / frame.width_in, box.y0 / DPI / frame.height_in - 0.18 / frame.height_in, "\n".join(lines),
                 va="top", fontsize=8, linespacing=1.45)
 
 
@@ -384,6 +384,6 @@ def for_page(svg: str, name: str, title: str) -> str:
     picture = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg"):], flags=re.DOTALL)
     picture = re.sub(r'\bid="', f'id="{name}-', picture)
     picture = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", picture)
-    said = html.escape(title)
-    return picture.replace("<svg ", f'<svg role="img" aria-label="{said}" ', 1).replace(
-        ">", f"><title>{said}</title>", 1).strip()
+    escaped_title = html.escape(title)
+    return picture.replace("<svg ", f'<svg role="img" aria-label="{escaped_title}" ', 1).replace(
+        ">", f"><title>{escaped_title}</title>", 1).strip()

@@ -1,4 +1,4 @@
-"""Where labels go, so that they cover neither each other nor what matters."""
+"""Label placement that avoids overlaps with other labels, markers and lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a run, and that of a batch: the answer first, then what it rests on."""
+"""The report of a run: the answer first, then the results behind it."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _answer(summary: AnySummary) -> list[str]:
     unproved = "" if summary.reproducible else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
-            *(note(said) for said in remarks(summary)), unproved, "</div>"]
+            *(note(remark) for remark in remarks(summary)), unproved, "</div>"]
 
 
 def _findings(summary: Summary) -> Iterator[tuple[str, str]]:
@@ -150,7 +150,7 @@ def _over_trials(scenarios: Scenarios) -> list[str]:
 def _from_promise(scenarios: Scenarios) -> list[str]:
     return [heading("From promise to execution"), _statistics(scenarios, "promise"),
             note("Assumption: the plan's value under the failures executed, against what its maker believed. Draws: "
-                 "failures as drawn, against their expectation. Then what each unhappy end cost.")]
+                 "failures as drawn, against their expectation. Then the incentive lost to each end of the execution.")]
 
 
 def _measured(scenarios: Scenarios) -> list[str]:

@@ -1,4 +1,4 @@
-"""A summary in words: the same for terminal and page."""
+"""Texts of a summary, shared by terminal and page."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ _MOST_NAMED = 6
 FEW_MAPS = 10
 """Maps below which an interval over them wants a word of caution: it is wide and shaky there."""
 FEW_DRAWS = 16
-"""Noise draws below which an interval is mostly about draws that were not met."""
+"""Noise draws below which an interval is mostly due to draws that were not observed."""
 VSS_PCT = "VSS in %: how much more the stochastic plan collects than the deterministic one, in per cent of the former."
 
 
@@ -118,14 +118,14 @@ def finding(vss: VssFigures) -> str:
 
 
 def remarks(summary: AnySummary) -> list[str]:
-    """What the answer leaves out: what its percentages are of, how little it rests on, and what else was asked for."""
-    said = beyond_reach(summary.reach)
+    """Remarks beside the answer: unreachable POIs, percentages, few noise draws, precision and EVPI."""
+    sentences = beyond_reach(summary.reach)
     if isinstance(summary, ComparisonSummary):
-        return [*said, *infeasible_plans(summary), *_few_draws(summary)]
+        return [*sentences, *infeasible_plans(summary), *_few_draws(summary)]
     compared = [s.vss for s in summary.scenarios if not s.vss.same_plan]
     if any(vss.executed_pct is not None for vss in compared):
-        said.append(VSS_PCT)
-    return [*said, *(_few_draws(summary) if compared else []), *_precision(summary), *_known_beforehand(summary)]
+        sentences.append(VSS_PCT)
+    return [*sentences, *(_few_draws(summary) if compared else []), *_precision(summary), *_known_beforehand(summary)]
 
 
 def _few_draws(summary: AnySummary) -> list[str]:
@@ -148,7 +148,7 @@ def _precision(summary: Summary) -> list[str]:
 def _known_beforehand(summary: Summary) -> list[str]:
     known = [f"{s.name} {verdict(s.evpi_executed, distinguishable=s.evpi_executed.distinguishable)}"
              for s in summary.scenarios if s.evpi_executed is not None]
-    return ["Knowing beforehand who is available, or planning anew at the base, would add, executed: "
+    return ["Perfect information about who is available, or replanning at the base, would add, executed: "
             f"{'; '.join(known)}."] if known else []
 
 

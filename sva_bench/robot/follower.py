@@ -1,12 +1,13 @@
 """Path follower: regulated pure pursuit with rotation in place, compiled.
 
-One control step is a pure function of path, pose and a small state, so the kinematic twin and the physics
-are driven by the very same code. A path is cut into stretches at its sharp corners, by geometry alone, so that
-no small error of a pose decides between stopping at a corner and driving round it. A stretch is driven in three
+One control step is a pure function of path, pose and a small state, and the kinematic twin and physics run the same
+code. A path is cut into stretches at its sharp corners, by geometry alone, so that
+no small pose error decides between stopping at a corner and driving round it. A stretch is driven in three
 phases: turn towards the path, drive it, turn into the heading in which it ends.
 
 Source:
-    Macenski et al. (2023), Regulated Pure Pursuit for Robot Path Tracking; Coulter (1992).
+    Macenski et al. (2023), "Regulated Pure Pursuit for Robot Path Tracking"; Coulter (1992), "Implementation of the
+    Pure Pursuit Path Tracking Algorithm".
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ CONTROL_HZ = 60.0
 TURN_TO_PATH, DRIVE, TURN_TO_HEADING, ARRIVED = 0.0, 1.0, 2.0, 3.0
 
 _LATERAL_M_S2 = 0.5  # lateral acceleration in curves: slows the robot where the path bends
-_STEERED = 0.7  # share of the turn acceleration that a curve may ask for: what speed a robot that turns slowly keeps
-_CORNER_RAD = 0.6  # a path that bends by more at a vertex is stopped at there and turned in place
-_ASTRAY_RAD = 1.4  # a lookahead point further aside than any path without corners brings it: turn to it first
+_STEERED = 0.7  # share of the turn acceleration that a curve may need; limits the speed of robots that turn slowly
+_CORNER_RAD = 0.6  # at a vertex with a greater bend the robot stops and turns in place
+_ASTRAY_RAD = 1.4  # bearing of the lookahead point, beyond any on a path without corners, at which it turns in place
 _ALIGNED_RAD = 0.02  # heading error at which a turn in place is over
 _REACHED_M = 0.01  # distance to the end of a stretch at which its driving is over
 _CREEP_M_S = 0.03  # slowest approach, so that the end is reached in finite time
@@ -80,14 +81,14 @@ def new_state() -> FloatArray:
     return np.zeros(4)
 
 
-def sight_m(limits: FloatArray, dt: float) -> float:
-    """Farther ahead along its path than this, nothing makes a difference to a control step [m].
+def horizon_m(limits: FloatArray, dt: float) -> float:
+    """Distance along the path beyond which it has no influence on a control step [m].
 
     Args:
         limits: ``RobotModel.limits``.
         dt: Time between control steps [s].
     """
-    # The nearest point may be so far ahead; from there it looks to its lookahead point, and how far it has to brake.
+    # The nearest point is searched up to _SEARCH_M ahead; beyond it, the lookahead point and the braking distance.
     braking = limits[0] ** 2 / (2.0 * _BRAKING * limits[2]) + limits[0] * dt
     return float(_SEARCH_M + max(LOOKAHEAD_M, braking) + _REACHED_M)
 
@@ -105,13 +106,13 @@ def arc_lengths(path: FloatArray) -> FloatArray:
 def wrap(angle: float) -> float:
     """The same angle in [-pi, pi)."""
     turned = angle + math.pi
-    # Nearly always it is within already, where the remainder would be the number itself, and slow to find.
+    # Nearly always within already: then the slow remainder is skipped.
     return (turned if 0.0 <= turned < 2.0 * math.pi else turned % (2.0 * math.pi)) - math.pi
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _edge_at(arc: FloatArray, s: float) -> int:
-    """Index of the edge on which arc length ``s`` lies: by halves, for paths through mazes have thousands."""
+    """Index of the edge on which arc length ``s`` lies, by bisection: paths through mazes have thousands of edges."""
     low, high = 0, len(arc) - 2
     while low < high:
         middle = (low + high) // 2
@@ -134,7 +135,7 @@ def _point_at(path: FloatArray, arc: FloatArray, s: float, k: int) -> tuple[floa
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float) -> tuple[float, int]:
-    """Arc length of the path point nearest to (x, y), looked for between ``s`` and a little ahead; and its edge."""
+    """Arc length of the path point nearest to (x, y), between ``s`` and ``_SEARCH_M`` ahead; and its edge."""
     k = _edge_at(arc, s)
     best_x, best_y, best, best_s, best_k = 0.0, 0.0, np.inf, s, k  # ``best`` is squared
     while k < len(path) - 1 and arc[k] <= s + _SEARCH_M:
@@ -146,7 +147,7 @@ def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float
             share = (here - arc[k]) / length
             aside_x, aside_y = path[k, 0] + share * dx - x, path[k, 1] + share * dy - y
             squared = aside_x * aside_x + aside_y * aside_y
-            # Nearer by 1e-12 m or more; only where squares leave that in doubt are roots drawn, which are slow.
+            # Nearer by 1e-12 m or more; square roots, which are slow, are taken only where squares can't decide it.
             nearer = best == np.inf or best - squared > 2e-12 * (1.0 + best)
             if not nearer and squared <= best * (1 + 1e-9):
                 nearer = math.hypot(aside_x, aside_y) < math.hypot(best_x, best_y) - 1e-12
@@ -157,7 +158,8 @@ def _nearest_arc(path: FloatArray, arc: FloatArray, s: float, x: float, y: float
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _towards(now: float, wanted: float, step: float) -> float:
+def _rate_limited(now: float, wanted: float, step: float) -> float:
+    """The wanted value, at most a step away from the present one."""
     return min(max(wanted, now - step), now + step)
 
 
@@ -167,7 +169,7 @@ def _turn(error: float, rate: float, dt: float, limits: FloatArray) -> float:
     # The braking curve is evaluated where the robot will be when the command has acted for half a step.
     left = max(abs(error) - 0.5 * abs(rate) * dt, 0.0)
     wanted = min(limits[1], math.sqrt(2.0 * _BRAKING * limits[3] * left), abs(error) / dt)
-    return float(_towards(rate, math.copysign(wanted, error), limits[3] * dt))
+    return float(_rate_limited(rate, math.copysign(wanted, error), limits[3] * dt))
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -178,9 +180,9 @@ def control(
     """One control step along one stretch.
 
     Args:
-        path: Vertices from where the robot stands to where it is to stop [m], shape (n, 2).
+        path: Vertices of the stretch [m], shape (n, 2).
         arc: Arc length at each vertex, as ``arc_lengths`` gives it.
-        heading: Heading in which it is to stop [rad].
+        heading: Heading at the end of the stretch [rad].
         limits: ``RobotModel.limits``.
         state: As ``new_state`` gives it; changed in place. ``state[0]`` is ``ARRIVED`` at the end.
         x, y, yaw: Pose [m, rad].
@@ -205,23 +207,23 @@ def control(
         elif phase == DRIVE and abs(aside) > _ASTRAY_RAD and left > LOOKAHEAD_M / 2:
             phase = TURN_TO_PATH
     if phase == TURN_TO_PATH:
-        speed = _towards(speed, 0.0, limits[2] * dt)
+        speed = _rate_limited(speed, 0.0, limits[2] * dt)
         rate = _turn(aside, rate, dt, limits)
     elif phase == DRIVE:
         distance = max(math.hypot(ahead_x - x, ahead_y - y), 0.05)
         curvature = 2.0 * math.sin(aside) / distance
         bend = max(abs(curvature), 1e-9)
         remaining = max(left - 0.5 * speed * dt, 0.0)
-        # A curve comes up over the lookahead, in which the robot must get from no turn rate to the curve's.
+        # Over the lookahead distance the robot must reach the curve's turn rate from none.
         lateral = min(_LATERAL_M_S2, _STEERED * limits[3] * LOOKAHEAD_M)
         wanted = min(limits[0], math.sqrt(2.0 * _BRAKING * limits[2] * remaining), math.sqrt(lateral / bend),
                      limits[1] / bend)
         wanted = min(max(wanted, min(_CREEP_M_S, limits[0])), left / dt)
-        speed = _towards(speed, wanted, limits[2] * dt)
-        rate = _towards(rate, speed * curvature, 2.0 * limits[3] * dt)
+        speed = _rate_limited(speed, wanted, limits[2] * dt)
+        rate = _rate_limited(rate, speed * curvature, 2.0 * limits[3] * dt)
     if phase == TURN_TO_HEADING:
         error = wrap(heading - yaw)
-        speed = _towards(speed, 0.0, limits[2] * dt)
+        speed = _rate_limited(speed, 0.0, limits[2] * dt)
         if abs(error) < _ALIGNED_RAD and abs(speed) < 1e-9:
             phase, rate = ARRIVED, 0.0
         else:

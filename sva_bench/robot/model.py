@@ -12,10 +12,10 @@ from sva_bench.arrays import FloatArray
 LOOKAHEAD_M = 0.25
 """How far ahead on its path a robot looks; shorter oscillates, longer cuts corners by more than the planning margin."""
 
-_STEERING = 0.3  # least turn acceleration x (time over the lookahead)^2 [rad]: with less it sways about its path
-_BRAKING_LOOKAHEADS = 2.0  # distance in which a robot must come to rest, in lookaheads: a bend may come up only there
+_STEERING = 0.3  # least turn acceleration x (time over the lookahead)^2 [rad]: with less the robot oscillates
+_BRAKING_LOOKAHEADS = 2.0  # braking distance at most, in lookaheads: a bend is seen no earlier
 _GRAVITY_M_S2 = 9.81
-_GRIP = 0.5  # share of the wheels' grip that the accelerations may ask for: speeds change by jerks, twice as fast
+_GRIP = 0.5  # share of the wheels' grip available to the accelerations: speed commands are steps, twice as fast
 CASTERS_AT = 0.75
 """Where the casters are, before and behind the middle, in radii of the hull."""
 _HULL_SHARE, _WHEELS_SHARE = 0.9, 0.1  # of the mass
@@ -23,18 +23,21 @@ _HULL_SHARE, _WHEELS_SHARE = 0.9, 0.1  # of the mass
 
 @dataclass(frozen=True, kw_only=True)
 class RobotModel:
-    """A round robot with two driven wheels on one axis through its centre, and ball casters.
+    """A round differential-drive robot: two driven wheels on one axis through its centre, and ball casters.
 
     Attributes:
         name: Its name.
-        radius_m: Radius of the hull.
-        wheel_radius_m: Radius of the driven wheels.
-        track_m: Distance between the driven wheels.
-        mass_kg: Mass of the whole robot.
-        max_speed_m_s: Fastest it drives.
-        max_turn_rad_s: Fastest it turns on the spot.
-        acceleration_m_s2: Greatest acceleration and braking.
-        turn_acceleration_rad_s2: Greatest angular acceleration.
+        radius_m: Radius of the hull [m].
+        wheel_radius_m: Radius of the driven wheels [m].
+        track_m: Distance between the driven wheels [m].
+        mass_kg: Mass of the whole robot [kg].
+        max_speed_m_s: Greatest speed [m/s].
+        max_turn_rad_s: Greatest turn rate in place [rad/s].
+        acceleration_m_s2: Greatest acceleration and braking [m/s2].
+        turn_acceleration_rad_s2: Greatest angular acceleration [rad/s2].
+
+    Raises:
+        ValueError: If a figure is not positive and finite, or they don't make a robot that drives.
     """
 
     name: str
@@ -63,7 +66,7 @@ class RobotModel:
         self._check_grip()
 
     def _check_grip(self) -> None:
-        """Refuse accelerations at which the wheels would slip: the robot would fall behind its figures.
+        """Refuse accelerations at which the wheels would slip, so that the robot can't reach them.
 
         Each wheel bears half the weight, less what braking puts on the casters, and gives half of the force along and
         its share of the moment about the vertical axis; in a curve the turn rate may change at twice the limit.
@@ -87,9 +90,9 @@ class RobotModel:
 
     @property
     def followed_speed_m_s(self) -> float:
-        """Fastest that it keeps to its path: it must steer and brake for what comes up within its lookahead.
+        """Greatest speed at which it follows a path [m/s]: it must steer and brake within its lookahead.
 
-        Beyond it a robot sways about its path or overshoots bends, and no prediction of its times holds.
+        Beyond it a robot oscillates about its path or overshoots bends, and the predicted times don't hold.
         """
         steered = LOOKAHEAD_M * math.sqrt(self.turn_acceleration_rad_s2 / _STEERING)
         braked = math.sqrt(2 * self.acceleration_m_s2 * _BRAKING_LOOKAHEADS * LOOKAHEAD_M)
@@ -98,7 +101,7 @@ class RobotModel:
     @property
     def turn_inertia_m2(self) -> float:
         """Moment of inertia about the vertical axis per mass [m2], as physics builds the robot."""
-        # Physics takes a hull for the square about it: (2 r)^2 / 6.
+        # Physics takes the inertia of the hull's bounding square: (2 r)^2 / 6.
         return _HULL_SHARE * self.radius_m**2 * 2 / 3 + _WHEELS_SHARE * (self.track_m / 2) ** 2
 
     def figures(self) -> dict[str, float | str]:
@@ -121,4 +124,4 @@ BUILT_IN = {
 }
 
 USUAL_MODEL = "turtlebot2"
-"""The built-in robot of missions that are proposed."""
+"""The built-in robot of proposed missions."""

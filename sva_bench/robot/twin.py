@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray
-from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, Stretch, control, new_state, sight_m
+from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, Stretch, control, horizon_m, new_state
 from sva_bench.robot.model import RobotModel
 
 _SLOWEST = 0.05  # a stretch that takes longer than at this share of the robot's speeds counts as stuck
@@ -18,7 +18,7 @@ _SETTLING_S = 30.0
 
 
 def patience_steps(stretch: Stretch, model: RobotModel) -> int:
-    """Control steps after which a stretch that isn't finished counts as stuck."""
+    """Control steps after which an unfinished stretch counts as stuck."""
     fastest_s = float(stretch.arc[-1]) / model.followed_speed_m_s + 2 * math.pi / model.max_turn_rad_s
     return math.ceil((fastest_s / _SLOWEST + _SETTLING_S) * CONTROL_HZ)
 
@@ -48,7 +48,7 @@ def _drive(
     gain_left: float, gain_right: float, track: float, dt: float, first: int, steps: int, until: float,
     trace: FloatArray,
 ) -> int:
-    """Drives one stretch, from step ``first`` to arrival, to step ``steps`` or beyond an arc length, and says to which.
+    """Drive one stretch from step ``first`` to arrival, step ``steps`` or beyond arc length ``until``; the last step.
 
     Changes ``state`` and ``pose`` in place and fills ``trace`` with the pose after each step.
     """
@@ -70,14 +70,14 @@ def drive(
     model: RobotModel, course: Sequence[Stretch], pose: FloatArray, wheel_gains: tuple[float, float] = (1.0, 1.0),
     *, traced: bool = False,
 ) -> tuple[float, FloatArray]:
-    """Time that a hop takes the ideal robot.
+    """Time that a course takes the ideal robot.
 
     Args:
         model: The robot.
-        course: The stretches of the hop.
-        pose: x, y [m], yaw [rad]; moved to the end of the hop.
+        course: The stretches of the course.
+        pose: x, y [m], yaw [rad] at the start, shape (3,); changed in place to the end.
         wheel_gains: Factor on the speed of the left and the right wheel.
-        traced: Whether to keep the poses.
+        traced: Whether to return the poses.
 
     Returns:
         The time [s], ``inf`` if it never arrives; the pose after each control step, shape (steps, 3), if traced.
@@ -97,13 +97,13 @@ def drive(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Halt:
-    """Where a robot has got to on a course.
+class _DriveState:
+    """The state of a robot part of the way along a course.
 
     Attributes:
-        stretch: The stretch that it is on, by its place in the course.
-        done: Control steps that the stretches before it took.
-        taken: Control steps that it took so far.
+        stretch: Index of its stretch in the course.
+        done: Control steps of the stretches before.
+        taken: Control steps on this stretch so far.
         state: The follower's state.
         pose: x, y [m], yaw [rad].
     """
@@ -116,62 +116,64 @@ class _Halt:
 
 
 def leg_times(model: RobotModel, courses: Sequence[Sequence[Stretch]], pose: FloatArray) -> FloatArray:
-    """Times that legs from one place take the ideal robot, bit by bit as ``drive`` has them.
+    """Times that legs from one pose take the ideal robot, equal to those of ``drive`` to the bit.
 
-    A beginning that legs share is driven once: as far as the follower can't see yet where they part. Paths through a
-    maze share nearly all of their way.
+    The common beginning of legs is driven once, as far as their difference is beyond the follower's horizon. Paths
+    through a maze have most of their length in common.
 
     Args:
         model: The robot.
         courses: The stretches of each leg.
-        pose: x, y [m], yaw [rad] where all of them begin.
+        pose: x, y [m], yaw [rad] at the start of all, shape (3,).
 
     Returns:
-        Time of each leg [s], ``inf`` if it never arrives.
+        Time of each leg [s], ``inf`` if it never arrives, shape (legs,).
     """
     vertices = [np.concatenate([course[0].path[:1], *(stretch.path[1:] for stretch in course)]) for course in courses]
     times = np.full(len(courses), math.inf)
-    work = [(list(range(len(courses))), _Halt(stretch=0, done=0, taken=0, state=new_state(), pose=pose))]
+    work = [(list(range(len(courses))), _DriveState(stretch=0, done=0, taken=0, state=new_state(), pose=pose))]
     while work:
-        legs, halt = work.pop()
+        legs, reached = work.pop()
         first = legs[0]
-        shared = min((_shared(vertices[first], vertices[leg]) for leg in legs[1:]), default=len(vertices[first]))
+        shared = min((_common_vertices(vertices[first], vertices[leg]) for leg in legs[1:]),
+                     default=len(vertices[first]))
         apart: dict[tuple[float, ...] | int, list[int]] = {}
         for leg in legs:
             ends = len(vertices[leg]) == shared
             apart.setdefault(leg if ends else tuple(vertices[leg][shared].tolist()), []).append(leg)
         if len(legs) > 1:
-            halt = _advanced(model, courses[first], halt, shared)
-            work += [(part, halt) for part in apart.values()]
+            reached = _drive_on(model, courses[first], reached, shared)
+            work += [(part, reached) for part in apart.values()]
         else:
-            halt = _advanced(model, courses[first], halt, None)
-            if halt.stretch == len(courses[first]):
-                times[first] = halt.done * (1.0 / CONTROL_HZ)
+            reached = _drive_on(model, courses[first], reached, None)
+            if reached.stretch == len(courses[first]):
+                times[first] = reached.done * (1.0 / CONTROL_HZ)
     return times
 
 
-def _shared(one: FloatArray, other: FloatArray) -> int:
-    """How many vertices two paths begin with in common."""
+def _common_vertices(one: FloatArray, other: FloatArray) -> int:
+    """Number of vertices that the beginnings of two paths have in common."""
     most = min(len(one), len(other))
     differ = (one[:most] != other[:most]).any(axis=1)
     return int(differ.argmax()) if differ.any() else most
 
 
-def _advanced(model: RobotModel, course: Sequence[Stretch], halt: _Halt, shared: int | None) -> _Halt:
-    """A robot driven on, as long as it sees nothing but the first so many vertices; ``None`` = to the end."""
+def _drive_on(model: RobotModel, course: Sequence[Stretch], reached: _DriveState, shared: int | None) -> _DriveState:
+    """The state after driving with only the first ``shared`` vertices within the horizon; ``None`` = to the end."""
     dt, limits, no_trace = 1.0 / CONTROL_HZ, model.limits, np.empty((0, 3))
-    number, done, taken, state, pose = halt.stretch, halt.done, halt.taken, halt.state.copy(), halt.pose.copy()
+    number, done, taken = reached.stretch, reached.done, reached.taken
+    state, pose = reached.state.copy(), reached.pose.copy()
     before = sum(len(stretch.path) - 1 for stretch in course[:number])  # vertices before the stretch
     while number < len(course):
         stretch = course[number]
         last = before + len(stretch.path) - 1
         until = math.inf
-        # Whether a stretch ends at a vertex, and in which heading, depends on the one behind it.
+        # Whether a stretch ends at a vertex, and in which heading, depends on the next vertex.
         if shared is not None and last > shared - 2:
-            until = float(stretch.arc[shared - 1 - before]) - sight_m(limits, dt)
+            until = float(stretch.arc[shared - 1 - before]) - horizon_m(limits, dt)
         taken = _drive(stretch.path, stretch.arc, stretch.heading_rad, limits, state, pose, 1.0, 1.0, model.track_m,
                        dt, taken, patience_steps(stretch, model), until, no_trace)
         if state[0] != ARRIVED:
             break
         number, done, taken, state, before = number + 1, done + taken, 0, new_state(), last
-    return _Halt(stretch=number, done=done, taken=taken, state=state, pose=pose)
+    return _DriveState(stretch=number, done=done, taken=taken, state=state, pose=pose)

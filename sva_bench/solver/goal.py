@@ -1,4 +1,4 @@
-"""What a solve maximises, and what it must keep. Knows numbers alone: no failure process, no method."""
+"""The objective and constraints of a solve, as arrays; independent of failure processes and methods."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from sva_bench.solver.risk import Risk
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Goal:
-    """What a solve maximises, and what it must keep.
+    """The objective of a solve, and lower bounds on other sums of rewards.
 
     Attributes:
         weights: Reward of a visit by vehicle m to site j, shape (M, n); may be negative.
-        floors: Weights and the least sum of them that a plan must reach.
-        driving: What a second of driving and stopping costs.
-        survival: Chance of each vehicle to get to its next POI, shape (M,): the k-th visit of a route earns the k-th
-            power of it; ``None`` = certain.
-        risk: A measure of risk, whose weight is not in ``weights``; its outcomes are the floors, which are then no
-            constraints.
+        floors: Constraints: weights of shape (M, n), and the least sum of them over a plan's visits.
+        driving: Cost of a second of driving and stopping.
+        survival: Probability of each vehicle to get to its next POI, shape (M,): the k-th visit of a route earns its
+            k-th power; ``None`` = certain.
+        risk: A measure of risk, added to ``weights``; its outcomes are then the floors, which are rows of the measure
+            and no constraints.
     """
 
     weights: FloatArray
@@ -36,14 +36,14 @@ class Goal:
         return np.ones(len(self.weights)) if self.survival is None else self.survival
 
     def times(self, factor: float) -> Goal:
-        """The same goal with incentives, and what is compared with them, in another unit."""
+        """The same goal with incentives, and all that is compared with them, multiplied by a factor."""
         return replace(
             self, weights=self.weights * factor, driving=self.driving * factor,
             floors=tuple((weights * factor, floor * factor) for weights, floor in self.floors),
             risk=None if self.risk is None else self.risk.times(factor))
 
     def within(self, reach: BoolArray) -> Goal:
-        """The same goal without the rewards of visits that can't be made.
+        """The same goal without the rewards of infeasible visits.
 
         Args:
             reach: Whether vehicle m can visit site j, shape (M, n).
@@ -53,7 +53,7 @@ class Goal:
         return replace(self, weights=np.where(reach, self.weights, 0.0), risk=risk)
 
     def essential(self) -> Goal:
-        """The same goal but for a constant, without what no plan can change of its measure of risk."""
+        """The same goal but for a constant: its measure of risk reduced to the outcomes that depend on the plan."""
         if self.risk is None:
             return self
         risk = self.risk.essential()
@@ -73,5 +73,5 @@ class Goal:
 
 
 def sizes_of(floors: Sequence[tuple[FloatArray, float]]) -> FloatArray:
-    """By what to divide each floor's row so that a solver's absolute tolerance is a relative one, shape (floors,)."""
+    """Scale of each floor's row, by which to divide it so that absolute tolerances are relative, shape (floors,)."""
     return np.array([max(abs(floor), float(np.abs(weights).max(initial=0.0))) or 1.0 for weights, floor in floors])

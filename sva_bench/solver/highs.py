@@ -24,7 +24,7 @@ INTEGRALITY = 1e-9
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MipResult:
-    """What a solve of an integer program came to.
+    """The result of a mixed-integer program.
 
     Attributes:
         status: How it ended.
@@ -49,9 +49,9 @@ class Relaxed:
         status: How it ended.
         values: The optimum, shape (columns,); ``None`` if there is none, or it was not reached.
         objective: Its objective; ``-inf`` if there is none, ``inf`` if it was not reached.
-        reduced: Reduced cost of each column; positive ones would gain, shape (columns,).
+        reduced: Reduced cost of each column, positive where raising it would improve the objective, shape (columns,).
         activity: Value of each row, shape (rows,).
-        duals: Gain by each unit of a row's bound, shape (rows,).
+        duals: Dual value of each row: gain in the objective per unit of its bound, shape (rows,).
     """
 
     status: SolveStatus
@@ -88,7 +88,11 @@ class Relaxation:
                                     start[:-1], row, value), "addCols")
 
     def solve(self, time_limit_s: float) -> Relaxed:
-        """The optimum over the rows and columns so far; a large program is given up on Ctrl-C."""
+        """The optimum over the rows and columns so far.
+
+        Raises:
+            KeyboardInterrupt: If Ctrl-C is pressed during a large program.
+        """
         _option(self._solver, "time_limit", time_limit_s)
         if self._entries < _LARGE:
             _check(self._solver.run(), "run")
@@ -110,10 +114,15 @@ class Relaxation:
 
 
     def solve_integer(self, columns: IntArray, time_limit_s: float) -> MipResult:
-        """The optimum over integer values of some columns, proved but for rounding; the relaxation is lost."""
-        _set_whole(self._solver, columns)
+        """The optimum with some columns integer, proved but for rounding; the relaxation can't be solved again.
+
+        Args:
+            columns: Numbers of the integer columns.
+            time_limit_s: Wall-clock limit [s]; ``inf`` = none.
+        """
+        _set_integer(self._solver, columns)
         return _branch_and_bound(self._solver, gap=0.0, absolute_gap=1e-6, time_limit_s=time_limit_s, most_nodes=None,
-                                 heuristics=0.05, whole=len(columns) > 0)
+                                 heuristics=0.05, has_integers=len(columns) > 0)
 
 
 def maximise(
@@ -136,23 +145,23 @@ def maximise(
     if len(rows.lower):
         _check(solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1], rows.column,
                               rows.value), "addRows")
-    _set_whole(solver, np.flatnonzero(model.integer))
+    _set_integer(solver, np.flatnonzero(model.integer))
     if start is not None:
         solution = highspy.HighsSolution()
         solution.col_value = start.tolist()
         _check(solver.setSolution(solution), "setSolution")
     return _branch_and_bound(solver, gap=gap, absolute_gap=absolute_gap, time_limit_s=time_limit_s,
-                             most_nodes=most_nodes, heuristics=heuristics, whole=bool(model.integer.any()))
+                             most_nodes=most_nodes, heuristics=heuristics, has_integers=bool(model.integer.any()))
 
 
-def _set_whole(solver: Any, columns: IntArray) -> None:
+def _set_integer(solver: Any, columns: IntArray) -> None:
     kinds = np.full(len(columns), int(highspy.HighsVarType.kInteger), dtype=np.uint8)
     _check(solver.changeColsIntegrality(len(columns), columns.astype(np.int32), kinds), "changeColsIntegrality")
 
 
 def _branch_and_bound(
     solver: Any, *, gap: float, absolute_gap: float, time_limit_s: float, most_nodes: int | None, heuristics: float,
-    whole: bool,
+    has_integers: bool,
 ) -> MipResult:
     _option(solver, "mip_rel_gap", gap)
     _option(solver, "mip_abs_gap", absolute_gap)
@@ -168,7 +177,7 @@ def _branch_and_bound(
     info = solver.getInfo()
     found = info.primal_solution_status == highspy.SolutionStatus.kSolutionStatusFeasible
     # Without integer columns, as where no route is left to choose, HiGHS solves a linear program and states no bound.
-    bound = float(info.mip_dual_bound if whole else info.objective_function_value)
+    bound = float(info.mip_dual_bound if has_integers else info.objective_function_value)
     if not math.isfinite(bound) or status == "infeasible":
         bound = -math.inf if status == "infeasible" else math.inf
     return MipResult(
@@ -179,9 +188,9 @@ def _branch_and_bound(
 
 
 class _Silent(highspy.Highs):  # type: ignore[misc]
-    """HiGHS without a banner, which belongs on no one's standard output.
+    """HiGHS without a banner on standard output.
 
-    It comes with the first call of all that is no option; from 1.16 on that is this one, in the constructor.
+    The banner is printed at the first call that sets no option; from 1.16 on that is this one, in the constructor.
     """
 
     def enableCallbacks(self) -> None:
@@ -193,7 +202,7 @@ class _Silent(highspy.Highs):  # type: ignore[misc]
 def _open(model: LinearModel) -> Any:
     """A solver that holds the model's linear relaxation."""
     solver = _Silent()
-    # From 1.16 on HiGHS searches a tree on several threads unless told not to: order and ties would be the machine's.
+    # From 1.16 on HiGHS branches on several threads by default, and ties would depend on the machine.
     _option(solver, "threads", 1)
     _option(solver, "parallel", "off")
     _option(solver, "random_seed", 0)
@@ -214,13 +223,13 @@ def _open(model: LinearModel) -> Any:
 
 
 def _run_interruptibly(solver: Any) -> bool:
-    """Run in a thread, so that Ctrl-C reaches us at once and not after the solve; whether it did.
+    """Run the solver in a thread, so that Ctrl-C cancels it at once; whether it did.
 
-    It counts as heard: what the solver has by then is still to be taken up.
+    Ctrl-C is then handled: the caller still uses what the solver has found.
     """
     solver.HandleUserInterrupt = True
     ended: list[Any] = []
-    over = Event()  # not Thread.join: interrupted, it takes a running thread for a dead one (Python 3.11)
+    over = Event()  # not Thread.join: interrupted, it marks a running thread as stopped (Python 3.11)
 
     def run() -> None:
         try:
@@ -262,6 +271,6 @@ def _option(solver: Any, name: str, value: bool | int | float | str) -> None:
 
 
 def _check(status: Any, what: str) -> None:
-    """Refuse an error; warnings are judged by the model status."""
+    """Raise on an error; warnings show in the model status."""
     if status == highspy.HighsStatus.kError:
         raise RuntimeError(f"HiGHS: {what} failed")

@@ -1,4 +1,4 @@
-"""What a solve begins with, how far it has got, and what it came to."""
+"""The state of solves: limits, incumbent and bound, results, and what solves of one instance share."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from sva_bench.choices import Status
 from sva_bench.interrupts import hear_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.goal import Goal
-from sva_bench.solver.routes.fronts import Tables, tables_of
+from sva_bench.solver.routes.fronts import LegTables, leg_tables
 from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.heuristic import value_of as rewards
-from sva_bench.solver.routes.refuelling import Road, quickest, road_of
+from sva_bench.solver.routes.refuelling import VehicleLegs, quickest_route, vehicle_legs
 from sva_bench.solver.units import common_unit
 
 Routes = tuple[tuple[int, ...], ...]
@@ -61,15 +61,15 @@ class Clock:
         """Time since the start [s]."""
         return time.monotonic() - self.started
 
-    def out(self) -> bool:
-        """Whether no time is left; Ctrl-C is heard here at the latest."""
+    def is_over(self) -> bool:
+        """Whether the deadline has passed; raises ``KeyboardInterrupt`` if Ctrl-C was pressed."""
         hear_ctrl_c()
         return time.monotonic() >= self.deadline
 
 
 @dataclass(frozen=True, kw_only=True, order=True)
 class Cut:
-    """A connectivity cut of one vehicle: what it drives out of the sites S is no less than what it drives into i.
+    """A connectivity cut of one vehicle: ``y(out of S) >= y(into i)`` for a POI i in S.
 
     Attributes:
         vehicle: Number of the vehicle.
@@ -84,20 +84,20 @@ class Cut:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
-    """What a solve came to.
+    """The result of a solve.
 
     Attributes:
         routes: Sites of each vehicle's route.
-        orders: Its POIs alone.
-        value: Value of the goal.
+        orders: POIs of each vehicle in order of visit.
+        value: Objective value.
         bound: Upper bound on it.
-        status: How it ended.
+        status: How the solve ended.
         nodes: Branch-and-bound nodes.
         cuts: Connectivity cuts in the last program.
         optimality_cuts: Cuts from the second stage, of the L-shaped method.
         rounds: Linear and integer programs solved.
         seconds: Wall-clock time of each phase [s].
-        method: How it was proved.
+        method: The method that proved it.
     """
 
     routes: Routes
@@ -115,20 +115,20 @@ class Solution:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Knowledge:
-    """What earlier solves of the same sites and vehicles found; availabilities may differ between them.
+    """What solves of one instance share: cuts, plans and solutions; availabilities may differ between the solves.
 
     Attributes:
-        instance: The instance it began with.
-        roads: Road of each vehicle.
-        tables: The same for compiled code.
+        instance: The instance of the first solve.
+        legs_by_vehicle: Legs of each vehicle.
+        tables: The same as arrays, for compiled code.
         cuts: Connectivity cuts, valid for any goal, in order of discovery.
         orders: Feasible plans, in order of discovery.
         solutions: Proved solutions by what defines their goal.
     """
 
     instance: Instance
-    roads: tuple[Road, ...]
-    tables: Tables
+    legs_by_vehicle: tuple[VehicleLegs, ...]
+    tables: LegTables
     cuts: dict[Cut, None] = field(default_factory=dict)
     orders: dict[VisitOrders, None] = field(default_factory=dict)
     solutions: dict[tuple[object, ...], Solution] = field(default_factory=dict)
@@ -152,14 +152,29 @@ class Knowledge:
 
 
 def knowledge_of(instance: Instance) -> Knowledge:
-    """Nothing known yet."""
-    return Knowledge(instance=instance, roads=tuple(road_of(instance, v) for v in instance.vehicles),
-                     tables=tables_of(instance))
+    """The knowledge of an instance before its first solve."""
+    return Knowledge(instance=instance, legs_by_vehicle=tuple(vehicle_legs(instance, v) for v in instance.vehicles),
+                     tables=leg_tables(instance))
 
 
 @dataclass(eq=False, kw_only=True)
 class Progress:
-    """The state of a solve, kept where Ctrl-C can't lose it."""
+    """The incumbent, its bound and counters of a running solve; kept when Ctrl-C ends it.
+
+    Attributes:
+        orders: POIs of each vehicle, of the best plan so far.
+        value: Its objective value.
+        bound: Upper bound on the objective.
+        status: How the solve ended, so far.
+        nodes: Branch-and-bound nodes.
+        cuts: Connectivity cuts in the last program.
+        optimality_cuts: Cuts from the second stage, of the L-shaped method.
+        rounds: Linear and integer programs solved.
+        seconds: Wall-clock time of each phase [s].
+        grain: Every plan's value is a multiple of it; 0 = unknown.
+        rounding: Difference up to which a bound and a value are the same.
+        constant: Part of every plan's value that is left out here; relative gaps include it.
+    """
 
     orders: VisitOrders
     value: float
@@ -170,23 +185,22 @@ class Progress:
     optimality_cuts: int = 0
     rounds: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
-    grain: float = 0.0  # every plan's value is a multiple of it; 0 = unknown
-    rounding: float = 0.0  # a bound that is above the value by no more is the value
-    constant: float = 0.0  # part of every plan's value that is left out here; gaps are relative to all of it
+    grain: float = 0.0
+    rounding: float = 0.0
+    constant: float = 0.0
 
     def tighten(self, bound: float) -> None:
-        """Take up an upper bound, and round it down to a value that a plan can have."""
+        """Lower the bound, rounded down to a multiple of the grain."""
         if self.grain and math.isfinite(bound):
             bound = math.floor((bound + self.rounding) / self.grain + 1e-6) * self.grain
         self.bound = min(self.bound, bound)
 
     def closed(self, gap: float) -> bool:
-        """Whether nothing is left to prove."""
+        """Whether the incumbent is proved within a relative gap."""
         return self.bound - self.value <= max(gap * abs(self.value + self.constant), self.rounding)
 
     def slack(self, gap: float) -> float:
-        """By how much another plan must be worth more to be of interest: less is within the gap, or below the next
-        value that a plan can have, or rounding."""
+        """Least improvement over the incumbent that matters: beyond the gap, the grain and rounding."""
         return max(gap * abs(self.value + self.constant), (1 - 1e-5) * self.grain - 2 * self.rounding,
                    self.rounding / 2)
 
@@ -194,22 +208,22 @@ class Progress:
 def best_known(goal: Goal, known: Knowledge) -> VisitOrders | None:
     """The best of the known plans under a goal, without stops that earn nothing; ``None`` if none keeps the floors."""
     rewarded = goal.rewarded()
-    nobody: VisitOrders = tuple(() for _ in known.roads)
+    all_at_base: VisitOrders = tuple(() for _ in known.legs_by_vehicle)
     candidates = [
-        tuple(without_idle_stops(road, order, rewarded[m])
-              for m, (road, order) in enumerate(zip(known.roads, orders, strict=True)))
-        for orders in (*known.orders, nobody)]
+        tuple(without_idle_stops(own_legs, order, rewarded[m])
+              for m, (own_legs, order) in enumerate(zip(known.legs_by_vehicle, orders, strict=True)))
+        for orders in (*known.orders, all_at_base)]
     kept = [orders for orders in candidates if _keeps_floors(goal, orders)]
-    return max(kept, key=lambda orders: value_of(goal, known.roads, orders)) if kept else None
+    return max(kept, key=lambda orders: value_of(goal, known.legs_by_vehicle, orders)) if kept else None
 
 
-def without_idle_stops(road: Road, order: tuple[int, ...], rewarded: BoolArray) -> tuple[int, ...]:
-    """The order without POIs without reward, but for those that the rest can't be driven without."""
+def without_idle_stops(own_legs: VehicleLegs, order: tuple[int, ...], rewarded: BoolArray) -> tuple[int, ...]:
+    """The order without POIs of no reward, but for those without which the route would be infeasible."""
     if not any(rewarded[j] for j in order):
         return ()
     for poi in order:
         shorter = tuple(j for j in order if j != poi)
-        if not rewarded[poi] and quickest(road, shorter) is not None:
+        if not rewarded[poi] and quickest_route(own_legs, shorter) is not None:
             order = shorter
     return order
 
@@ -220,21 +234,25 @@ def _keeps_floors(goal: Goal, orders: VisitOrders) -> bool:
 
 def adopt(progress: Progress, goal: Goal, known: Knowledge, orders: VisitOrders) -> None:
     """Make a plan the incumbent if it is better."""
-    value = value_of(goal, known.roads, orders)
+    value = value_of(goal, known.legs_by_vehicle, orders)
     if value > progress.value and _keeps_floors(goal, orders):
         progress.orders, progress.value = orders, value
 
 
-def value_of(goal: Goal, roads: Sequence[Road], orders: VisitOrders) -> float:
-    """Value of a feasible plan under a goal."""
+def value_of(goal: Goal, legs_by_vehicle: Sequence[VehicleLegs], orders: VisitOrders) -> float:
+    """Value of a feasible plan under a goal.
+
+    Raises:
+        ValueError: If driving costs and the plan is infeasible.
+    """
     value = rewards(goal.weights, goal.chances(), orders)
     if goal.risk is not None:
         earned = goal.risk.outcomes.incentives
         sums = np.array([math.fsum(earned[m, j] for j in order) for m, order in enumerate(orders)])
         value += goal.risk.measure.weight * goal.risk.of(sums)
     if goal.driving:
-        for road, order in zip(roads, orders, strict=True):
-            found = quickest(road, order)
+        for own_legs, order in zip(legs_by_vehicle, orders, strict=True):
+            found = quickest_route(own_legs, order)
             if found is None:
                 raise ValueError("an infeasible plan has no value")
             value -= goal.driving * found.time_s
@@ -245,20 +263,20 @@ def _sum(weights: FloatArray, orders: VisitOrders) -> float:
     return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
 
 
-def drive(road: Road, order: tuple[int, ...]) -> tuple[int, ...]:
-    """Sites of the quickest route over POIs in this order.
+def route_over(own_legs: VehicleLegs, order: tuple[int, ...]) -> tuple[int, ...]:
+    """Sites of the quickest route over POIs in this order, from base to base.
 
     Raises:
-        RuntimeError: If there is none.
+        RuntimeError: If the order is infeasible.
     """
-    found = quickest(road, order)
+    found = quickest_route(own_legs, order)
     if found is None:
         raise RuntimeError(f"no feasible route visits {order}")
     return found.route
 
 
 def trivial_bound(goal: Goal) -> float:
-    """Every POI visited by whoever earns most there."""
+    """Upper bound on a goal: every POI visited by the vehicle that earns most there."""
     if not len(goal.weights):
         return 0.0
     bound = float(np.maximum(goal.weights.max(axis=0), 0.0).sum())
@@ -268,7 +286,7 @@ def trivial_bound(goal: Goal) -> float:
 
 
 def grain_of(goal: Goal) -> float:
-    """The greatest number of which every plan's value is a multiple; 0 where none is plain to see."""
+    """The greatest number of which every plan's value is a multiple; 0 where none is known."""
     if goal.driving or goal.survival is not None or goal.risk is not None:
         return 0.0
     return common_unit(goal.weights.ravel())

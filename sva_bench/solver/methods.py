@@ -1,4 +1,4 @@
-"""The methods that prove a plan, a line each, and the rule by which ``auto`` chooses among them."""
+"""The registry of solution methods, one line each, and the rule by which ``auto`` chooses among them."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from sva_bench.errors import BadInput
 from sva_bench.solver.columns.prove import prove_by_columns
 from sva_bench.solver.flow.branch_and_cut import prove_by_cuts
 from sva_bench.solver.flow.expected import DirectedModel
-from sva_bench.solver.flow.lshaped import prove_by_duals
+from sva_bench.solver.flow.lshaped import prove_by_lshaped
 from sva_bench.solver.flow.recourse import EquivalentModel
 from sva_bench.solver.flow.undirected import UndirectedModel, serves
 from sva_bench.solver.problem import Problem
 
 LONG = {1: 2.0, 2: 2.0, 3: 2.6, 4: 2.6}
-"""Mission limit in longest legs from which the edge model proves sooner than columns do, by number of vehicles."""
+"""Mission limit, in longest legs, from which the edge model is faster than branch-and-price, by number of vehicles."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SolutionMethod:
-    """A method.
+    """A solution method.
 
     Attributes:
-        name: How options call it; ``choices.METHODS`` has its description.
+        name: Its name in options; ``choices.METHODS`` has its description.
         prove: Proves the plan of a problem's progress, or a better one, within the gap.
-        second_stage: Whether it keeps the second stage as the paper has it.
-        discounts: Whether it serves rewards that depend on the order of visits.
-        risk: Whether it serves measures of risk.
-        serves: Whether it serves an instance, whatever the goal.
+        second_stage: Whether it keeps the second stage explicitly, as in the paper.
+        discounts: Whether it supports rewards that depend on the order of visits.
+        risk: Whether it supports measures of risk.
+        serves: Whether it supports an instance, whatever the goal.
     """
 
     name: Method
@@ -49,13 +49,13 @@ class SolutionMethod:
         return choices.METHODS[self.name]
 
     def accepts(self, problem: Problem) -> bool:
-        """Whether it proves plans of this problem."""
+        """Whether it supports this problem."""
         return ((self.discounts or problem.goal.survival is None) and (self.risk or problem.goal.risk is None)
                 and self.serves(problem))
 
 
 def _directed(problem: Problem) -> None:
-    prove_by_cuts(DirectedModel(problem.instance, problem.scopes, problem.goal, problem.known.roads), problem)
+    prove_by_cuts(DirectedModel(problem.instance, problem.scopes, problem.goal, problem.known.legs_by_vehicle), problem)
 
 
 def _undirected(problem: Problem) -> None:
@@ -63,7 +63,7 @@ def _undirected(problem: Problem) -> None:
 
 
 def _equivalent(problem: Problem, *, relaxed: bool = False) -> None:
-    prove_by_cuts(EquivalentModel(problem.instance, problem.scopes, problem.goal, problem.known.roads,
+    prove_by_cuts(EquivalentModel(problem.instance, problem.scopes, problem.goal, problem.known.legs_by_vehicle,
                                   problem.second_stage, relaxed=relaxed), problem)
 
 
@@ -79,7 +79,7 @@ _ALL = (
     SolutionMethod(name="expected", prove=_directed),
     SolutionMethod(name="dep", prove=_equivalent, second_stage=True),
     SolutionMethod(name="relaxed", prove=_relaxed, second_stage=True),
-    SolutionMethod(name="lshaped", prove=prove_by_duals, second_stage=True),
+    SolutionMethod(name="lshaped", prove=prove_by_lshaped, second_stage=True),
     SolutionMethod(name="undirected", prove=_undirected, serves=_is_undirected),
     SolutionMethod(name="branch-and-price", prove=prove_by_columns, discounts=True, risk=True),
 )
@@ -88,12 +88,12 @@ METHODS: Mapping[Method, SolutionMethod] = {method.name: method for method in _A
 
 
 def keeps_second_stage(name: Method) -> bool:
-    """Whether a method keeps the second stage as the paper has it; ``auto`` chooses none that does."""
+    """Whether a method keeps the second stage explicitly; ``auto`` chooses none that does."""
     return name in METHODS and METHODS[name].second_stage
 
 
 def serves_discounts(name: Method) -> bool:
-    """Whether a method serves rewards that depend on the order of visits; ``auto`` chooses one that does."""
+    """Whether a method supports rewards that depend on the order of visits; ``auto`` chooses one that does."""
     return name not in METHODS or METHODS[name].discounts
 
 
@@ -101,28 +101,28 @@ def method_for(name: Method, problem: Problem) -> SolutionMethod:
     """The method of that name, or the one that ``auto`` chooses.
 
     Raises:
-        BadInput: If it doesn't serve the problem.
+        BadInput: If it doesn't support the problem.
     """
     method = METHODS[name if name in METHODS else choice(problem)]
     if not method.accepts(problem):
         raise BadInput(f"instance {problem.instance.name}: the method {method.name} ({method.description}) doesn't "
-                       "serve it; take the method auto")
+                       "support it; take the method auto")
     return method
 
 
 def choice(problem: Problem) -> Method:
-    """What ``auto`` chooses, by what was measured in ``benchmarks/solver``.
+    """The method that ``auto`` chooses, by the measurements of ``benchmarks/solver``.
 
-    Long routes that never refuel, by few vehicles, over symmetric costs want the edge model. Where a mission limit is
-    missing routes are too long for labels, and the directed model takes over. All else wants routes as columns, and
-    failures along the route and measures of risk leave no other choice.
+    Long routes without refuels, of few vehicles, over symmetric costs are solved by the edge model. Without a mission
+    limit routes are too long for labels, and the directed model serves. All others go to branch-and-price, and
+    failures along the route and measures of risk are supported by no other method.
     """
     instance, scopes, goal = problem.instance, problem.scopes, problem.goal
     if goal.survival is not None or goal.risk is not None:
         return "branch-and-price"
     if not all(math.isfinite(v.mission_limit_s) for v in instance.vehicles):
         return "expected"
-    # Of all legs: those that a short limit leaves are short themselves.
+    # Of all legs of the instance: with a short limit, the legs of the scopes are short too.
     longest = max((float(v.fuel_s[np.isfinite(v.fuel_s)].max()) for v in instance.vehicles), default=0.0)
     shortest_limit = min((v.mission_limit_s for v in instance.vehicles), default=0.0)
     if len(scopes) in LONG and shortest_limit >= LONG[len(scopes)] * longest and serves(instance, scopes):

@@ -1,4 +1,4 @@
-"""Which vehicles can be available, with what probability, and what they would earn."""
+"""The outcomes of the draw of availabilities: sets of available vehicles and their probabilities."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def possible(instance: Instance) -> dict[frozenset[str], float]:
         return found
     certain = [v.name for v in instance.vehicles if v.availability == 1]
     uncertain = [v for v in instance.vehicles if 0 < v.availability < 1]
-    for there in itertools.product((True, False), repeat=len(uncertain)):
-        names = frozenset([*certain, *(v.name for v, t in zip(uncertain, there, strict=True) if t)])
+    for drawn in itertools.product((True, False), repeat=len(uncertain)):
+        names = frozenset([*certain, *(v.name for v, t in zip(uncertain, drawn, strict=True) if t)])
         found[names] = math.prod(
-            v.availability if t else 1 - v.availability for v, t in zip(uncertain, there, strict=True))
+            v.availability if t else 1 - v.availability for v, t in zip(uncertain, drawn, strict=True))
     return found
 
 
@@ -61,7 +61,7 @@ def outcomes_of(instance: Instance, sets: Mapping[frozenset[str], float], scale:
         scale: Unit of the rewards.
 
     Raises:
-        BadInput: If there are more than a program should have rows for.
+        BadInput: If there are more than ``MOST_OUTCOMES``, each of which is rows of the program.
     """
     if len(sets) > MOST_OUTCOMES:
         raise BadInput(f"instance {instance.name}: {len(sets)} sets of vehicles can be available, and the program has "
@@ -71,5 +71,5 @@ def outcomes_of(instance: Instance, sets: Mapping[frozenset[str], float], scale:
     return Outcomes(
         incentives=np.array([v.incentives for v in instance.vehicles]).reshape(len(names), len(instance.sites)) / scale,
         probability=np.array(list(sets.values())),
-        available=np.array([[float(name in there) for name in names] for there in sets]).reshape(
+        available=np.array([[float(name in vehicles) for name in names] for vehicles in sets]).reshape(
             len(sets), len(names)))

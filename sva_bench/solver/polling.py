@@ -1,7 +1,7 @@
-"""Polling from compiled code: was Ctrl-C pressed, and is time up?
+"""Polling for Ctrl-C and the deadline from compiled code.
 
-Compiled code keeps Python from noticing signals. So code that may take long calls ``poll`` now and then, which lets
-Python run its handlers and see the clock; called within ``deferring_ctrl_c``, they only leave a mark in ``stop``.
+While compiled code runs, Python handles no signals. So compiled loops call ``poll`` regularly, which lets
+Python run its handlers; within ``deferring_ctrl_c`` these only set the flag ``stop``.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def stop_flag() -> NDArray[np.uint8]:
 
 @njit(cache=True)
 def poll(stop):
-    """Whether to stop; gives Python's handlers of signals a chance to say so."""
-    if _run_handlers() != 0:  # another handler's exception: compiled code can't raise it, but can end
+    """Whether to stop: runs Python's signal handlers, and reads the flag they set."""
+    if _run_handlers() != 0:  # an exception of another handler: compiled code can't raise it, so it stops
         _forget_error()
         stop[0] = 1
     return stop[0] != 0
@@ -43,7 +43,7 @@ def poll(stop):
 
 @njit(cache=True)
 def now_s():
-    """A clock [s]."""
+    """The monotonic clock [s], from compiled code."""
     parts = np.zeros(2, np.int64)
     _clock_gettime(_CLOCK, parts.ctypes)
     return parts[0] + 1e-9 * parts[1]

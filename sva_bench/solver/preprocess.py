@@ -1,6 +1,6 @@
-"""What one vehicle may do in a solve: the sites and legs that some plan worth having can use.
+"""Preprocessing: the sites and legs that a vehicle can use in an optimal plan, and bounds on its fuel and time.
 
-Every bound is a shortest path, so nothing here needs the triangle inequality but the one rule that says so.
+Every bound is a shortest path, so only the removal of unrewarded stops needs the triangle inequality.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 _log = logging.getLogger(__name__)
 
 SLACK_S = TOLERANCE_S / 2
-"""Half the feasibility tolerance: a route that is on its limit but for rounding stays feasible."""
+"""Half the feasibility tolerance, added to capacities and limits: a route that meets its limit stays feasible."""
 _ROUNDING_S = 1e-9  # of sums of legs
 
 
@@ -26,7 +26,7 @@ class Scope:
     """The legs that one vehicle may drive, and the bounds on its fuel.
 
     Attributes:
-        legs: Whether the leg from site i to site j is of use, shape (n, n).
+        legs: Whether an optimal plan can use the leg from site i to site j, shape (n, n).
         fuel_s: Fuel of a leg [s], shape (n, n).
         time_s: Driving time of a leg and the stop at its end [s], shape (n, n).
         since_refuel_s: Least fuel burnt since the last refuel on arrival at a site [s], ``s_i``, shape (n,).
@@ -49,7 +49,13 @@ class Scope:
 
 
 def is_metric(cost: FloatArray, base: int, *, tolerance_s: float = TOLERANCE_S) -> bool:
-    """Whether no detour is cheaper than a direct leg, but for detours over the base, which no route can take."""
+    """Whether a cost obeys the triangle inequality, except by way of the base, which no route can take.
+
+    Args:
+        cost: Cost from site i to site j [s], shape (n, n).
+        base: The base.
+        tolerance_s: Violation that is accepted [s].
+    """
     for k in range(len(cost)):
         if k != base:
             excess = cost > cost[:, k, None] + cost[None, k, :] + max(tolerance_s, _ROUNDING_S)
@@ -74,19 +80,19 @@ def shortest_paths(cost: FloatArray, base: int) -> FloatArray:
 
 
 def warn_of_unreachable(instance: Instance) -> None:
-    """Log the POIs that no vehicle can reach and come home from, however much fuel and time it has."""
-    there_and_back = np.zeros(len(instance.sites), dtype=np.bool_)
+    """Log the POIs that no vehicle can reach and return from, whatever its fuel and limit."""
+    connected = np.zeros(len(instance.sites), dtype=np.bool_)
     for vehicle in instance.vehicles:
         _, part = connected_components(np.isfinite(vehicle.fuel_s), connection="strong")
-        there_and_back |= part == part[instance.base]
+        connected |= part == part[instance.base]
     for poi in instance.pois:
-        if instance.vehicles and not there_and_back[poi]:
+        if instance.vehicles and not connected[poi]:
             _log.warning("instance %s: POI %s cannot be reached and left again; it is left out of the plan",
                          instance.name, instance.sites[poi])
 
 
 def scope_of(instance: Instance, vehicle: Vehicle, rewarded: BoolArray) -> Scope:
-    """The legs of use to one vehicle.
+    """The legs that one vehicle can use in an optimal plan, and bounds on its fuel and time.
 
     Args:
         instance: The instance.
@@ -104,23 +110,23 @@ def scope_of(instance: Instance, vehicle: Vehicle, rewarded: BoolArray) -> Scope
     keep = np.zeros(n, dtype=np.bool_)
     if rewarded.any():
         keep[:] = True
-        if is_metric(fuel, base):  # then a stop that earns nothing never helps
+        if is_metric(fuel, base):  # then a stop without reward improves no route
             keep[list(instance.pois)] = rewarded[list(instance.pois)]
             keep[list(instance.stations)] = np.isfinite(capacity)
         keep[base] = True
     fuel[~keep], fuel[:, ~keep] = np.inf, np.inf
     time[~keep], time[:, ~keep] = np.inf, np.inf
     refuels = [base, *(r for r in instance.stations if keep[r])]
-    ahead, behind, arrival, departure = _fuel_and_time_around(fuel, time, base, refuels, capacity)
+    to_refuel, since_refuel, arrival, departure = _fuel_and_time_around(fuel, time, base, refuels, capacity)
     legs = np.zeros((n, n), dtype=np.bool_)
     for q in range(len(refuels)):
         for r in range(len(refuels)):
-            legs |= (behind[q][:, None] + fuel + ahead[r][None, :] <= capacity + TOLERANCE_S) \
+            legs |= (since_refuel[q][:, None] + fuel + to_refuel[r][None, :] <= capacity + TOLERANCE_S) \
                 & (arrival[q][:, None] + time + departure[r][None, :] <= vehicle.mission_limit_s + TOLERANCE_S) \
                 & np.isfinite(arrival[q][:, None] + time + departure[r][None, :])
     np.fill_diagonal(legs, False)
     return Scope(
-        legs=legs, fuel_s=fuel, time_s=time, since_refuel_s=behind.min(axis=0), to_refuel_s=ahead.min(axis=0),
+        legs=legs, fuel_s=fuel, time_s=time, since_refuel_s=since_refuel.min(axis=0), to_refuel_s=to_refuel.min(axis=0),
         since_start_s=arrival.min(axis=0), to_end_s=departure.min(axis=0), capacity_s=capacity,
         limit_s=vehicle.mission_limit_s)
 
@@ -133,13 +139,13 @@ def _fuel_and_time_around(
     fuel_paths, time_paths = shortest_paths(fuel, base), shortest_paths(time, base)
     hop = np.where(fuel_paths <= capacity + TOLERANCE_S, time_paths, np.inf)[np.ix_(refuels, refuels)]
     hop = shortest_paths(hop, 0)
-    behind, ahead = fuel_paths[refuels].copy(), fuel_paths[:, refuels].T.copy()
+    since_refuel, to_refuel = fuel_paths[refuels].copy(), fuel_paths[:, refuels].T.copy()
     arrival = hop[0][:, None] + time_paths[refuels]
     departure = hop[:, 0][:, None] + time_paths[:, refuels].T
-    behind[np.isinf(arrival)], ahead[np.isinf(departure)] = np.inf, np.inf
-    for number, site in enumerate(refuels):  # at a refuel the tank is full: no other state exists there
-        for array in (behind, ahead, arrival, departure):
+    since_refuel[np.isinf(arrival)], to_refuel[np.isinf(departure)] = np.inf, np.inf
+    for number, site in enumerate(refuels):  # at a refuel the tank is full: that is its only state
+        for array in (since_refuel, to_refuel, arrival, departure):
             array[:, site] = np.inf
-        behind[number, site] = ahead[number, site] = 0.0
+        since_refuel[number, site] = to_refuel[number, site] = 0.0
         arrival[number, site], departure[number, site] = hop[0, number], hop[number, 0]
-    return ahead, behind, arrival, departure
+    return to_refuel, since_refuel, arrival, departure

@@ -1,4 +1,4 @@
-"""What a method has to prove, and all that it may use."""
+"""The problem that a solution method proves: goal, instance, incumbent and shared knowledge."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from sva_bench.solver.routes.packing import Route
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Problem:
-    """A goal on an instance, in the solver's own units, and the best plan so far.
+    """A goal on an instance, in the solver's own units, and the incumbent.
 
     Attributes:
         instance: The instance.
-        scopes: What each vehicle may do.
+        scopes: Legs and bounds of each vehicle.
         goal: What to maximise.
         known: What earlier solves found; methods add to it.
         clock: Time left.
         gap: Gap at which a plan counts as optimal.
-        progress: The best plan so far and its bound, which the method improves.
-        recourse: The second stage; ``None`` where it is not kept.
-        cuts: Optimality cuts of the L-shaped method.
-        routes: Routes that the heuristic met, each with its vehicle; good columns to begin with.
+        progress: The incumbent and its bound, which the method improves.
+        recourse: The second stage; ``None`` in the collapsed model.
+        cuts: Kind of optimality cuts of the L-shaped method.
+        routes: Routes that the heuristic found, each with its vehicle: initial columns.
     """
 
     instance: Instance
@@ -44,10 +44,10 @@ class Problem:
 
     @property
     def second_stage(self) -> Outcomes:
-        """The second stage, for the methods that keep it.
+        """The second stage, for the methods that keep it explicitly.
 
         Raises:
-            ValueError: If there is none.
+            ValueError: If the problem has none.
         """
         if self.recourse is None:
             raise ValueError("this method needs a second stage")

@@ -1,4 +1,4 @@
-"""Linear programs as arrays: rows, columns and objective. Knows no solver and no mission."""
+"""Linear programs as arrays: rows, columns and objective."""
 
 from __future__ import annotations
 
@@ -64,6 +64,7 @@ class RowBuilder:
 
     def add(self, columns: Sequence[int] | IntArray, values: Sequence[float] | FloatArray, lower: float,
             upper: float) -> None:
+        """Add one row: its columns and their values, and its bounds."""
         self.column.append(np.asarray(columns, dtype=np.int64))
         self.value.append(np.asarray(values, dtype=np.float64))
         self.start.append(self.start[-1] + len(columns))
@@ -71,6 +72,7 @@ class RowBuilder:
         self.upper.append(upper)
 
     def rows(self) -> Rows:
+        """The rows added so far."""
         return Rows(
             lower=np.array(self.lower, dtype=np.float64), upper=np.array(self.upper, dtype=np.float64),
             start=np.array(self.start, dtype=np.int64),

@@ -1,11 +1,11 @@
-"""Risk: what a plan is worth when it matters how bad the bad outcomes are.
+"""Measures of risk over the outcomes of a plan.
 
-With ``Pi_m`` the sum of incentives on vehicle m's route, and ``Pi(w) = sum_m alpha_m(w) Pi_m`` what outcome w pays:
+With ``Pi_m`` the sum of incentives on vehicle m's route, and ``Pi(w) = sum_m alpha_m(w) Pi_m`` the reward in outcome w:
 
 - ``cvar``: ``(1 - l) E[Pi] + l CVaR``, the mean of the worst ``1 - beta`` share of outcomes;
 - ``excess``: ``(1 - l) E[Pi] - l E[max(T - Pi, 0)]``, the expected shortfall below a target.
 
-Both are linear programs in ``Pi`` with a row for each outcome, and the joint distribution counts.
+Both are linear programs in ``Pi`` with a row for each outcome, and depend on the joint distribution.
 
 Source:
     Rockafellar, Uryasev (2000), "Optimization of conditional value-at-risk"; the paper's section 6 on expected excess.
@@ -25,11 +25,11 @@ from sva_bench.solver.outcomes import Outcomes
 
 @dataclass(frozen=True, kw_only=True)
 class RiskMeasure:
-    """What is to be maximised in place of the expected incentive.
+    """A measure of risk, maximised in place of the expected incentive.
 
     Attributes:
         kind: The measure.
-        weight: Share ``l`` of the measure in the objective, the rest is the expected incentive.
+        weight: Share ``l`` of the measure in the objective; the rest is the expected incentive.
         beta: Confidence level of ``cvar``.
         target: Target of ``excess``.
     """
@@ -51,7 +51,7 @@ class Risk:
     Attributes:
         measure: The measure.
         outcomes: The outcomes.
-        constant: What it adds to every plan's value besides, weight included: a gap counts in the value with it.
+        constant: What every plan's value has besides, weight included; relative gaps include it.
     """
 
     measure: RiskMeasure
@@ -64,18 +64,18 @@ class Risk:
                     outcomes=self.outcomes.times(factor), constant=self.constant * factor)
 
     def essential(self) -> Risk | None:
-        """The same measure but for ``constant``, over the outcomes that can pay; ``None`` where no plan changes it.
+        """The same measure but for ``constant``, over outcomes with a reward; ``None`` where no plan changes it.
 
-        An outcome that pays nothing whatever is driven may have nearly all the probability: beside it the others'
-        share, which is all that a plan can change, would be rounding. Without it the tail of ``cvar`` begins among the
-        others, with the rest of its probability. What exceeds the target is of no use to ``excess``, and cut off.
+        An outcome without reward, whatever the plan, may have nearly all the probability; the part of the measure that
+        a plan can change would then be lost to rounding. Without such outcomes the tail of ``cvar`` begins among the
+        others, with the rest of its probability. For ``excess``, incentives are truncated at the target.
         """
         measure, outcomes = self.measure, self.outcomes
         probability = outcomes.probability / math.fsum(outcomes.probability)
-        pays = outcomes.available @ outcomes.incentives.any(axis=1) > 0
-        chance = min(math.fsum(probability[pays]), 1.0)
+        rewarded = outcomes.available @ outcomes.incentives.any(axis=1) > 0
+        chance = min(math.fsum(probability[rewarded]), 1.0)
         if measure.kind == "excess":
-            lost = self.constant - measure.weight * measure.target * math.fsum(probability[~pays])
+            lost = self.constant - measure.weight * measure.target * math.fsum(probability[~rewarded])
             measure = replace(measure, weight=measure.weight * chance)
             left = chance if measure.target > 0 else 0.0
             incentives = np.minimum(outcomes.incentives, measure.target)
@@ -87,8 +87,8 @@ class Risk:
         if left <= 0 or measure.weight == 0:
             return None
         return Risk(measure=measure, constant=lost, outcomes=replace(
-            outcomes, incentives=incentives, probability=probability[pays] / chance,
-            available=outcomes.available[pays]))
+            outcomes, incentives=incentives, probability=probability[rewarded] / chance,
+            available=outcomes.available[rewarded]))
 
     def rates(self) -> FloatArray:
         """The most that a visit by vehicle m to site j can add to the measure, weight included, shape (M, n)."""
@@ -101,7 +101,8 @@ class Risk:
 
     def floors(self) -> tuple[tuple[FloatArray, float], ...]:
         """Weights and right-hand side of each outcome's row."""
-        return tuple((there[:, None] * self.outcomes.incentives, self.rhs) for there in self.outcomes.available)
+        return tuple((available[:, None] * self.outcomes.incentives, self.rhs)
+                     for available in self.outcomes.available)
 
     def of(self, sums: FloatArray) -> float:
         """Value of the measure, without its weight, for sums of incentives by vehicle, shape (M,)."""
@@ -109,7 +110,7 @@ class Risk:
         if self.measure.kind == "excess":
             return -float(self.outcomes.probability @ np.maximum(self.measure.target - paid, 0.0))
         tail = 1.0 - self.measure.beta
-        # From the best outcome down: those that pay may have so little probability that 1 less it is 1.
+        # From the best outcome down: its probability may be so small that 1 minus it rounds to 1.
         order = np.argsort(-paid, kind="stable")
         better = np.concatenate([[0.0], np.cumsum(self.outcomes.probability[order])[:-1]])
         share = self.outcomes.probability[order]
@@ -122,10 +123,10 @@ class Risk:
         return self.measure.target if self.measure.kind == "excess" else 0.0
 
     def costs(self) -> tuple[FloatArray, FloatArray]:
-        """Objective of the columns ``u`` by outcome, then ``eta`` for ``cvar``; and their entries in the rows.
+        """Objective of the auxiliary columns ``u`` of each outcome, then ``eta`` for ``cvar``; and their row entries.
 
         Returns:
-            Shapes (columns,) and (outcomes, columns). All columns are at least 0: ``eta`` is, as nothing is paid back.
+            Shapes (columns,) and (outcomes, columns). All columns are at least 0: ``eta`` too, as rewards are.
         """
         outcomes, weight = len(self.outcomes.probability), self.measure.weight
         if self.measure.kind == "excess":

@@ -1,4 +1,4 @@
-"""A goal solved: the best known plan, a heuristic, and a proof by the method that suits."""
+"""One solve: the best known plan, a heuristic, and a proof by the chosen method."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from sva_bench.solver.knowledge import (
     Solution,
     adopt,
     best_known,
-    drive,
     grain_of,
+    route_over,
     trivial_bound,
     value_of,
 )
@@ -49,11 +49,11 @@ def solve(
         clock: Time left.
         gap: Gap at which the plan counts as optimal.
         method: How to prove it.
-        recourse: The second stage, for those that keep it.
-        cuts: Optimality cuts of ``lshaped``.
+        recourse: The second stage, for the methods that keep it.
+        cuts: Kind of optimality cuts of ``lshaped``.
 
     Raises:
-        BadInput: If the method doesn't serve the instance or the goal.
+        BadInput: If the method doesn't support the instance or the goal.
         ValueError: If the goal has floors and no known plan reaches them.
     """
     with deferring_ctrl_c():
@@ -76,7 +76,7 @@ def _solve(
         constant = 0.0 if goal.risk is None else goal.risk.constant
     factor = factor_of(goal)
     goal = goal.times(factor)
-    progress = Progress(orders=start, value=value_of(goal, known.roads, start), bound=trivial_bound(goal),
+    progress = Progress(orders=start, value=value_of(goal, known.legs_by_vehicle, start), bound=trivial_bound(goal),
                         grain=grain_of(goal), rounding=ROUNDING * most_of_a_visit(goal), constant=factor * constant)
     problem = Problem(instance=instance, scopes=scopes, goal=goal, known=known, clock=clock, gap=gap, progress=progress,
                       recourse=None if recourse is None else recourse.times(factor), cuts=cuts)
@@ -97,30 +97,31 @@ def _solve(
         orders = shorten(known.tables, orders)
     known.orders[orders] = None
     return Solution(
-        routes=tuple(drive(road, order) for road, order in zip(known.roads, orders, strict=True)), orders=orders,
+        routes=tuple(route_over(own_legs, order)
+                     for own_legs, order in zip(known.legs_by_vehicle, orders, strict=True)), orders=orders,
         value=progress.value / factor, bound=progress.bound / factor, status=progress.status, nodes=progress.nodes,
         cuts=progress.cuts, optimality_cuts=progress.optimality_cuts, rounds=progress.rounds, seconds=progress.seconds,
         method=used.name)
 
 
 def _search(problem: Problem) -> Sequence[Route]:
-    """Find a good plan; the routes met on the way."""
+    """Improve the incumbent by the heuristic; the good routes that it found."""
     goal, progress, clock = problem.goal, problem.progress, problem.clock
     if (goal.floors and not goal.risk) or goal.driving or bool((goal.weights < 0).any()):
         return ()
-    began = clock.used_s()
+    started_s = clock.used_s()
     found = search(
         problem.known.tables, _searched(goal), goal.chances(), progress.orders,
-        stop=lambda value: clock.out() or (
+        stop=lambda value: clock.is_over() or (
             goal.risk is None and progress.bound - value <= problem.gap * abs(value)),
         offer=lambda orders: adopt(progress, goal, problem.known, orders))
     adopt(progress, goal, problem.known, found.orders)
-    progress.seconds["heuristic"] = clock.used_s() - began
+    progress.seconds["heuristic"] = clock.used_s() - started_s
     return found.routes
 
 
 def _searched(goal: Goal) -> FloatArray:
-    """What the heuristic maximises: the goal, or in place of a measure of risk what it takes the mean of."""
+    """Weights that the heuristic maximises, shape (M, n): a measure of risk is replaced by its expected incentive."""
     if goal.risk is None:
         return goal.weights
     outcomes = goal.risk.outcomes

@@ -1,4 +1,4 @@
-"""Both plans of a comparison, and what perfect foresight would earn."""
+"""The stochastic and the deterministic plan of a comparison, risk-averse plans, and the wait-and-see value."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from sva_bench.solver.preprocess import warn_of_unreachable
 from sva_bench.solver.risk import Risk, RiskMeasure
 from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.heuristic import value_of as rewards
-from sva_bench.solver.routes.refuelling import quickest
+from sva_bench.solver.routes.refuelling import quickest_route
 from sva_bench.solver.solve import solve
 from sva_bench.solver.units import in_own_units, in_unit
 
@@ -46,9 +46,9 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 TIE = 1e-6
-"""Relative difference of two values that counts as none."""
+"""Relative difference up to which two values are equal."""
 MOST_SUBSETS = 16
-"""Subsets of uncertain vehicles up to which the value of perfect information is worked out unasked."""
+"""Outcomes up to which the value of perfect information is computed by default."""
 _FLOOR = 1e-8  # relative; keeps a known optimum feasible when its value becomes a constraint
 _ROUNDING = 1e-12  # relative; of sums of incentives, and of availabilities that are the same
 _STATUSES: tuple[Status, ...] = get_args(Status)  # best first
@@ -56,14 +56,14 @@ _STATUSES: tuple[Status, ...] = get_args(Status)  # best first
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeterministicPlans:
-    """The deterministic plan, and what its ties leave open.
+    """The deterministic plan, and the range of expected value that its ties span.
 
     Attributes:
         plan: Of the plans with the greatest sum of incentives, the one of greatest expected value, then of least time.
-        stochastic: The stochastic plan; the same routes where the two are worth the same.
-        least: Least expected value of a plan with that sum of incentives.
-        most: Greatest expected value of one.
-        worst: A plan of that least expected value; ``None`` where none is worth less than ``plan``.
+        stochastic: The stochastic plan; with the same routes where both have the same expected value.
+        least: Least expected value among the plans with that sum of incentives.
+        most: Greatest expected value among them.
+        worst: A plan of the least expected value; ``None`` where that is ``plan``'s.
     """
 
     plan: Plan
@@ -84,11 +84,11 @@ def plan_stochastic(
         limits: When to stop.
         incumbent: A feasible plan to start from.
         known: What solves of the same instance with other availabilities found.
-        method: How to prove it.
-        cuts: Optimality cuts of the method ``lshaped``.
+        method: The solution method.
+        cuts: Kind of optimality cuts of the method ``lshaped``.
 
     Raises:
-        BadInput: If the incumbent is infeasible, or the method doesn't serve the instance.
+        BadInput: If the incumbent is infeasible, or the method doesn't support the instance.
     """
     process = process_of(instance.failure)
     if not process.collapses and not serves_discounts(method):
@@ -102,7 +102,7 @@ def plan_stochastic(
 def plan_averse(
     instance: Instance, measure: RiskMeasure, limits: SolveLimits | None = None, known: Knowledge | None = None,
 ) -> Plan:
-    """The plan that is best under a measure of risk; failures are those of ``mission``.
+    """The plan that maximises a measure of risk; failures are those of ``mission``.
 
     Raises:
         BadInput: If the instance fails per leg, or too many outcomes are possible.
@@ -119,7 +119,7 @@ def plan_averse(
     own, unit = in_own_units(instance)
     in_own = replace(measure, target=in_unit(measure.target, unit))
     solution = solve(own, _averse(own, in_own), known, clock, limits.gap)
-    value = value_of(_averse(instance, measure), known.roads, solution.orders)
+    value = value_of(_averse(instance, measure), known.legs_by_vehicle, solution.orders)
     return _finish(instance, measure.kind, solution.orders, known, value=value,
                    bound=value + unit * (solution.bound - solution.value), status=solution.status,
                    solutions=[solution], runtime_s=clock.used_s())
@@ -139,9 +139,9 @@ def plan_nominal(
     instance: Instance, limits: SolveLimits | None = None, incumbent: Plan | None = None,
     known: Knowledge | None = None, method: Method = "auto", cuts: Cuts = "single",
 ) -> Plan:
-    """A plan with the greatest sum of incentives, every vehicle taken as available; its ties are left open.
+    """A plan of greatest sum of incentives, every vehicle available; ties are broken arbitrarily.
 
-    It depends on no availability, so all scenarios can share it.
+    It doesn't depend on availabilities, so all scenarios share it.
     """
     terms = PlanningTerms(share=np.ones(len(instance.vehicles)))
     return _plan(replace(instance, failure=MODEL), "deterministic", terms, limits, incumbent, known, method, cuts)
@@ -151,16 +151,16 @@ def plan_deterministic(
     instance: Instance, stochastic: Plan, limits: SolveLimits | None = None, nominal: Plan | None = None,
     known: Knowledge | None = None, method: Method = "auto", cuts: Cuts = "single",
 ) -> DeterministicPlans:
-    """The deterministic plan, its ties broken in its own favour, and the range that they span.
+    """The deterministic plan, ties broken by greatest expected value, and the range of expected value of its ties.
 
     Args:
-        instance: The instance; expected values are those under ``mission`` whatever it says.
+        instance: The instance; its failure process is taken as ``mission``.
         stochastic: Its stochastic plan.
-        limits: When to stop; the time is that of all solves together.
+        limits: When to stop; the time limit is for all solves together.
         nominal: ``plan_nominal`` of the instance, which scenarios may share.
         known: What solves of the same instance with other availabilities found.
-        method: How to prove it.
-        cuts: Optimality cuts of the method ``lshaped``.
+        method: The solution method.
+        cuts: Kind of optimality cuts of the method ``lshaped``.
 
     Source:
         ``docs/model.md``, section "Ties".
@@ -171,7 +171,7 @@ def plan_deterministic(
     known.check(instance)
     clock = limits.clock()
     if nominal is None:
-        if stochastic.status == "interrupted":  # all that there is to begin with: what follows ends at once
+        if stochastic.status == "interrupted":  # the only plan known: the nominal solve ends at once too
             known.orders[_orders(instance, stochastic, known)] = None
         nominal = plan_nominal(instance, limits, known=known, method=method, cuts=cuts)
     elif nominal.value is None or nominal.bound is None or nominal.status is None:
@@ -180,11 +180,11 @@ def plan_deterministic(
     known.orders.update(dict.fromkeys((nominal_orders, stochastic_orders)))
     ties = _Ties(in_own_units(instance)[0], nominal_orders, known, clock, limits.gap,
                  "auto" if keeps_second_stage(method) else method)
-    most, least, soonest = ties.solutions(nominal.status == "interrupted")
-    best = soonest or most
+    most, least, quickest = ties.solutions(nominal.status == "interrupted")
+    best = quickest or most
     orders = best.orders if best else nominal_orders
     expected, total = _expected(instance, orders), _sum(_incentives(instance), orders)
-    solutions = [s for s in (most, least, soonest) if s is not None]
+    solutions = [s for s in (most, least, quickest) if s is not None]
     plan = _finish(
         instance, "deterministic", orders, known, value=total, bound=nominal.bound or total,
         status=_worst([nominal.status or "feasible", *(s.status for s in solutions)]), solutions=solutions,
@@ -206,16 +206,16 @@ def plan_deterministic(
 def wait_and_see(
     instance: Instance, limits: SolveLimits | None = None, known: Knowledge | None = None, *, force: bool = False,
 ) -> float | None:
-    """Expected value with perfect foresight, ``WS``: each outcome's best plan, weighted by its probability.
+    """The wait-and-see value ``WS``: the expected value of the perfect-information plans, one for each outcome.
 
     Args:
-        instance: The instance; failures are those of ``mission`` whatever it says.
-        limits: When to stop; the time is that of all solves together.
-        known: What solves of the same instance with other availabilities found; each outcome is solved once.
+        instance: The instance; its failure process is taken as ``mission``.
+        limits: When to stop; the time limit is for all solves together.
+        known: What solves of the same instance with other availabilities found.
         force: Solve however many outcomes there are.
 
     Returns:
-        The value; ``None`` if there are more than 16 outcomes, or one could not be solved to a proof.
+        The value; ``None`` if there are more than ``MOST_SUBSETS`` outcomes, or one has no proof.
     """
     limits = limits or SolveLimits()
     known = known or knowledge_of(instance)
@@ -225,15 +225,15 @@ def wait_and_see(
         return None
     clock, total, (own, _) = limits.clock(), 0.0, in_own_units(instance)
     for available, probability in outcomes.items():
-        there = np.array([v.name in available for v in instance.vehicles], dtype=np.float64)
-        solution = _greatest(own, there, known, clock, limits.gap)
+        available_vehicles = np.array([v.name in available for v in instance.vehicles], dtype=np.float64)
+        solution = _solve_expected(own, available_vehicles, known, clock, limits.gap)
         if solution.status == "interrupted":
             raise KeyboardInterrupt
         if solution.status != "optimal":
             _log.warning("instance %s: no proof for the outcome in which %s are available; the value of perfect "
-                         "information stays open", instance.name, ", ".join(sorted(available)) or "no vehicles")
+                         "information is unknown", instance.name, ", ".join(sorted(available)) or "no vehicles")
             return None
-        total += probability * _sum(_incentives(instance) * there[:, None], solution.orders)
+        total += probability * _sum(_incentives(instance) * available_vehicles[:, None], solution.orders)
     return total
 
 
@@ -257,7 +257,7 @@ def _plan(
         solution = solve(own, goal, known, clock, limits.gap, method)
         value = rewards(_incentives(instance) * terms.share[:, None], terms.survival, solution.orders)
     else:
-        solution = _greatest(own, terms.share, known, clock, limits.gap, method, cuts)
+        solution = _solve_expected(own, terms.share, known, clock, limits.gap, method, cuts)
         value = _sum(_incentives(instance) * terms.share[:, None], solution.orders)
         unit *= float(terms.share.max(initial=0.0))
     return _finish(instance, objective, solution.orders, known, value=value,
@@ -265,11 +265,11 @@ def _plan(
                    solutions=[solution], runtime_s=clock.used_s())
 
 
-def _greatest(
+def _solve_expected(
     instance: Instance, availability: FloatArray, known: Knowledge, clock: Clock, gap: float, method: Method = "auto",
     cuts: Cuts = "single",
 ) -> Solution:
-    """The plan of greatest ``sum p e y``, in units in which the greatest ``p`` is 1."""
+    """The plan of greatest ``sum p e y``, with ``p`` scaled to a maximum of 1."""
     scale = float(availability.max(initial=0.0))
     shares = availability / scale if scale > 0 else availability
     goal = Goal(weights=_incentives(instance) * shares[:, None])
@@ -279,10 +279,10 @@ def _greatest(
         refuse_free_legs(instance)
         refuse_seldom_available(instance, scale)
         return solve(instance, goal, known, clock, gap, method, outcomes_of(instance, sets, scale or 1.0), cuts)
-    return _once(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap, method)
+    return _solve_unless_known(("greatest", tuple(shares.tolist()), gap), instance, goal, known, clock, gap, method)
 
 
-def _once(
+def _solve_unless_known(
     key: tuple[object, ...], instance: Instance, goal: Goal, known: Knowledge, clock: Clock,
     gap: float, method: Method,
 ) -> Solution:
@@ -300,8 +300,8 @@ def _once(
 class _Ties:
     """The plans that share the greatest sum of incentives.
 
-    Among them ``sum p e y`` is, but for a constant, ``sum (p - least p) e y``: solved in that form, two vehicles have
-    one and the same tie in all scenarios.
+    Among them ``sum p e y`` is, but for a constant, ``sum (p - least p) e y``: in that form, the ties of two vehicles
+    are the same in all scenarios.
     """
 
     def __init__(self, instance: Instance, nominal: VisitOrders, known: Knowledge, clock: Clock, gap: float,
@@ -316,7 +316,7 @@ class _Ties:
         self._shares = np.zeros(len(spread)) if self._equal else spread / spread.max()
 
     def solutions(self, interrupted: bool) -> tuple[Solution | None, Solution | None, Solution | None]:
-        """The tied plans of most and least expected value, and the quickest of most; ``None`` = not sought."""
+        """The tied plans of most and least expected value, and the quickest of the former; ``None`` = not solved."""
         weights = self._incentives * self._shares[:, None]
         most = least = None
         if not self._equal and not interrupted:
@@ -330,12 +330,12 @@ class _Ties:
         floors = [(self._incentives, self._floor)]
         if most is not None:
             floors.append((weights, most.value - _FLOOR * abs(most.value)))
-        soonest = self._solve("soonest", Goal(weights=np.zeros_like(weights), floors=tuple(floors), driving=1.0))
-        return most, least, soonest
+        quickest = self._solve("soonest", Goal(weights=np.zeros_like(weights), floors=tuple(floors), driving=1.0))
+        return most, least, quickest
 
     def _solve(self, what: str, goal: Goal) -> Solution:
         key = (what, tuple(self._shares.tolist()), self._gap, *(floor for _, floor in goal.floors))
-        return _once(key, self._instance, goal, self._known, self._clock, self._gap, self._method)
+        return _solve_unless_known(key, self._instance, goal, self._known, self._clock, self._gap, self._method)
 
 
 def _finish(
@@ -343,12 +343,12 @@ def _finish(
     status: Status, solutions: Sequence[Solution], runtime_s: float,
 ) -> Plan:
     routes, fuel = {}, {}
-    for vehicle, road, order in zip(instance.vehicles, known.roads, orders, strict=True):
-        drive = quickest(road, order)
-        if drive is None:
+    for vehicle, own_legs, order in zip(instance.vehicles, known.legs_by_vehicle, orders, strict=True):
+        timed = quickest_route(own_legs, order)
+        if timed is None:
             raise RuntimeError(f"no feasible route of {vehicle.name} visits {order}")
-        routes[vehicle.name] = tuple(instance.sites[i] for i in drive.route)
-        fuel[vehicle.name] = float(sum(vehicle.fuel_s[i, j] for i, j in itertools.pairwise(drive.route)))
+        routes[vehicle.name] = tuple(instance.sites[i] for i in timed.route)
+        fuel[vehicle.name] = float(sum(vehicle.fuel_s[i, j] for i, j in itertools.pairwise(timed.route)))
     counted = {"nodes": sum(s.nodes for s in solutions), "cuts": max((s.cuts for s in solutions), default=0),
                "rounds": sum(s.rounds for s in solutions)}
     if any(s.optimality_cuts for s in solutions):
@@ -363,7 +363,7 @@ def _certified(instance: Instance, plan: Plan) -> Plan:
     """The plan, after an independent check.
 
     Raises:
-        RuntimeError: If it fails; that is a fault of the solver.
+        RuntimeError: If the check fails, which is a defect of the solver.
     """
     certificate = certify(instance, plan)
     if certificate.reasons:
@@ -372,12 +372,16 @@ def _certified(instance: Instance, plan: Plan) -> Plan:
 
 
 def _orders(instance: Instance, plan: Plan, known: Knowledge) -> VisitOrders:
-    """The POIs of a feasible plan's routes."""
+    """The POIs of a feasible plan's routes, in order.
+
+    Raises:
+        ValueError: If a route is infeasible.
+    """
     pois = set(instance.pois)
     orders = tuple(tuple(j for j in map(instance.sites.index, plan.route(v.name)) if j in pois)
                    for v in instance.vehicles)
-    for road, order, vehicle in zip(known.roads, orders, instance.vehicles, strict=True):
-        if quickest(road, order) is None:
+    for own_legs, order, vehicle in zip(known.legs_by_vehicle, orders, instance.vehicles, strict=True):
+        if quickest_route(own_legs, order) is None:
             raise ValueError(f"the plan's route of {vehicle.name} is infeasible")
     return orders
 
@@ -399,7 +403,7 @@ def _expected(instance: Instance, orders: VisitOrders) -> float:
 
 
 def _above(bound: float, value: float) -> float:
-    """The bound, or the value where the two differ by rounding."""
+    """The bound; the value where the two differ by rounding alone."""
     return value if bound - value <= _ROUNDING * abs(value) else bound
 
 

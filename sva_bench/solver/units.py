@@ -1,12 +1,12 @@
-"""The units that plans are made in, so that the unit an instance counts its incentives in changes nothing.
+"""Scaling of incentives, so that plans don't depend on the unit in which an instance states them.
 
-Two steps. Where an instance comes in, its incentives become multiples of its own largest one, rounding undone
-(``in_own_units``): whatever all of them are multiplied by, the same numbers come out. Then each goal is multiplied by
-the power of two that brings the most that one visit can earn near ``LARGEST`` (``factor_of``), which loses nothing.
-Constants that are compared with values anywhere in the solver are meant in these units, where the best plan of a goal
+Two steps. First an instance's incentives become multiples of its own largest one, rounding undone
+(``in_own_units``): a common factor on all of them has no effect. Then each goal is multiplied by
+the power of two that brings the most that one visit can earn near ``LARGEST`` (``factor_of``), which is exact.
+Absolute tolerances anywhere in the solver are in these units, in which the best plan of a goal
 without negative weights is worth ``LARGEST / 2`` at least.
 
-What a visit can earn has all that multiplies its incentive in it: availability, the chance to get there, its share in
+What a visit can earn includes all factors on its incentive: availability, the probability to get there, its share in
 a measure of risk (``Goal.rates``). So what is guaranteed of an optimal plan is relative to what the goal can pay, not
 to its incentives: no plan is better by more than the gap, or by ``ROUNDING`` of the most that one visit can earn. The
 latter is less than the gap but for goals with negative weights, and for measures of risk whose best plan is worth less
@@ -29,16 +29,16 @@ from sva_bench.solver.goal import Goal
 LARGEST = 128.0
 """Least power of two above the largest incentive."""
 ROUNDING = 1e-9
-"""Share of the most that one visit can earn within which two values, or a value and a bound, are the same."""
+"""Share of the most that one visit can earn, up to which two values, or a value and a bound, count as equal."""
 MOST_UNITS = 1_000_000
 _MULTIPLE = 1e-9  # how far from an integer a multiple of the common unit may be
 _BITS = 36  # of a mantissa that are kept; the rest is noise of scaling and unscaling
 
 
 def common_unit(values: Iterable[float]) -> float:
-    """The greatest number of which all values are multiples, but for rounding; 0 where none is plain to see.
+    """The greatest number of which all values are multiples, but for rounding; 0 if there is none.
 
-    A unit of less than a millionth of the largest value is none.
+    Units below a millionth of the largest value are not looked for.
     """
     distinct = sorted({abs(float(value)) for value in values} - {0.0}, reverse=True)
     if not distinct:
@@ -55,7 +55,7 @@ def common_unit(values: Iterable[float]) -> float:
 
 
 def in_own_units(instance: Instance) -> tuple[Instance, float]:
-    """The instance with incentives below ``LARGEST``, and the unit: what 1 of them is in the instance's own.
+    """The instance with incentives below ``LARGEST``, and the unit: the instance's own value of 1 in them.
 
     Where all incentives are multiples of one number they become exact multiples of a power of two, so sums that are
     equal in decimals are equal; else they are rounded to 11 digits.
@@ -78,7 +78,7 @@ def in_own_units(instance: Instance) -> tuple[Instance, float]:
 
 
 def in_unit(value: float, unit: float) -> float:
-    """What is compared with incentives, such as a target, in the unit that an instance's own are in."""
+    """A quantity that is compared with incentives, such as a target, in another unit."""
     return float(_without_noise(np.array([value / unit]))[0])
 
 

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 
 from sva_bench import __version__
 from sva_bench.analysis.results import Amount, Words
-from sva_bench.files.fields import Seed, WholeNumber
+from sva_bench.files.fields import NonNegativeInt, Seed
 from sva_bench.files.records import Record
 from sva_bench.files.versions import library_versions
 from sva_bench.workers.pool import usable_cores
@@ -27,7 +27,7 @@ def _is_text(value: object) -> object:
 
 
 AnyText = Annotated[Any, AfterValidator(_is_text)]
-"""Of the command line, which may hold what is no UTF-8."""
+"""Text of the command line, which may not be valid UTF-8."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,19 +36,19 @@ class Machine(Record):
 
     platform: Words
     python: Words
-    cpus: WholeNumber
+    cpus: NonNegativeInt
 
 
 @dataclass(frozen=True, kw_only=True)
 class Manifest(Record):
-    """What was run; the only place for wall-clock times.
+    """The manifest of a run; the only file with wall-clock times.
 
     Attributes:
-        version, packages: Of the program, and of what results depend on.
-        seed, options: All that it was told.
-        command, started, seconds: As it was called, when, and how long each phase took.
+        version, packages: Versions of the program, and of the libraries that results depend on.
+        seed, options: The seed and all options.
+        command, started, seconds: The command line, its start, and the duration of each phase [s].
         machine: Where it was run.
-        world: The resolved world, a document of its own; it is checked as any world is.
+        world: The resolved world, which is validated as any world file.
     """
 
     format: Literal["sva-bench/manifest@1"] = MANIFEST

@@ -1,4 +1,4 @@
-"""Run folders: tables, plans, summary. Written under a temporary name and renamed when complete."""
+"""Run folders: tables, plans and summary, written under a temporary name and renamed when complete."""
 
 from __future__ import annotations
 
@@ -53,15 +53,14 @@ def run_folder(out: Path, name: str) -> Iterator[Path]:
 
 
 def tidy(out: Path) -> None:
-    """Remove what killed runs left unfinished, and put back an older run that one had moved away."""
+    """Remove stale drafts of killed runs, and restore older runs that they had moved away."""
     remove_left_behind(out, lambda left: _RUN_NAME.fullmatch(left) is not None)
 
 
 def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
-    """Name of a plan's files under a scenario, which no other plan of the run has.
+    """The unique name of a plan's files under a scenario.
 
-    Names of ours have no ``+`` in them, and no planner's is the end of another's; plans from elsewhere may be called
-    anything.
+    Planners' own names have no ``+``, and none is the end of another; given plans may have any name.
 
     Args:
         scenario: The scenario's name.
@@ -110,7 +109,7 @@ MAP = "map"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Legs:
-    """The columns of ``legs.parquet``, whose units are told there; a row per leg that was driven."""
+    """The columns of ``legs.parquet``, with a row per leg driven; the units are in its schema."""
 
     scenario: Sequence[str]
     planner: Sequence[str]
@@ -127,7 +126,7 @@ class Legs:
 
 
 def legs_of(executed: Sequence[Executed]) -> Legs:
-    """Every leg that was driven."""
+    """All legs driven in some runs."""
     rows = [(run.case, leg) for run in executed for leg in run.legs]
     return Legs(
         scenario=[case.scenario.name for case, _ in rows], planner=[case.planner for case, _ in rows],

@@ -1,4 +1,4 @@
-"""A finished run, read again from its folder: checked as what comes from elsewhere is, for it may."""
+"""A finished run, read from its folder; validated, since the folder may be of any origin."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from sva_bench.storage.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
 from sva_bench.world.model import World
 
-_AGREE = 1e-6  # relative; a mean added up in another order
+_AGREE = 1e-6  # relative tolerance of means that are summed in another order
 MOST_LEGS = 5_000_000
-"""Legs that a report is made of; they are held in memory."""
+"""Most legs of a report, which are held in memory."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Content:
-    """What a report is made of: all of it stands in the run folder.
+    """The content of a report, all from the run folder.
 
     Attributes:
         summary: The summary.
@@ -61,7 +61,7 @@ def run_folder_at(path: Path) -> Path:
     """The path, if it is a run folder.
 
     Raises:
-        BadInput: If it is none: says what it is.
+        BadInput: If it is none, with what it is.
         BadFile: If it lacks its summary.
     """
     if not path.exists():
@@ -85,7 +85,7 @@ def run_folder_at(path: Path) -> Path:
 
 @contextlib.contextmanager
 def _complete(folder: Path) -> Iterator[None]:
-    """What isn't there of a run folder is said of the folder, with the way out."""
+    """A block in which missing files of a run folder are reported with what to do."""
     try:
         yield
     except BadFile as error:
@@ -95,14 +95,14 @@ def _complete(folder: Path) -> Iterator[None]:
 
 
 def missing(folder: Path, path: Path) -> BadFile:
-    """What is said of a run folder that a file of it isn't in."""
+    """The error of a run folder in which a file is missing."""
     where = ", it stands in manifest.json" if (folder / "manifest.json").exists() else ""
     return BadFile(folder, None, "", f"the run folder is incomplete: {path.relative_to(folder)} is missing; run its "
                    f"command again{where}")
 
 
 def is_batch(folder: Path) -> bool:
-    """Whether a folder is that of a batch, whole or not."""
+    """Whether a folder is that of a batch, complete or not."""
     try:
         data = read_json(folder / "manifest.json", MOST_BYTES).data
     except BadFile:
@@ -111,7 +111,7 @@ def is_batch(folder: Path) -> bool:
 
 
 def write_csv(folder: Path) -> list[Path]:
-    """Write each table of a run folder as CSV too, for spreadsheets, and the statistics of its plans.
+    """Write each table of a run folder, and the statistics of its plans, as CSV: the files written.
 
     Raises:
         BadFile: If one can't be read.
@@ -140,10 +140,10 @@ def _summary_in(folder: Path) -> tuple[Document, AnySummary]:
 
 
 def read_content(folder: Path) -> Content:
-    """What the report of a run folder is made of.
+    """The content of the report of a run folder.
 
     Raises:
-        BadFile: If a file is missing, cut off, foreign or not of the same run.
+        BadFile: If a file is missing, truncated, invalid or not of the same run.
     """
     with _complete(folder):
         return _content(folder)
@@ -151,8 +151,8 @@ def read_content(folder: Path) -> Content:
 
 def _content(folder: Path) -> Content:
     document, summary = _summary_in(folder)
-    told, manifest = read_ours(folder / "manifest.json", Manifest, MANIFEST)
-    world = world_of(Part(told, ("world",), manifest.world), folder / MAP)
+    manifest_document, manifest = read_ours(folder / "manifest.json", Manifest, MANIFEST)
+    world = world_of(Part(manifest_document, ("world",), manifest.world), folder / MAP)
     first = summary.scenarios[0]
     for key, found, known in (
             (("world",), [summary.world], [world.name]),
@@ -197,15 +197,15 @@ def _legs(path: Path, world: World, words: Mapping[str, frozenset[str]]) -> Legs
                 raise BadFile(path, None, name, "expected times between 0 and 1e9 s; run the command in manifest.json "
                               "again")
         for name in LEGS.names:
-            parts[name].append(_plainly(piece.column(name)))
+            parts[name].append(_as_column(piece.column(name)))
     columns: dict[str, Any] = {
         name: np.concatenate(found or [np.zeros(0)]) if name.endswith("_s") else [x for part in found for x in part]
         for name, found in parts.items()}
     return Legs(**columns)
 
 
-def _plainly(column: pa.ChunkedArray) -> Any:
-    """Figures as an array; words and counts as a list whose equal words are one object."""
+def _as_column(column: pa.ChunkedArray) -> Any:
+    """Floats as an array; strings and counts as a list, in which equal strings are one object."""
     if pa.types.is_floating(column.type):
         return column.to_numpy()
     if not pa.types.is_dictionary(column.type):
@@ -219,7 +219,7 @@ def _plainly(column: pa.ChunkedArray) -> Any:
 
 def _check_outcomes(path: Path, plans: Mapping[tuple[str, str], float], trials: int, robots: int,
                     words: Mapping[str, frozenset[str]]) -> None:
-    """Refuse outcomes that aren't a row for each trial and robot, or whose means aren't those of the summary."""
+    """Check that outcomes have a row for each trial and robot, and the means of the summary."""
     sums, counts = dict.fromkeys(plans, 0.0), dict.fromkeys(plans, 0)
     for piece in pieces_of(path, OUTCOMES, rows=len(plans) * trials * robots, words=words):
         grouped = piece.group_by(["scenario", "planner"]).aggregate([("incentive", "sum"), ("trial", "count")])

@@ -1,4 +1,4 @@
-"""Plans under the failures they were made for and under the others: what the wrong assumption costs."""
+"""Plans executed under each failure process: the loss by a wrong assumption."""
 
 from __future__ import annotations
 

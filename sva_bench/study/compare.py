@@ -1,4 +1,4 @@
-"""Plans from anywhere, executed in one world and compared pair by pair."""
+"""Given plans, executed in one world and compared pair by pair."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def execute_plans(
     world: World, plans: Mapping[str, Plan], options: Options, out: Path, executor: Executor | None,
     progress: OnProgress, costs: Mapping[str, FuelCosts],
 ) -> Run:
-    """Execute plans from anywhere and compare them, pair by pair.
+    """Execute given plans and compare them, pair by pair.
 
     Args:
         world: The world.
-        plans: The plans by the name they go by; feasible, or meant to be seen failing.
-        options: Seed, trials, rollouts, fidelity; what solvers are told is not used.
+        plans: The plans by name; infeasible ones are executed too.
+        options: Seed, trials, rollouts and fidelity; options of the solver are not used.
         out, executor, progress: As for ``run``.
         costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
     """
@@ -59,7 +59,7 @@ def execute_plans(
 
 
 def _judged(world: World, instance: Instance, plan: Plan, run: Executed) -> Judged:
-    """A plan's trials beside its value if fuel and limits allow its routes: it may be here to be seen failing."""
+    """A plan's trials, its value without fuel and time limits, and its feasibility."""
     truth = unlimited(replace(instance, failure=world.execute_failure))
     return Judged(expected=expected_value(truth, plan), executed=run,
                   feasible=certify(instance, replace(plan, value=None)).feasible)

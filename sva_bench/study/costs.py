@@ -1,6 +1,6 @@
-"""What driving costs in a world, the instances made of that, and what no robot reaches: all before a plan is made.
+"""Fuel costs of a world, its instances, and unreachable POIs.
 
-Apart from the planning, since a check of a world needs neither solvers nor physics, and these take a second to load.
+Apart from ``planning``, since a check of a world needs neither solvers nor physics, which take a second to import.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from sva_bench.analysis.reach import reached
 from sva_bench.analysis.summaries import Reach
 from sva_bench.choices import PathPlanner
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.solver.routes.refuelling import quickest, road_of
+from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.study.given_plans import instance_name
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.travel.times import plan_travel_times
@@ -37,7 +37,7 @@ def plan_costs(world: World, planner: PathPlanner, progress: OnProgress) -> dict
 
 
 def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario) -> Instance:
-    """The instance of one scenario: all that a solver needs, and no world."""
+    """The optimisation instance of one scenario of a world."""
     sites = tuple(site.name for site in world.sites)
     return Instance(
         name=instance_name(world, None if scenario.name == NOMINAL else scenario.name), sites=sites, base=0,
@@ -51,23 +51,23 @@ def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario
 
 
 def nominal_scenario(world: World) -> Scenario:
-    """The availabilities as they stand under ``robots:``."""
+    """The scenario of the availabilities under ``robots:``."""
     return Scenario(name=NOMINAL, availability={robot.name: robot.availability for robot in world.robots})
 
 
 def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list[str]]:
-    """POIs that a robot cannot visit and come home from, even alone and refuelling at will; by robot."""
+    """POIs that a robot cannot visit and return from within fuel and limit, even as the only POI; by robot."""
     instance = instance_of(world, costs, nominal_scenario(world))
     lost = {}
     for vehicle in instance.vehicles:
-        road = road_of(instance, vehicle)
-        pois = [instance.sites[poi] for poi in instance.pois if quickest(road, (poi,)) is None]
+        own_legs = vehicle_legs(instance, vehicle)
+        pois = [instance.sites[poi] for poi in instance.pois if quickest_route(own_legs, (poi,)) is None]
         if pois:
             lost[vehicle.name] = pois
     return lost
 
 
 def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> Reach:
-    """What robots cannot reach within fuel and limit, as every summary says it."""
+    """The section ``reach`` of summaries: POIs that robots cannot reach within fuel and limit."""
     return reached(out_of_reach(world, costs), [robot.name for robot in world.robots],
                    [poi.name for poi in world.pois])

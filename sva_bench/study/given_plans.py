@@ -1,4 +1,4 @@
-"""Plans from elsewhere, read and checked as far as goes without travel times: what is wrong is said at once."""
+"""Given plans, read and checked as far as possible without travel times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 
 
 class InfeasiblePlan(SvaBenchError):
-    """A plan that its certificate refuses."""
+    """A plan that its certificate finds infeasible."""
 
     exit_code = ExitCode.INFEASIBLE_PLAN
 
@@ -33,11 +33,11 @@ class InfeasiblePlan(SvaBenchError):
 
 
 def read_plans(world: World, paths: Mapping[str, Path]) -> dict[str, Plan]:
-    """Read plan files for a world, by the names that they go by.
+    """The plans of some files for a world, by name.
 
     Raises:
         BadFile: If a file is no plan, or names robots or sites that the world doesn't have.
-        InfeasiblePlan: If a plan could not be driven whatever the travel times.
+        InfeasiblePlan: If a plan is infeasible for any travel times.
     """
     instance = _without_times(world)
     names = {instance_name(world), *(instance_name(world, scenario.name) for scenario in world.scenarios)}
@@ -59,7 +59,7 @@ def instance_name(world: World, scenario: str | None = None) -> str:
 
 
 def _without_times(world: World) -> Instance:
-    """The world's instance in which every leg is free: what breaks its rules breaks those of any travel times."""
+    """The world's instance with all costs 0: a plan infeasible for it is infeasible for any travel times."""
     sites = tuple(site.name for site in world.sites)
     free, nothing = np.zeros((len(sites), len(sites))), np.zeros(len(sites))
     return Instance(

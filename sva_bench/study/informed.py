@@ -15,13 +15,13 @@ INFORMED = "informed"
 
 
 def cases_of(scenario: Scenario, informed: InformedPlans) -> list[Case]:
-    """Each of the plans, to be executed in all trials: drives are shared, and those not wanted are few."""
+    """Cases of each perfect-information plan in all trials; drives are shared between them."""
     return [Case(scenario=scenario, planner=f"{INFORMED} of {', '.join(sorted(available)) or 'none'}", plan=plan,
                  role="informed_part") for available, plan in informed.plans.items()]
 
 
-def put_together(parts: Mapping[frozenset[str], Executed]) -> Executed:
-    """The trials of the informed planner: each from the plan for the robots that are available in it.
+def combined_trials(parts: Mapping[frozenset[str], Executed]) -> Executed:
+    """The trials of the informed planner: each trial is that of the plan for its available robots.
 
     Args:
         parts: All trials of the plan for each set of available robots.

@@ -1,4 +1,4 @@
-"""What a run can be told."""
+"""The options of a run."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from sva_bench.world.model import World
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Options:
-    """What a run can be told.
+    """The options of a run.
 
     Attributes:
-        seed: Root of failures and noise; plans don't depend on it.
+        seed: Root seed of failures and noise; plans don't depend on it.
         trials: Trials of each plan in each scenario.
-        rollouts: Noise draws; 1 is enough without noise.
+        rollouts: Number of noise draws.
         fidelity: How plans are executed.
         planner: How paths are planned.
         limits: When a solve may stop.
-        evpi: Work out the value of perfect information however many outcomes there are.
-        informed: Execute what somebody would plan who knew beforehand who is available, too.
-        assumptions: Execute plans for both failure processes under both.
-        precision: Go on with more trials and noise draws until the executed VSS is so sure.
+        evpi: Compute the value of perfect information for any number of outcomes.
+        informed: Execute the perfect-information plans too.
+        assumptions: Execute the plans for each failure process under each.
+        precision: Stopping rule, by which trials and noise draws grow; ``None`` = fixed numbers.
     """
 
     seed: int = 0

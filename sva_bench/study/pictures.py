@@ -1,4 +1,4 @@
-"""Pictures of worlds: what is to be seen is planned here, and drawn by ``analysis.drawing``."""
+"""Pictures of worlds with planned paths and routes, drawn by ``report.drawing``."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ def picture_of(
     world: World, kind: Kind, *, roadmap: bool, paths: bool, progress: OnProgress,
     plan: Plan | None = None, plan_file: Path | None = None,
 ) -> bytes:
-    """A picture of a world, with what is planned in it on request.
+    """A picture of a world, with roadmap, paths and routes on request.
 
     Args:
         world: The world.
         kind: ``png`` or ``svg``.
         roadmap, paths: Whether to show them; those of the widest robot where there are several models.
-        progress: Told how far it is.
+        progress: Progress callback.
         plan, plan_file: A plan whose routes to show, and its file; one that breaks fuel or limit is shown too, with a
             warning.
 
     Raises:
-        InfeasiblePlan: If the plan can't be driven whatever the fuel.
-        UnreachableSite: If something planned is asked for, and a site can't be reached.
+        InfeasiblePlan: If the plan can't be driven with any fuel.
+        UnreachableSite: If paths are needed, and a site can't be reached.
     """
     if not (roadmap or paths or plan):
         return draw_world(world, kind, Overlays())
@@ -44,12 +44,12 @@ def picture_of(
     if roadmap:
         points = np.array([(site.x_m, site.y_m) for site in world.sites])
         edges = roadmap_edges(world.obstacles, points, widest.clearance_m)
-    ways = [path for i, row in enumerate(widest.paths) for path in row[i + 1:] if path is not None] if paths else []
+    drawn = [path for i, row in enumerate(widest.paths) for path in row[i + 1:] if path is not None] if paths else []
     routes: dict[str, list[Leg]] = {}
     if plan is not None and plan_file is not None:
         check_plans(world, costs, {"plan": plan}, {"plan": plan_file}, allow_infeasible=True)
         routes = routes_of(world, costs, plan)
-    return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(ways), routes=routes))
+    return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(drawn), routes=routes))
 
 
 def routes_of(world: World, costs: Mapping[str, FuelCosts], plan: Plan) -> dict[str, list[Leg]]:

@@ -1,4 +1,4 @@
-"""What is planned for a world: fuel costs, instances and plans of each scenario; plans from elsewhere are checked."""
+"""The plans of a world's scenarios, and checks of given plans."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class InformedPlans:
-    """What somebody would plan who knew beforehand who is available.
+    """The perfect-information plans of a scenario.
 
     Attributes:
         plans: The plan for each set of available robots.
-        expected: Their expected value, over who turns out to be available: wait and see.
+        expected: Their expected value: the wait-and-see value.
         bound: Upper bound on it.
     """
 
@@ -52,7 +52,7 @@ class InformedPlans:
     bound: float
 
     def promised(self, executed: Executed) -> Executed:
-        """The informed planner's trials, with what its plans promise together in place of what the first one does."""
+        """The informed planner's trials, with the expected value and bound of all its plans as promise."""
         stopped = [plan.status for plan in self.plans.values() if plan.status != "optimal"]
         together = replace(executed.case.plan, value=self.expected, bound=self.bound,
                            status=stopped[0] if stopped else "optimal")
@@ -66,7 +66,7 @@ class PlansByProcess:
     Attributes:
         instance: What they were made for.
         stochastic: The best plan under each failure process.
-        deterministic: The plan that knows no failures.
+        deterministic: The deterministic plan.
     """
 
     instance: Instance
@@ -76,18 +76,18 @@ class PlansByProcess:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Planned:
-    """Both plans of a scenario, with what the model says of them.
+    """Both plans of a scenario, with modelled values.
 
     Attributes:
         instance: What they were made for.
         stochastic, deterministic: The plans.
         vss_range: Least and greatest modelled VSS over all deterministic plans that tie, under ``mission``.
         worst: The deterministic plan that ties and has that greatest VSS; ``None`` where no tie makes a difference.
-        ws: Expected value of knowing beforehand who is available, under ``mission``; ``None`` if it wasn't worked out.
-        evpi: What that is worth beyond the stochastic plan.
+        ws: Wait-and-see value under ``mission``; ``None`` if it wasn't computed.
+        evpi: Expected value of perfect information.
         value_of_process: Greatest value under another failure process, the one executed if it is another, less that of
             the plan for ``mission``; ``None`` where no other is planned for or executed.
-        informed: What somebody would plan who knew beforehand who is available, on request.
+        informed: The perfect-information plans, on request.
         by_process: The plans for each failure process, where they are known.
     """
 
@@ -118,8 +118,8 @@ def plan_scenarios(
     """Both plans of each scenario. Scenarios share what doesn't depend on availabilities.
 
     Raises:
-        BadInput: If the informed planner is asked for where nothing can be known beforehand.
-        KeyboardInterrupt: On Ctrl-C; there is no use for some of the plans.
+        BadInput: If the informed planner is requested under another process than ``mission``.
+        KeyboardInterrupt: On Ctrl-C; an incomplete set of plans is of no use.
     """
     if options.informed and not model_is_executed(world):
         raise BadInput("the informed planner knows who is available for a mission; with failures along the route there "
@@ -200,11 +200,11 @@ def check_plans(
     world: World, costs: Mapping[str, FuelCosts], plans: Mapping[str, Plan], paths: Mapping[str, Path], *,
     allow_infeasible: bool,
 ) -> None:
-    """Refuse plans from elsewhere that the world's travel times make infeasible.
+    """Refuse given plans that are infeasible with the world's travel times.
 
     Args:
         world, costs: The world, and its fuel costs.
-        plans, paths: The plans and their files, by the names that they go by.
+        plans, paths: The plans and their files, by name.
         allow_infeasible: Warn of those that break fuel or limit alone.
 
     Raises:
@@ -221,6 +221,6 @@ def check_plans(
 
 
 def unlimited(instance: Instance) -> Instance:
-    """The instance with all the fuel and time in the world."""
+    """The instance without limits on fuel and time."""
     return replace(instance, vehicles=tuple(
         replace(v, fuel_capacity_s=np.inf, mission_limit_s=np.inf) for v in instance.vehicles))

@@ -1,4 +1,4 @@
-"""Run folders written, and their pages written again."""
+"""Writing of run folders, and of their reports again."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from sva_bench.world.model import World
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
-    """A finished run: where it is, and its summary."""
+    """A finished run: its folder and summary."""
 
     folder: Path
     summary: AnySummary
@@ -52,7 +52,7 @@ def publish(
     executed: list[Executed], summary: AnySummary, out: Path, clock: Stopwatch, progress: OnProgress,
     identity: Mapping[str, Any] | None = None,
 ) -> Run:
-    """Write the run folder; ``identity`` is what results of plans from elsewhere depend on beside the rest."""
+    """Write the run folder; ``identity`` holds further inputs that the results depend on, such as given plans."""
     resolved = world_as_dict(world)
     name = run_name(world.name, options.seed,
                     {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
@@ -78,11 +78,11 @@ def publish(
         write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
                        settings_of(world, options))
         write_record(folder / "summary.json", summary)
-        told = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
-        write_record(folder / "manifest.json", told)
+        manifest = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
+        write_record(folder / "manifest.json", manifest)
         write_report(folder / "report.html", Content(
             summary=summary, routes={k: v.case.plan.routes for k, v in by_case(executed).items()}, stems=stems,
-            legs=legs, world=world, manifest=told))
+            legs=legs, world=world, manifest=manifest))
     return Run(folder=out / name, summary=summary)
 
 
@@ -90,7 +90,7 @@ def report_again(folder: Path) -> Path:
     """Write the report of a finished run again, from its tables.
 
     Raises:
-        BadInput, BadFile: If this is no run folder, or something in it is cut off, foreign or not of the same run.
+        BadInput, BadFile: If this is no run folder, or a file in it is truncated, invalid or not of the same run.
     """
     content = read_content(run_folder_at(folder))
     path = folder / "report.html"
@@ -113,8 +113,8 @@ class Stopwatch:
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        begun = time.monotonic()
+        started_s = time.monotonic()
         try:
             yield
         finally:
-            self.seconds[name] = time.monotonic() - begun
+            self.seconds[name] = time.monotonic() - started_s

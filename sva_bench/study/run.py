@@ -1,4 +1,4 @@
-"""The bench on one screen: from a world to its summary. The composition root."""
+"""From a world to its summary: the composition root."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sva_bench.execution.execute import Executed, execute
 from sva_bench.files.printable import counted
 from sva_bench.study.assumptions import cross_table
 from sva_bench.study.costs import plan_costs, reach_of
-from sva_bench.study.informed import cases_of, put_together
+from sva_bench.study.informed import cases_of, combined_trials
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, plan_scenarios, two_cases
 from sva_bench.study.publish import Run, Stopwatch, publish
@@ -40,7 +40,12 @@ class Measured:
 
 
 def run(world: World, options: Options, out: Path, executor: Executor | None, progress: OnProgress) -> Run:
-    """Plan, execute, measure and record a world's mission."""
+    """Plan, execute, measure and record a world's mission, and write the run folder.
+
+    Raises:
+        BadInput: If there are too many trials, or the folder can't be written.
+        UnreachableSite: If a site can't be reached.
+    """
     done = measure(world, options, executor, progress)
     return publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
                     done.summary, out, done.clock, progress)
@@ -84,7 +89,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
 
 
 def _cases_of(world: World, scenario: Scenario, planned: Planned) -> list[Case]:
-    """Everything that is executed in a scenario."""
+    """All cases to be executed in a scenario."""
     cases = two_cases(scenario, planned)
     if model_is_executed(world) and planned.worst is not None:  # the VSS against the least fortunate of the ties
         cases.append(Case(scenario=scenario, planner="worst of ties", plan=planned.worst, role="worst_tie"))
@@ -92,19 +97,23 @@ def _cases_of(world: World, scenario: Scenario, planned: Planned) -> list[Case]:
 
 
 def _with_informed(world: World, planned: Mapping[str, Planned], executed: Sequence[Executed]) -> list[Executed]:
-    """What was executed, the parts of the informed planner put together, scenario by scenario."""
+    """The executed cases, with the parts of the informed planner combined, scenario by scenario."""
     found: list[Executed] = []
     for scenario in world.scenarios:
         mine = [run for run in executed if run.case.scenario.name == scenario.name]
         found += [run for run in mine if run.case.role != "informed_part"]
         if (informed := planned[scenario.name].informed) is not None:
             parts = [run for run in mine if run.case.role == "informed_part"]
-            found.append(put_together(dict(zip(informed.plans, parts, strict=True))))
+            found.append(combined_trials(dict(zip(informed.plans, parts, strict=True))))
     return found
 
 
 def refuse_too_many_rows(world: World, trials: int, plans: int) -> None:
-    """Refuse a run whose trials would not fit into memory: all of them are at hand until its figures are worked out."""
+    """Refuse a run whose outcomes would not fit into memory, which holds all of them.
+
+    Raises:
+        BadInput: If it has more than ``MOST_ROWS``.
+    """
     rows = trials * len(world.scenarios) * plans * len(world.robots)
     if rows > MOST_ROWS:
         raise BadInput(f"{rows} outcomes ({counted(trials, 'trial')} x {counted(len(world.scenarios), 'scenario')} x "

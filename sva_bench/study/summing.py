@@ -22,7 +22,7 @@ def summarise(
     world: World, options: Options, head: Head, planned: Mapping[str, Planned], executed: Sequence[Executed],
     reach: Reach,
 ) -> Summary:
-    """The summary of a run, whose plans are ours."""
+    """The summary of a run."""
     runs: dict[tuple[str, Role], Executed] = {(run.case.scenario.name, run.case.role): run for run in executed}
     scenarios = []
     for scenario in world.scenarios:
@@ -38,7 +38,7 @@ def summarise(
 
 
 def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:
-    """What is known of a scenario before any trial: each plan's value in closed form, and of both together."""
+    """The modelled values of a scenario: each plan's closed-form value, and those of both together."""
     mission = model_is_executed(world)
     truth = replace(plans.instance, failure=world.execute_failure)
 
@@ -58,12 +58,12 @@ def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:
 
 
 def proved(planned: Mapping[str, Planned]) -> bool:
-    """Whether no solve met a limit."""
+    """Whether all plans are proved optimal."""
     return all(plan.status == "optimal" for p in planned.values() for plan in p.all_plans())
 
 
 def head_of(world: World, settings: Settings, costs: Mapping[str, FuelCosts], *, reproducible: bool) -> Head:
-    """What every summary says first."""
+    """The common head of summaries."""
     pairs = sum(cost.pairs for cost in costs.values())
     changed = sum(cost.changed_pct * cost.pairs for cost in costs.values())
     return Head(
@@ -75,5 +75,5 @@ def head_of(world: World, settings: Settings, costs: Mapping[str, FuelCosts], *,
 
 
 def by_case(executed: Sequence[Executed]) -> dict[tuple[str, str], Executed]:
-    """What was executed, by scenario and planner: joined into one word, two cases could be one."""
+    """The executed cases by scenario and planner."""
     return {(run.case.scenario.name, run.case.planner): run for run in executed}

@@ -39,7 +39,7 @@ class FuelCosts:
         return np.round(self.repaired_ms * (1.0 + self.margin) / 1000.0, 9)
 
     def chain(self, origin: str, destination: str) -> tuple[str, ...]:
-        """Sites that the leg runs through, its two ends included."""
+        """Sites of the cheapest chain from one site to another, both included."""
         sites = self.times.sites
         here, end = sites.index(origin), sites.index(destination)
         chain = [here]
@@ -84,7 +84,7 @@ def repair_metric(time_ms: IntArray) -> tuple[IntArray, IntArray]:
         ValueError: If ``time_ms`` is not square, or not positive off the diagonal.
 
     Source:
-        Floyd (1962), Algorithm 97; section 5.2 of the paper, which leaves out the chains.
+        Floyd (1962), "Algorithm 97: Shortest path"; section 5.2 of the paper, which leaves out the chains.
     """
     n = len(time_ms)
     if time_ms.shape != (n, n) or (time_ms[~np.eye(n, dtype=bool)] <= 0).any():
@@ -103,6 +103,11 @@ def repair_metric(time_ms: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def fuel_costs(times: TravelTimes, margin: float) -> FuelCosts:
-    """Repair travel times into fuel costs."""
+    """Metric fuel costs from travel times.
+
+    Args:
+        times: The travel times.
+        margin: Relative safety margin on them.
+    """
     repaired, via = repair_metric(times.time_ms)
     return FuelCosts(times=times, repaired_ms=repaired, via=via, margin=margin)

@@ -1,7 +1,7 @@
-"""Ways on the lattice of a map's half cells: what a roadmap is joined by where crowds of corners leave it in parts.
+"""Paths on the lattice of a map's half cells, which connect a roadmap where a map has too many corners.
 
-The saddles of the distance to a map's corners and walls lie on that lattice, so hardly a passage is left out, however
-many corners there are; the paths are not the shortest, but are free.
+The saddle points of the distance to a map's obstacles lie on that lattice, so hardly a passage is missed, whatever the
+number of corners; the paths are not shortest, but free.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.geometry.buckets import keeps_clear
 from sva_bench.geometry.cells import Cells, DistanceField, distance_field
 
-_SURELY = 1 + 1e-6  # times the clearance, in single precision, is the clearance at least
-_AT_A_TIME = 1_000_000  # places that are looked at before Ctrl-C is listened to
+_SURELY = 1 + 1e-6  # factor on the clearance that covers the rounding of single precision
+_AT_A_TIME = 1_000_000  # nodes between two checks for Ctrl-C
 
 
 def lattice_paths(
     cells: Cells, checker: FloatArray, clearance_m: float, points: FloatArray, goals: Sequence[int],
 ) -> list[FloatArray | None]:
-    """A free path from the first point to each of some others, pulled straight where it goes easily.
+    """A free path from the first point to each of some others, straightened greedily.
 
     Args:
         cells: The map.
-        checker: As ``clearance_checker`` makes it, for that clearance.
-        clearance_m: Distance to keep.
+        checker: From ``clearance_checker``, for that clearance.
+        clearance_m: Distance to keep [m].
         points: The points, all of them free [m], shape (n, 2).
-        goals: Indices of those to go to.
+        goals: Indices of the goals.
 
     Returns:
         For each goal the path's vertices [m], shape (k, 2); ``None`` where none is found.
@@ -40,7 +40,7 @@ def lattice_paths(
     field = distance_field(cells)
     roomy = field.distance_m >= clearance_m * _SURELY
     parts, count = label(roomy)
-    # World coordinates of a place: those of the first, and a step along a row and along a column.
+    # World coordinates of a node: those of the first, and a step along a row and along a column.
     first, right, up = field.places(np.array([[0, 0], [0, 1], [1, 0]]))
     frame = np.concatenate([first, right - first, up - first])
     parent = np.arange(count + 1)
@@ -52,29 +52,31 @@ def lattice_paths(
         at += _AT_A_TIME
     links = np.concatenate(bridges)
     links = links[np.argsort(links[:, 0], kind="stable")]
-    start = _place_by(field, checker, roomy, points[0])
-    ends = [_place_by(field, checker, roomy, points[goal]) for goal in goals]
+    start = _nearest_free_place(field, checker, roomy, points[0])
+    ends = [_nearest_free_place(field, checker, roomy, points[goal]) for goal in goals]
     if start is None:
         return [None] * len(goals)
-    came = np.full(parts.size, -1, dtype=np.int32)
+    predecessor = np.full(parts.size, -1, dtype=np.int32)
     queue = np.empty(parts.size, dtype=np.int32)
-    came[start], queue[0] = start, start
-    state = np.array([0, 1])  # places of the queue that are done, and all of them
+    predecessor[start], queue[0] = start, start
+    state = np.array([0, 1])  # head and tail of the queue
     while state[0] < state[1]:
-        _go_on(parts, links, came, queue, state, _AT_A_TIME)
+        _breadth_first(parts, links, predecessor, queue, state, _AT_A_TIME)
     paths: list[FloatArray | None] = []
     for goal, end in zip(goals, ends, strict=True):
-        if end is None or came[end] < 0:
+        if end is None or predecessor[end] < 0:
             paths.append(None)
             continue
-        index = np.column_stack(np.divmod(_chain(came, end)[::-1], parts.shape[1]))
+        index = np.column_stack(np.divmod(_path_back(predecessor, end)[::-1], parts.shape[1]))
         path = np.concatenate([points[:1], field.places(index), points[goal:goal + 1]])
-        paths.append(_pulled(checker, np.ascontiguousarray(path)))
+        paths.append(_straightened(checker, np.ascontiguousarray(path)))
     return paths
 
 
-def _place_by(field: DistanceField, checker: FloatArray, roomy: NDArray[np.bool_], point: FloatArray) -> int | None:
-    """The number of the nearest place with room that a straight free line joins to a point."""
+def _nearest_free_place(
+    field: DistanceField, checker: FloatArray, roomy: NDArray[np.bool_], point: FloatArray,
+) -> int | None:
+    """The number of the nearest node with enough clearance that a free line joins to a point; ``None`` if none."""
     row, column = field.index_of(point[None])[0].tolist()
     rows, columns = roomy.shape
     around = np.array([(r, c) for r in range(max(row - 2, 0), min(row + 3, rows)) for c in range(
@@ -98,17 +100,17 @@ def _root(parent: IntArray, part: int) -> int:
 def _bridges(
     parts: NDArray[np.int32], parent: IntArray, frame: FloatArray, checker: FloatArray, begin: int, end: int
 ) -> IntArray:
-    """Free lines from place to place, two steps away at most, that join parts which nothing joined before.
+    """Free lines between nodes, at most two steps apart, that join components not yet joined.
 
     Args:
-        parts: Which part each place is of, 0 = of none.
-        parent: Parts that are joined already, as a forest; brought up to date.
-        frame: x, y of the first place, and steps along rows and columns [m], shape (6,).
-        checker: As ``clearance_checker`` makes it.
-        begin, end: Numbers of the places to begin from.
+        parts: Component of each node, 0 = none, shape (rows, columns).
+        parent: Union-find forest of the components joined so far; changed in place.
+        frame: x, y of the first node, and steps along rows and columns [m], shape (6,).
+        checker: From ``clearance_checker``.
+        begin, end: Numbers of the nodes to begin from.
 
     Returns:
-        Numbers of both places, shape (k, 2).
+        Numbers of both nodes, shape (k, 2).
     """
     found = np.empty((len(parent), 2), dtype=np.int64)  # each joins two trees of the forest
     count = 0
@@ -133,11 +135,11 @@ def _bridges(
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _go_on(
-    parts: NDArray[np.int32], links: IntArray, came: NDArray[np.int32], queue: NDArray[np.int32], state: IntArray,
-    most: int,
+def _breadth_first(
+    parts: NDArray[np.int32], links: IntArray, predecessor: NDArray[np.int32], queue: NDArray[np.int32],
+    state: IntArray, most: int,
 ) -> None:
-    """Breadth-first search over places and bridges, for so many places."""
+    """Continue a breadth-first search over nodes and bridges for ``most`` nodes, in place."""
     rows, columns = parts.shape
     head, tail = state
     until = head + most
@@ -147,15 +149,15 @@ def _go_on(
         row, column = here // columns, here % columns
         for dr, dc in ((0, 1), (1, 0), (0, -1), (-1, 0)):
             r, c = row + dr, column + dc
-            if 0 <= r < rows and 0 <= c < columns and parts[r, c] > 0 and came[r * columns + c] < 0:
-                came[r * columns + c] = here
+            if 0 <= r < rows and 0 <= c < columns and parts[r, c] > 0 and predecessor[r * columns + c] < 0:
+                predecessor[r * columns + c] = here
                 queue[tail] = r * columns + c
                 tail += 1
         link = np.searchsorted(links[:, 0], here) if len(links) else 0
         while link < len(links) and links[link, 0] == here:
             there = links[link, 1]
-            if came[there] < 0:
-                came[there] = here
+            if predecessor[there] < 0:
+                predecessor[there] = here
                 queue[tail] = there
                 tail += 1
             link += 1
@@ -163,26 +165,26 @@ def _go_on(
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _chain(came: NDArray[np.int32], end: int) -> IntArray:
-    """Places on the way back from one to where the search began, which came from itself."""
+def _path_back(predecessor: NDArray[np.int32], end: int) -> IntArray:
+    """Nodes from ``end`` back to the root of the search, which is its own predecessor."""
     count, place = 1, end
-    while came[place] != place:
-        place = came[place]
+    while predecessor[place] != place:
+        place = predecessor[place]
         count += 1
     chain = np.empty(count, dtype=np.int64)
     chain[0] = end
     for k in range(1, count):
-        chain[k] = came[chain[k - 1]]
+        chain[k] = predecessor[chain[k - 1]]
     return chain
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _pulled(checker: FloatArray, path: FloatArray) -> FloatArray:
-    """A path with fewer vertices: from each a line about as far along as it is free."""
+def _straightened(checker: FloatArray, path: FloatArray) -> FloatArray:
+    """A path with fewer vertices: from each a free line as far along as bisection finds."""
     kept = [0]
     while kept[-1] < len(path) - 1:
         here = kept[-1]
-        good, step = here + 1, 2  # one step is free: the lattice says so
+        good, step = here + 1, 2  # one step is free by construction
         while here + step < len(path) and keeps_clear(
                 checker, path[here, 0], path[here, 1], path[here + step, 0], path[here + step, 1]):
             good, step = here + step, 2 * step
@@ -198,11 +200,16 @@ def _pulled(checker: FloatArray, path: FloatArray) -> FloatArray:
     return pulled
 
 
-def open_parts(field: DistanceField, clearance_m: float, points: FloatArray) -> tuple[NDArray[np.int32], IntArray]:
-    """Parts of the lattice that no path leaves: those of the places, and those of some points.
+def reachable_components(
+    field: DistanceField, clearance_m: float, points: FloatArray,
+) -> tuple[NDArray[np.int32], IntArray]:
+    """Components of the lattice that no path leaves: of the nodes, and of some points.
 
-    Each point of a path is near a place of the lattice, at most half a diagonal away. Places that are nearer to an
-    obstacle than the clearance less that are closed; a path runs by open ones, from neighbour to neighbour.
+    Each point of a path is within half a diagonal of a node. Nodes nearer to an obstacle than the clearance less that
+    are closed; so a path stays within half a diagonal of open ones, from neighbour to neighbour.
+
+    Returns:
+        Component of each node, 0 = closed, shape (rows, columns); component of each point, shape (n,).
     """
     open_places = field.distance_m >= clearance_m - field.cells.cell_m / 2 * math.sqrt(0.5) - 1e-5
     at = field.index_of(points)

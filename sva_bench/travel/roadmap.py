@@ -1,8 +1,8 @@
 """Collision-free paths between sites, planned by OMPL. The only importer of ompl.
 
 A deterministic PRM* roadmap serves all pairs: half of its samples lie on the boundary of the inflated obstacles,
-where shortest paths bend, half are a Halton sequence; tangents between the boundary's arcs make it near the optimum.
-Edges are checked exactly, without a resolution. The other planners search pair by pair.
+where shortest paths bend, half are a Halton sequence; tangents between the boundary's arcs make paths nearly optimal.
+Edges are checked exactly, not at a resolution. The other planners search pair by pair.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from sva_bench.geometry.buckets import clearance_checker, keeps_clear, keeps_cle
 from sva_bench.geometry.cells import Cells, distance_field
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c, pressed
-from sva_bench.travel.lattice import lattice_paths, open_parts
+from sva_bench.travel.lattice import lattice_paths, reachable_components
 from sva_bench.travel.samples import arc_points, roadmap_samples
-from sva_bench.travel.tangents import nothing_known, tangents, tangents_of_own, taut
+from sva_bench.travel.tangents import new_line_cache, shortcut, tangents, tangents_of_isolated
 
 _GROWTH = ((1000, 6), (3000, 12), (6000, 24))
 """Milestones, and points on a quarter circle: the roadmap grows until it connects all sites, or to the last of these.
 
-The tangents between arcs make paths short, the milestones make sure of odd places: more of them shorten no path.
+The tangents between arcs make paths short, the milestones connect the rest: more of them shorten no path.
 """
 _CROWD = 10_000
-"""Points on arcs from which on the roadmap does not grow, but is joined by paths on the lattice of the map's cells.
+"""Points on arcs from which on the roadmap is not grown, but connected by paths on the lattice of the map's cells.
 
-More points and milestones take seconds each time there, and join hardly more: the lattice finds every passage.
+More points and milestones would take seconds, and connect hardly more; the lattice finds nearly every passage.
 """
-_CELL_M, _CELLS = 0.02, 200_000  # finest cell, and most cells, of the grid that says which sites no path joins
-_EFFORTS = (1, 4, 16)  # by which a planner's samples and steps for one pair grow, until they join it or to the last
-_START_SLACK_M = 1e-9  # a start on the very boundary is free
-_WINDOW = 40  # vertices of a path that are cut off at a time: more than its arcs have between two tangents
+_CELL_M, _CELLS = 0.02, 200_000  # finest cell, and most cells, of the grid that proves sites disconnected
+_EFFORTS = (1, 4, 16)  # factors on a planner's samples and steps for one pair, tried until a path is found
+_START_SLACK_M = 1e-9  # a start on the boundary of the free space is free
+_WINDOW = 40  # most vertices that one shortcut skips: more than an arc has between two tangents
 
 
 
@@ -52,9 +52,9 @@ class PairPlanner:
     """A planner that searches pair by pair.
 
     Attributes:
-        search: Its class in OMPL.
-        calls: How often its termination condition is asked before it gives up a pair, at least effort.
-        samples: States that it samples beforehand, at least effort; 0 = as it goes.
+        search: OMPL's class.
+        calls: Evaluations of its termination condition for one pair, at effort 1.
+        samples: States that it samples beforehand, at effort 1; 0 = it samples while it searches.
     """
 
     search: Callable[[Any], Any]
@@ -70,7 +70,7 @@ PAIR_PLANNERS: Mapping[PathPlanner, PairPlanner] = {
 }
 """The planners but for ``prmstar``, whose one roadmap serves all pairs."""
 
-ou.setLogLevel(ou.LogLevel.LOG_NONE)  # it warns that seeding is late; it is not, and the result is the same bit for bit
+ou.setLogLevel(ou.LogLevel.LOG_NONE)  # it warns that seeding is late, wrongly: results are equal to the bit
 
 
 def plan_paths(
@@ -79,29 +79,32 @@ def plan_paths(
     """A path from every point to every other.
 
     Args:
-        obstacles: What stands in the way.
-        points: Where the paths begin and end [m], shape (n, 2); all at least ``clearance_m`` from obstacles.
-        clearance_m: Distance that every path keeps from obstacles.
-        planner: ``prmstar``, one roadmap for all; the others plan each directed pair by itself, ``rrtconnect`` noisily.
+        obstacles: The obstacles.
+        points: Ends of the paths [m], shape (n, 2); all at least ``clearance_m`` from obstacles.
+        clearance_m: Distance that every path keeps from obstacles [m].
+        planner: ``prmstar``: one roadmap for all pairs; the others plan each directed pair by itself.
         seed: Seed of OMPL's random numbers.
 
     Returns:
         ``paths[i][j]``: vertices [m], shape (k, 2); ``None`` if there is no path, or i = j.
+
+    Source:
+        Karaman & Frazzoli (2011), "Sampling-based algorithms for optimal motion planning" (PRM*).
     """
     ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
     if planner in PAIR_PLANNERS:
         return _pair_by_pair(obstacles, points, clearance_m, planner)
     if len(points) < 2:
         return [[None] for _ in points]
-    return _shortest(_grown(obstacles, points, clearance_m), points)
+    return _shortest(_connecting_roadmap(obstacles, points, clearance_m), points)
 
 
 def roadmap_edges(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> FloatArray:
-    """The edges of the roadmap that ``plan_paths`` plans on, for looking at: both ends of each [m], shape (e, 2, 2)."""
+    """The edges of the roadmap of ``plan_paths``, for display: both ends of each [m], shape (e, 2, 2)."""
     if len(points) < 2:
         return np.empty((0, 2, 2))
     ou.RNG.setSeed(1)
-    roadmap = _grown(obstacles, points, clearance_m)
+    roadmap = _connecting_roadmap(obstacles, points, clearance_m)
     one, other = roadmap.graph.nonzero()
     ends: FloatArray = np.stack([roadmap.vertices[one], roadmap.vertices[other]], axis=1)
     return ends
@@ -109,14 +112,14 @@ def roadmap_edges(obstacles: Obstacles, points: FloatArray, clearance_m: float) 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Roadmap:
-    """What paths are planned on.
+    """A roadmap.
 
     Attributes:
-        vertices: Where its vertices are [m], shape (v, 2).
+        vertices: Its vertices [m], shape (v, 2).
         graph: Length of each edge [m], from the lower number to the higher, shape (v, v).
-        at: The vertex of each point that paths are to join.
-        checker: What says whether an edge is free.
-        arcs: Points on arcs among its vertices, as ``arc_points`` gives them.
+        at: Index of the vertex of each end of paths, shape (n,).
+        checker: From ``clearance_checker``, for edges.
+        arcs: Points on arcs among its vertices, from ``arc_points``.
     """
 
     vertices: FloatArray
@@ -127,7 +130,7 @@ class _Roadmap:
 
 
 class _ExactValidator(ob.MotionValidator):  # type: ignore[misc]
-    """Checks a whole edge at once, exactly."""
+    """Checks edges exactly."""
 
     def __init__(self, si: Any, free: Callable[[float, float, float, float], bool]) -> None:
         super().__init__(si)
@@ -138,7 +141,7 @@ class _ExactValidator(ob.MotionValidator):  # type: ignore[misc]
 
 
 class _SampleQueue(ob.ValidStateSampler):  # type: ignore[misc]
-    """Hands out prepared samples, one after the other; none ever depends on chance."""
+    """Returns prepared samples in order, so that nothing is random."""
 
     def __init__(self, si: Any, samples: FloatArray) -> None:
         super().__init__(si)
@@ -154,12 +157,12 @@ class _SampleQueue(ob.ValidStateSampler):  # type: ignore[misc]
 
 
 def surely_disconnected(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> BoolArray:
-    """Which points no path can join, however fine the roadmap, shape (n, n).
+    """Which pairs of points are proved to have no path, shape (n, n).
 
-    By a lattice: each point of a path is near a place of it, which can't be much nearer to an obstacle than the path.
+    By a lattice: each point of a path has a node nearby that is hardly nearer to an obstacle than the path.
     """
     if obstacles.cells is not None:
-        _, mine = open_parts(distance_field(obstacles.cells), clearance_m, points)
+        _, mine = reachable_components(distance_field(obstacles.cells), clearance_m, points)
     else:
         low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
         cell = max(_CELL_M, math.sqrt(float(np.prod(high - low)) / _CELLS))
@@ -188,7 +191,7 @@ def _space(obstacles: Obstacles, clearance_m: float) -> tuple[Any, Callable[[flo
     def free(ax: float, ay: float, bx: float, by: float) -> bool:
         return bool(keeps_clear(checker, ax, ay, bx, by))
 
-    free(*obstacles.bounds_m[:2].tolist() * 2)  # is compiled here, where Ctrl-C may be raised, not within OMPL
+    free(*obstacles.bounds_m[:2].tolist() * 2)  # compile it here, where Ctrl-C may be raised, not within OMPL
     si.setStateValidityChecker(lambda s: free(s[0], s[1], s[0], s[1]))
     si.setMotionValidator(_ExactValidator(si, free))
     si.setup()
@@ -201,18 +204,18 @@ def _state(si: Any, point: Sequence[float] | FloatArray) -> Any:
     return state
 
 
-def _grown(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roadmap:
-    """A roadmap that connects all points, or to the limit of its growth."""
+def _connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roadmap:
+    """A roadmap grown until it connects all points, or to the last of ``_GROWTH``."""
     disconnected: BoolArray | None = None
     for milestones, per_corner in _GROWTH:
-        roadmap = _roadmap(obstacles, points, clearance_m, milestones, per_corner)
+        roadmap = _build_roadmap(obstacles, points, clearance_m, milestones, per_corner)
         _, part = connected_components(roadmap.graph, directed=False)
         mine = part[roadmap.at]
         missing = mine[:, None] != mine[None, :]
         if not missing.any():
             break
         if obstacles.cells is not None and len(roadmap.arcs) > _CROWD:
-            return _joined(roadmap, obstacles.cells, points, clearance_m, np.flatnonzero(missing[0]))
+            return _with_lattice_paths(roadmap, obstacles.cells, points, clearance_m, np.flatnonzero(missing[0]))
         if disconnected is None:
             disconnected = surely_disconnected(obstacles, points, clearance_m)
         if disconnected[missing].all():
@@ -220,10 +223,10 @@ def _grown(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roa
     return roadmap
 
 
-def _joined(
+def _with_lattice_paths(
     roadmap: _Roadmap, cells: Cells, points: FloatArray, clearance_m: float, goals: IntArray
 ) -> _Roadmap:
-    """The same with paths on the lattice from the first point to some others, and lines from them to what they see."""
+    """A roadmap with lattice paths from the first point to some others added, and tangents from their vertices."""
     found = lattice_paths(cells, roadmap.checker, clearance_m, points, goals.tolist())
     paths = [path for path in found if path is not None]
     if not paths:
@@ -233,12 +236,12 @@ def _joined(
     first = np.delete(np.arange(len(along)), last)  # of each edge
     vertices, graph = _with_edges(roadmap.vertices, roadmap.graph, along, np.column_stack([first, first + 1]))
     inner = np.unique(np.concatenate([path[1:-1] for path in paths]), axis=0)
-    ends = np.concatenate([_alone(inner), roadmap.arcs])
-    vertices, graph = _with_edges(vertices, graph, ends[:, :2], tangents_of_own(roadmap.checker, ends))
+    ends = np.concatenate([_isolated(inner), roadmap.arcs])
+    vertices, graph = _with_edges(vertices, graph, ends[:, :2], tangents_of_isolated(roadmap.checker, ends))
     return replace(roadmap, vertices=vertices, graph=graph)
 
 
-def _roadmap(
+def _build_roadmap(
     obstacles: Obstacles, points: FloatArray, clearance_m: float, milestones: int, per_corner: int,
 ) -> _Roadmap:
     si, _ = _space(obstacles, clearance_m)
@@ -246,7 +249,7 @@ def _roadmap(
     samples = roadmap_samples(obstacles, clearance_m, milestones, arcs)
     si.setValidStateSamplerAllocator(lambda inner: _SampleQueue(inner, samples))
     problem = ob.ProblemDefinition(si)
-    # Each site once: of two vertices in one place, chance decides which gets an edge.
+    # Each site once: of two vertices at one point, chance decides which gets an edge.
     for point in points[1:]:
         problem.addStartState(_state(si, point))
     problem.setGoalState(_state(si, points[0]))
@@ -254,23 +257,23 @@ def _roadmap(
     planner.setProblemDefinition(problem)
     planner.setup()
     total = len(points) + len(samples)
-    with deferring_ctrl_c():  # OMPL calls back, and is no place for exceptions
+    with deferring_ctrl_c():  # exceptions must not pass through OMPL's callbacks
         planner.solve(ob.plannerAlwaysTerminatingCondition())  # inserts the sites; a Python condition would deadlock
         planner.growRoadmapPtc(ob.PlannerTerminationCondition(lambda: pressed() or planner.milestoneCount() >= total))
     checker = clearance_checker(obstacles, clearance_m, _START_SLACK_M)
-    ends = np.concatenate([_alone(points), arcs])
+    ends = np.concatenate([_isolated(points), arcs])
     vertices, graph = _with_edges(*_read_roadmap(si, planner), ends[:, :2], tangents(checker, ends))
     at = np.array([int(np.argmin(np.hypot(*(vertices - point).T))) for point in points], dtype=np.int64)
     return _Roadmap(vertices=vertices, graph=graph, at=at, checker=checker, arcs=arcs)
 
 
 def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | None]]:
-    """Shortest paths on a roadmap, pulled taut."""
+    """Shortest paths on a roadmap, shortened by shortcuts, as ``plan_paths`` returns them."""
     at = roadmap.at.tolist()
     lengths, before = dijkstra(roadmap.graph, directed=False, indices=at, return_predecessors=True)
     n = len(points)
     paths: list[list[FloatArray | None]] = [[None] * n for _ in range(n)]
-    known = nothing_known()
+    known = new_line_cache()
     for i in range(n):
         length = np.full(len(roadmap.vertices), np.inf)
         length[at[i]] = 0.0
@@ -278,14 +281,14 @@ def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | N
         for j in range(i + 1, n):
             if not math.isfinite(lengths[i, at[j]]):
                 continue
-            path = taut(roadmap.checker, roadmap.vertices, before[i], at[i], at[j], _WINDOW, known, length, via)
+            path = shortcut(roadmap.checker, roadmap.vertices, before[i], at[i], at[j], _WINDOW, known, length, via)
             path[0], path[-1] = points[i], points[j]
             paths[i][j], paths[j][i] = path, path[::-1].copy()
     return paths
 
 
-def _alone(points: FloatArray) -> FloatArray:
-    """Points of their own, on no arc, as ``tangents`` takes them."""
+def _isolated(points: FloatArray) -> FloatArray:
+    """Isolated points, on no arc, as ``tangents`` takes them, shape (n, 5)."""
     return np.column_stack([points, np.full((len(points), 2), np.nan), np.zeros(len(points))])
 
 
@@ -296,10 +299,10 @@ def _with_edges(
 
     Args:
         vertices, graph: The roadmap.
-        ends: Where the edges end [m], shape (n, 2); places that the roadmap lacks are added.
-        pairs: Which two of them each edge joins, shape (e, 2).
+        ends: Ends of the edges [m], shape (n, 2); those that are no vertices yet are added.
+        pairs: Indices of the two ends of each edge, shape (e, 2).
     """
-    # By x, then y, as complex numbers are compared; of vertices in one place the last.
+    # Lookup by x, then y, the order of complex numbers; of vertices at one point the last.
     places = np.ascontiguousarray(vertices).view(np.complex128)[:, 0]
     order = np.argsort(places, kind="stable")
     wanted = np.ascontiguousarray(ends).view(np.complex128)[:, 0]
@@ -311,7 +314,7 @@ def _with_edges(
     heads, tails = known[pairs].T
     old = graph.tocoo()
     rows, columns = np.concatenate([old.row, heads]), np.concatenate([old.col, tails])
-    # Each edge once: a sparse matrix adds up duplicates.
+    # Each edge once: a sparse matrix sums duplicates.
     low, high = np.minimum(rows, columns).astype(np.int64), np.maximum(rows, columns).astype(np.int64)
     numbers = np.sort(low * len(vertices) + high)
     low, high = np.divmod(numbers[np.diff(numbers, prepend=-1) > 0], len(vertices))
@@ -329,8 +332,8 @@ def _read_roadmap(si: Any, planner: Any) -> tuple[FloatArray, csr_array]:
         neighbours = data.getEdges(k)
         rows += [k] * len(neighbours)
         columns += neighbours
-    # OMPL numbers vertices by where they lie in memory, and ties between equally short paths go by number:
-    # by their coordinates instead, the same roadmap always gives the same paths.
+    # OMPL numbers vertices by memory address, and ties between equally short paths go by number:
+    # sorted by coordinates, equal roadmaps give equal paths.
     order = np.lexsort(vertices.T)
     number = np.empty(count, dtype=np.int64)
     number[order] = np.arange(count)
@@ -376,7 +379,7 @@ def _query(
     search.setup()
     with deferring_ctrl_c():
         search.solve(_after(kind.calls * effort))
-    if not problem.hasExactSolution():  # solve() is true for an approximate one too, which ends short
+    if not problem.hasExactSolution():  # solve() is true for an approximate one too, which ends before the goal
         return None
     path = problem.getSolutionPath()
     with deferring_ctrl_c():
@@ -387,6 +390,6 @@ def _query(
 
 
 def _after(calls: int) -> Any:
-    """A termination condition that counts how often it is asked: never the clock. Ctrl-C ends it too."""
-    asked = iter(range(calls))
-    return ob.PlannerTerminationCondition(lambda: next(asked, None) is None or pressed())
+    """A termination condition by number of evaluations, not by time; Ctrl-C ends it too."""
+    evaluations = iter(range(calls))
+    return ob.PlannerTerminationCondition(lambda: next(evaluations, None) is None or pressed())

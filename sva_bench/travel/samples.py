@@ -1,4 +1,4 @@
-"""Where the roadmap's milestones lie: round the corners that shortest paths bend about, and all over the free space."""
+"""The roadmap's milestones: on the arcs about corners, where shortest paths bend, and all over the free space."""
 
 from __future__ import annotations
 
@@ -11,37 +11,36 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.geometry.buckets import keeps_clearance
 from sva_bench.geometry.cells import Cells, convex_corners, distance_field
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.travel.lattice import open_parts
+from sva_bench.travel.lattice import reachable_components
 
-_GRAZE_M = 1e-4  # boundary samples keep this far outside, so that edges along the boundary are free
-_MOST_ARC_POINTS = 40_000  # of a map of 2000 x 2000 cells full of corners
+_GRAZE_M = 1e-4  # distance of boundary samples from the boundary, so that edges along it are free
+_MOST_ARC_POINTS = 40_000  # reached by maps of 2000 x 2000 cells full of corners
 
 
 def arc_points(
     obstacles: Obstacles, clearance_m: float, per_corner: int, sites: FloatArray | None = None
 ) -> FloatArray:
-    """Free points round the corners and circles that shortest paths bend about.
+    """Free points on the arcs about corners and cylinders, on which shortest paths bend.
 
-    They are the vertices of polygons about the arcs: inscribed ones would leave the ring between their vertices, and
-    so be blocked.
+    They are the vertices of polygons circumscribed about the arcs: edges of inscribed ones would come too near.
 
     Args:
-        obstacles: What stands in the way.
-        clearance_m: Distance to keep.
+        obstacles: The obstacles.
+        clearance_m: Distance to keep [m].
         per_corner: Vertices on a quarter circle.
-        sites: What paths are to join [m], shape (n, 2): of too many points on a map, those are left out that no path
-            between them can touch.
+        sites: Ends of the paths [m], shape (n, 2): on a map with too many points, those that no path
+            between them can reach are left out.
 
     Returns:
-        x, y, the arc's centre x, y [m], and the sine of half the angle between vertices: within so much of a right
-        angle to the radius a line touches the arc; shape (k, 5), at most ``_MOST_ARC_POINTS``.
+        x, y, the arc's centre x, y [m], and the sine of half the angle between vertices: within that of a right
+        angle to the radius, a line counts as tangent; shape (k, 5), at most ``_MOST_ARC_POINTS``.
     """
     ring, half = clearance_m + _GRAZE_M, math.pi / (4 * per_corner)
     angles = (np.arange(per_corner) + 0.5) / per_corner * (math.pi / 2)
     quarter = np.column_stack([np.cos(angles), np.sin(angles)])
     corners = _corners_of_boxes(obstacles) if obstacles.cells is None else _corners_of_cells(obstacles.cells)
     centres = np.repeat(corners[:, :2], per_corner, axis=0)
-    # Each corner has the directions of its two sides.
+    # Each corner comes with the outward directions of its two sides.
     aside = quarter @ corners[:, 2:].reshape(-1, 2, 2)
     points = centres + ring / math.cos(half) * aside.reshape(-1, 2)
     if len(obstacles.cylinders):
@@ -55,33 +54,33 @@ def arc_points(
     arcs = arcs[keeps_clearance(obstacles, points, clearance_m)]
     if sites is not None and obstacles.cells is not None and len(arcs) > _MOST_ARC_POINTS:
         field = distance_field(obstacles.cells)
-        parts, mine = open_parts(field, clearance_m, sites)
+        parts, mine = reachable_components(field, clearance_m, sites)
         row, column = field.index_of(arcs[:, :2]).T
         arcs = arcs[np.isin(parts[row, column], np.unique(mine[mine > 0]))]
-    return arcs[_thinned(np.ascontiguousarray(arcs[:, :2]), _MOST_ARC_POINTS)]
+    return arcs[_thin_out(np.ascontiguousarray(arcs[:, :2]), _MOST_ARC_POINTS)]
 
 
 def roadmap_samples(obstacles: Obstacles, clearance_m: float, count: int, arcs: FloatArray) -> FloatArray:
     """Free samples: half on the inflated obstacles' boundary, where shortest paths bend, half a Halton sequence.
 
     Args:
-        obstacles: What stands in the way.
-        clearance_m: Distance to keep.
-        count: How many.
-        arcs: Points round corners, as ``arc_points`` gives them.
+        obstacles: The obstacles.
+        clearance_m: Distance to keep [m].
+        count: Number of samples.
+        arcs: Points on arcs, from ``arc_points``.
 
     Returns:
-        Shape (about ``count``, 2); fewer where no more free ones are found.
+        Shape (about ``count``, 2) [m]; fewer where too few free ones are found.
     """
     boundary = np.ascontiguousarray(arcs[:, :2])
-    boundary = boundary[_thinned(boundary, count // 2)]
+    boundary = boundary[_thin_out(boundary, count // 2)]
     if obstacles.cells is None:
         along = _along_edges(obstacles, clearance_m + _GRAZE_M, count // 2 - len(boundary))
         boundary = np.concatenate([boundary, _free(obstacles, along, clearance_m)])
     low, high = obstacles.bounds_m[:2], obstacles.bounds_m[2:]
     spread = np.empty((0, 2))
     wanted = count - len(boundary)
-    for part in range(8):  # an eighth of the area free is the least that fills the count
+    for part in range(8):  # enough where an eighth of the area is free
         drawn = low + halton(part * count, count) * (high - low)
         spread = np.concatenate([spread, _free(obstacles, drawn, clearance_m)])
         if len(spread) >= wanted:
@@ -91,9 +90,9 @@ def roadmap_samples(obstacles: Obstacles, clearance_m: float, count: int, arcs: 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def halton(first: int, count: int) -> FloatArray:
-    """Points of the plane's Halton sequence, from number ``first`` on; shape (count, 2).
+    """Points of the Halton sequence in the unit square, from number ``first`` on, shape (count, 2).
 
-    SciPy has it too, to the same bits, in a package that takes half a second to import.
+    Equal to SciPy's to the bit, whose package takes half a second to import.
 
     Source:
         Halton (1960), with bases 2 and 3.
@@ -119,7 +118,7 @@ def _corners_of_boxes(obstacles: Obstacles) -> FloatArray:
 
 
 def _corners_of_cells(cells: Cells) -> FloatArray:
-    """The same of the corners of the occupied area that stick out."""
+    """The same for the convex corners of the occupied cells, shape (k, 6)."""
     corners = convex_corners(cells)
     yaw = float(cells.origin[2])
     ahead, left = np.array([[math.cos(yaw), math.sin(yaw)]]), np.array([[-math.sin(yaw), math.cos(yaw)]])
@@ -145,39 +144,39 @@ def _along_edges(obstacles: Obstacles, ring: float, count: int) -> FloatArray:
         edges, np.maximum(lengths / step, 1).astype(np.int64), strict=True)])
 
 
-def _thinned(points: FloatArray, count: int) -> IntArray:
-    """Indices of at most ``count`` points, none close to another while there are more."""
+def _thin_out(points: FloatArray, count: int) -> IntArray:
+    """Indices of at most ``count`` points, spread by a least distance as small as that allows."""
     if len(points) <= count:
         return np.arange(len(points))
-    # The narrowest of these gaps that leaves no more: first one that is surely wide enough, then by halving.
+    # The smallest of these gaps that leaves at most ``count``: exponential search, then bisection.
     gaps = 0.01 * 1.3 ** np.arange(100)
     low, high, step = -1, 0, 1
     kept: IntArray
-    while len(kept := _apart(points, gaps[high])) > count:
+    while len(kept := _spaced(points, gaps[high])) > count:
         low, high, step = high, high + step, 2 * step
     while high - low > 1:
         middle = (low + high) // 2
-        fewer = _apart(points, gaps[middle])
+        fewer = _spaced(points, gaps[middle])
         low, high, kept = (low, middle, fewer) if len(fewer) <= count else (middle, high, kept)
     return kept
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _apart(points: FloatArray, gap: float) -> IntArray:
-    """Indices of points of which no two are nearer than ``gap``: each that is far enough from those before it."""
+def _spaced(points: FloatArray, gap: float) -> IntArray:
+    """Indices of points of which no two are nearer than ``gap`` [m], chosen greedily in order."""
     low_x, low_y = points[:, 0].min(), points[:, 1].min()
     wide, high = points[:, 0].max() - low_x, points[:, 1].max() - low_y
-    side, squared = max(gap, max(wide, high) / 1000), gap * gap  # so many squares along each side at most
+    side, squared = max(gap, max(wide, high) / 1000), gap * gap  # at most 1000 squares along each side
     columns, rows = math.floor(wide / side) + 1, math.floor(high / side) + 1
-    newest = np.full(columns * rows, -1, dtype=np.int32)  # of each square
-    before = np.full(len(points), -1, dtype=np.int32)  # the one that was kept there before it
+    newest = np.full(columns * rows, -1, dtype=np.int32)  # last kept point of each square
+    before = np.full(len(points), -1, dtype=np.int32)  # the point kept before it in the same square
     kept = np.empty(len(points), dtype=np.int64)
     count = 0
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         column, row = math.floor((x - low_x) / side), math.floor((y - low_y) / side)
         far = True
-        # Its own square first, where one that is near most likely lies.
+        # Its own square first, which most likely has a near one.
         for r in (row, row - 1, row + 1):
             for c in (column, column - 1, column + 1):
                 if not far or r < 0 or r >= rows or c < 0 or c >= columns:

@@ -1,10 +1,10 @@
-"""Lines that touch the arcs about corners, and paths pulled taut: exact checks, compiled.
+"""Tangents of the arcs about corners, and shortcuts of paths; checked exactly, compiled.
 
-A shortest path that keeps a distance bends on arcs about corners only, and its straight parts touch them. So tangents
-between points on the arcs make a roadmap near the optimum.
+A shortest path that keeps a distance bends on arcs about corners only, and its straight parts are tangent to them. So
+tangents between points on the arcs make a nearly optimal roadmap.
 
 Source:
-    Lozano-Perez & Wesley (1979).
+    Lozano-Perez & Wesley (1979), "An algorithm for planning collision-free paths among polyhedral obstacles".
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.geometry.buckets import keeps_clear, solids_passed
+from sva_bench.geometry.buckets import checks_made, keeps_clear
 
-_MOST_PAIRS = 50_000_000  # of points spread evenly, that lie near enough to each other: says how near that is
-_MOST_WORK = 20_000_000  # solids and buckets that segments are held against: about half a second
-_AT_A_TIME = 5_000_000  # of them, before Ctrl-C is listened to
-_EDGE = 100  # what a tangent that is found costs, in this unit: as an edge of the roadmap, later
-_SEEN = 8  # points or squares that take as long to examine as one solid
-_FEW = 2000  # points whose tangents are looked for at once, whatever their length
-_LINES = 1 << 20  # that are remembered
-_RING = 1.4  # else those up to some length, then those up to so much more, and so on
+_MOST_PAIRS = 50_000_000  # pairs of evenly spread points within the greatest length of tangents, which it sets
+_MOST_WORK = 20_000_000  # solids and buckets that segments are checked against: about half a second
+_AT_A_TIME = 5_000_000  # of them, between two checks for Ctrl-C
+_EDGE = 100  # cost of a tangent found, in this unit, for its later use as an edge
+_SEEN = 8  # points or squares examined in the time of one solid
+_FEW = 2000  # points up to which tangents of all lengths are searched in one pass,
+_RING = 1.4  # else in rings of length that grow by this factor
+_LINES = 1 << 20  # slots of the cache of checked lines
 
 
 def tangents(checker: FloatArray, arcs: FloatArray) -> IntArray:
-    """All free tangents; of very many points on arcs, those to points that are not too far away.
+    """All free tangents; of very many points on arcs, the shorter ones.
 
-    Short ones come first, in rings of growing length, until ``_MOST_WORK`` is done: along the walls of a hatched map
+    Short ones come first, in rings of growing length, until ``_MOST_WORK`` is done: along the walls of a ragged map
     every point sees a thousand others. The work is counted, not timed, so the same points have the same tangents on
     every machine.
 
     Args:
-        checker: As ``clearance_checker`` makes it.
-        arcs: Points on arcs, as ``arc_points`` gives them; points of their own have centre NaN, and their tangents any
+        checker: From ``clearance_checker``.
+        arcs: Points on arcs, from ``arc_points``, shape (n, 5); isolated points have centre NaN, and tangents of any
             length.
 
     Returns:
@@ -47,12 +47,12 @@ def tangents(checker: FloatArray, arcs: FloatArray) -> IntArray:
     """
     x0, y0, x1, y1 = checker[:4]
     farthest = math.hypot(x1 - x0, y1 - y0)
-    # Of points spread evenly, so many partners lie within the circle that there are _MOST_PAIRS.
+    # The radius at which evenly spread points have _MOST_PAIRS pairs.
     longest = math.sqrt((x1 - x0) * (y1 - y0) * 2 * _MOST_PAIRS / math.pi) / max(len(arcs), 1)
     others = np.flatnonzero(~np.isnan(arcs[:, 2]))
     ends = _ends(arcs[others])
     squares = _squares(ends[:, :2])
-    found, left = [tangents_of_own(checker, arcs)], _MOST_WORK
+    found, left = [tangents_of_isolated(checker, arcs)], _MOST_WORK
     for near, far in _rings(min(longest, farthest), squares.side, len(arcs)):
         at = 0
         while at < len(ends) and left > 0:
@@ -64,16 +64,16 @@ def tangents(checker: FloatArray, arcs: FloatArray) -> IntArray:
     return np.concatenate(found)
 
 
-def tangents_of_own(checker: FloatArray, arcs: FloatArray) -> IntArray:
-    """Those tangents that begin or end at points of their own, as ``tangents``; so much work again at most."""
-    ends, own = _ends(arcs), np.flatnonzero(np.isnan(arcs[:, 2]))
+def tangents_of_isolated(checker: FloatArray, arcs: FloatArray) -> IntArray:
+    """The free tangents with an isolated point at an end, as ``tangents``; at most ``_MOST_WORK`` again."""
+    ends, isolated = _ends(arcs), np.flatnonzero(np.isnan(arcs[:, 2]))
     found, left = [np.empty((0, 2), dtype=np.int64)], _MOST_WORK
     x0, y0, x1, y1 = checker[:4]
     farthest = math.hypot(x1 - x0, y1 - y0)
     for near, far in _rings(farthest, 0.01 * farthest, len(arcs)):
         at = 0
-        while at < len(own) and left > 0:
-            pairs, at, work = _tangents_of_own(checker, ends, own, at, near, far, min(_AT_A_TIME, left))
+        while at < len(isolated) and left > 0:
+            pairs, at, work = _tangents_of_isolated(checker, ends, isolated, at, near, far, min(_AT_A_TIME, left))
             found.append(pairs)
             left -= work
     return np.concatenate(found)
@@ -83,19 +83,19 @@ def _ends(arcs: FloatArray) -> FloatArray:
     """x, y, the direction from the arc's centre, and the squared tolerance; shape (n, 5)."""
     out = arcs[:, :2] - arcs[:, 2:4]
     out /= np.hypot(out[:, 0], out[:, 1])[:, None]
-    out[np.isnan(out[:, 0])] = 0.0  # points of their own: at right angles to every line, so tangent to all
+    out[np.isnan(out[:, 0])] = 0.0  # isolated points: every line counts as tangent
     return np.column_stack([arcs[:, :2], out, arcs[:, 4] ** 2])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Squares:
-    """Points by the square of a grid that they lie in.
+    """Points by the square of a grid that they lie in, in compressed rows.
 
     Attributes:
         low: x, y of the grid's lower left corner [m].
         side: Side of a square [m].
         counts: Columns and rows.
-        starts: Where the points of each square begin in ``items``; row by row, and one more.
+        starts: Where each square's points begin in ``items``, row by row, and the end, shape (squares + 1,).
         items: Indices of the points.
     """
 
@@ -107,7 +107,7 @@ class _Squares:
 
 
 def _squares(points: FloatArray) -> _Squares:
-    """About two points a square, were they spread evenly."""
+    """A grid with two points a square on average."""
     low = points.min(axis=0) if len(points) else np.zeros(2)
     wide, high = (points.max(axis=0) - low).tolist() if len(points) else (0.0, 0.0)
     side = max(math.sqrt(2 * wide * high / max(len(points), 1)), max(wide, high) / 1000, 1e-3)
@@ -120,7 +120,7 @@ def _squares(points: FloatArray) -> _Squares:
 
 
 def _rings(reach_m: float, side_m: float, points: int) -> Iterator[tuple[float, float]]:
-    """Lengths from and to, until the reach; the first ring is a few squares wide at least, and of few points all."""
+    """Rings of length (from, to) [m] up to the reach; one ring where points are few."""
     near, far = 0.0, 4 * side_m
     while far < reach_m and points > _FEW:
         yield near, far
@@ -129,26 +129,26 @@ def _rings(reach_m: float, side_m: float, points: int) -> Iterator[tuple[float, 
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _tangents_of_own(
-    checker: FloatArray, ends: FloatArray, own: IntArray, first: int, near: float, far: float, most: int
+def _tangents_of_isolated(
+    checker: FloatArray, ends: FloatArray, isolated: IntArray, first: int, near: float, far: float, most: int
 ) -> tuple[IntArray, int, int]:
-    """Free lines between points of their own, and from them to arcs that they touch.
+    """Free lines between isolated points, and free tangents from them to arcs.
 
     Args:
-        checker: As ``clearance_checker`` makes it.
+        checker: From ``clearance_checker``.
         ends: x, y, the direction from the arc's centre, and the squared tolerance, shape (n, 5).
-        own: Indices of points of their own, ascending.
-        first: Which of them to begin with.
-        near, far: Lengths that are looked for: above the one, at most the other [m].
-        most: Work that is enough for now.
+        isolated: Indices of isolated points, ascending.
+        first: Position of the first of them to treat.
+        near, far: Length of the tangents: above the one, at most the other [m].
+        most: Work after which it returns.
 
     Returns:
-        Indices of the ends, shape (k, 2); which point is next; and the work done.
+        Indices of the ends, shape (k, 2); position of the next point to treat; and the work done.
     """
     found = np.empty((256, 2), dtype=np.int64)
     count, work, seen = 0, 0, 0
-    while first < len(own) and work < most:
-        i = own[first]
+    while first < len(isolated) and work < most:
+        i = isolated[first]
         x, y = ends[i, 0], ends[i, 1]
         for j in range(len(ends)):
             dx, dy = ends[j, 0] - x, ends[j, 1] - y
@@ -158,10 +158,10 @@ def _tangents_of_own(
             mx, my = ends[j, 2], ends[j, 3]
             if (mx * dx + my * dy) ** 2 > ends[j, 4] * squared or (mx == 0.0 and my == 0.0 and j >= i):
                 continue
-            passed = solids_passed(checker, x, y, ends[j, 0], ends[j, 1])
+            passed = checks_made(checker, x, y, ends[j, 0], ends[j, 1])
             work += abs(passed)
             if passed > 0:
-                found, count = _with(found, count, i, j)
+                found, count = _appended(found, count, i, j)
                 work += _EDGE
         seen += len(ends)
         work += len(ends) // _SEEN
@@ -174,10 +174,10 @@ def _tangents_of_arcs(
     checker: FloatArray, ends: FloatArray, starts: IntArray, items: IntArray, low: FloatArray, side: float,
     counts: IntArray, first: int, near: float, far: float, most: int,
 ) -> tuple[IntArray, int, int]:
-    """Free lines that touch the arcs at both ends.
+    """Free tangents between arcs.
 
-    Those from a point lie in two narrow cones; only the squares that a cone runs through are searched. One loop, for
-    compiled code that is called once a point would pass a dozen arrays each time.
+    Those from a point lie in two narrow cones; only the squares that a cone crosses are searched. One loop, because
+    compiled code called for each point would pass a dozen arrays each time.
 
     Args:
         checker, near, far, most: As above.
@@ -198,7 +198,7 @@ def _tangents_of_arcs(
         sine, cosine = math.sqrt(slack) + 1e-9, math.sqrt(1 - slack) - 1e-9
         for sign in (-1.0, 1.0):
             tx, ty = -sign * ny, sign * nx
-            # A quadrangle about the part of the cone that is as far away as asked for.
+            # A quadrangle about the part of the cone between the two lengths.
             for corner in range(4):
                 turn = sine if corner in (1, 2) else -sine
                 away = near if corner < 2 else far / cosine
@@ -220,15 +220,15 @@ def _tangents_of_arcs(
                         continue
                     dx, dy = ends[j, 0] - x, ends[j, 1] - y
                     squared = dx * dx + dy * dy
-                    # Within so much of a right angle to the radius a line touches the arc.
+                    # Tangent: within the tolerance of a right angle to the radius.
                     if (squared > far * far or (squared <= near * near and near > 0)
                             or tx * dx + ty * dy < 0.0 or (nx * dx + ny * dy) ** 2 > slack * squared
                             or (ends[j, 2] * dx + ends[j, 3] * dy) ** 2 > ends[j, 4] * squared):
                         continue
-                    passed = solids_passed(checker, x, y, ends[j, 0], ends[j, 1])
+                    passed = checks_made(checker, x, y, ends[j, 0], ends[j, 1])
                     work += abs(passed)
                     if passed > 0:
-                        found, count = _with(found, count, i, j)
+                        found, count = _appended(found, count, i, j)
                         work += _EDGE
         work += seen // _SEEN
         seen %= _SEEN
@@ -238,7 +238,7 @@ def _tangents_of_arcs(
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _span(quad: FloatArray, low: float, high: float) -> tuple[float, float]:
-    """Least and greatest x of a convex quadrangle between two heights; in the wrong order if it has no part there."""
+    """Least and greatest x of a convex quadrangle between two heights; (``inf``, ``-inf``) if it has no part there."""
     left, right = math.inf, -math.inf
     for k in range(4):
         ax, ay, bx, by = quad[k, 0], quad[k, 1], quad[(k + 1) % 4, 0], quad[(k + 1) % 4, 1]
@@ -254,7 +254,7 @@ def _span(quad: FloatArray, low: float, high: float) -> tuple[float, float]:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _with(found: IntArray, count: int, i: int, j: int) -> tuple[IntArray, int]:
+def _appended(found: IntArray, count: int, i: int, j: int) -> tuple[IntArray, int]:
     """A list of pairs with one more."""
     if count == len(found):
         grown = np.empty((2 * count, 2), dtype=np.int64)
@@ -265,24 +265,24 @@ def _with(found: IntArray, count: int, i: int, j: int) -> tuple[IntArray, int]:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def taut(
+def shortcut(
     checker: FloatArray, vertices: FloatArray, before: NDArray[np.int32], start: int, goal: int, window: int,
     known: IntArray, length: FloatArray, via: IntArray,
 ) -> FloatArray:
-    """The shortest path by way of some of a path's vertices, in their order.
+    """The shortest path by way of a subsequence of a path's vertices.
 
-    Paths from one start share their beginnings, on a tree: what was worked out for one path serves the others.
+    Paths from one start form a tree, so what is computed for one path serves the others.
 
     Args:
-        checker: As ``clearance_checker`` makes it.
-        vertices: Those of the roadmap [m], shape (v, 2).
-        before: The vertex before each on its path from the start; those paths keep the clearance; shape (v,).
-        start, goal: The vertices that the path joins.
-        window: How many vertices at most are cut off at a time.
-        known: What was found out about lines between vertices for other paths, as ``nothing_known`` makes it.
-        length: Length of the shortest way to each vertex from this start [m], as far as worked out for other paths,
-            else ``inf``; 0 at the start. Brought up to date, shape (v,).
-        via: The vertex before it on that way, shape (v,).
+        checker: From ``clearance_checker``.
+        vertices: Vertices of the roadmap [m], shape (v, 2).
+        before: Predecessor of each vertex on its path from the start, which keeps the clearance, shape (v,).
+        start, goal: Vertices at the ends of the path.
+        window: Most vertices that one shortcut skips.
+        known: Cache of lines checked for other paths, from ``new_line_cache``; changed in place.
+        length: Length of the shortest path from this start to each vertex [m], as far as computed for other paths,
+            else ``inf``; 0 at the start; changed in place, shape (v,).
+        via: Predecessor on that path; changed in place, shape (v,).
     """
     new, vertex = [goal], before[goal]
     while length[new[-1]] == np.inf:
@@ -313,7 +313,7 @@ def taut(
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _is_free(checker: FloatArray, known: IntArray, number: int, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a line keeps the clearance, remembered by its number."""
+    """Whether a line keeps the clearance, cached by its number."""
     line = 2 * number
     slot = (line * 0x9E3779B1 >> 12) % len(known)
     if known[slot] != line and known[slot] != line + 1:
@@ -321,6 +321,6 @@ def _is_free(checker: FloatArray, known: IntArray, number: int, ax: float, ay: f
     return bool(known[slot] == line + 1)
 
 
-def nothing_known() -> IntArray:
-    """What ``taut`` remembers, at first: twice the number of a line, and one more if it is free; by its place."""
+def new_line_cache() -> IntArray:
+    """An empty cache of checked lines: each slot holds twice a line's number, plus 1 if it is free, or -1."""
     return np.full(_LINES, -1, dtype=np.int64)

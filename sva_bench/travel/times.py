@@ -23,7 +23,7 @@ from sva_bench.world.places import CLEARANCE_MARGINS_M as CLEARANCE_MARGINS_M
 
 _log = logging.getLogger(__name__)
 
-_ROUNDING = 1e-3  # polygons go about the arcs in the roadmap: a passage just as wide as the clearance is too narrow
+_ROUNDING = 1e-3  # the roadmap's polygons about arcs need passages wider than the clearance by so much
 _NAMED = 10  # sites that a complaint names
 
 
@@ -52,13 +52,13 @@ class NeverArrives(SvaBenchError):
         self.model, self.origin, self.destination = model, origin, destination
 
     def __str__(self) -> str:
-        return (f"robot model {self.model}: it never arrives from {self.origin!r} at {self.destination!r}; its speeds "
+        return (f"robot model {self.model}: it never arrives at {self.destination!r} from {self.origin!r}; its speeds "
                 f"and accelerations don't go together: change them in the world file")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TravelTimes:
-    """Time that one kind of robot needs from each site to each other, and the path it takes.
+    """Travel times of one robot model between sites, and its paths.
 
     Attributes:
         sites: Site names, length n; an index into it is a site's identity.
@@ -66,7 +66,7 @@ class TravelTimes:
         time_ms: Time from site i to site j [ms], shape (n, n), zero diagonal. Directed.
         paths: Path from site i to site j [m], shape (k, 2); ``None`` on the diagonal.
         headings_rad: Heading in which a robot stops at each site, length n.
-        clearance_m: Distance that the paths keep from obstacles.
+        clearance_m: Distance that the paths keep from obstacles [m].
     """
 
     sites: tuple[str, ...]
@@ -81,19 +81,19 @@ class TravelTimes:
         object.__setattr__(self, "time_ms", frozen_int(self.time_ms, (n, n)))
 
     def path(self, origin: str, destination: str) -> FloatArray:
-        """The path from one site to another."""
+        """The path from one site to another [m], shape (k, 2)."""
         path = self.paths[self.sites.index(origin)][self.sites.index(destination)]
         assert path is not None, "a site has no path to itself"
         return path
 
     def course(self, origin: str, destination: str) -> tuple[Stretch, ...]:
-        """That path as the follower drives it."""
+        """That path as the stretches that the follower drives."""
         heading = self.headings_rad[self.sites.index(destination)]
         return stretches(self.path(origin, destination), heading)
 
 
 def plan_travel_times(world: World, model: RobotModel, planner: PathPlanner = "prmstar") -> TravelTimes:
-    """Plan a path between each pair of sites and time it.
+    """Paths between all pairs of sites, and their times by the kinematic twin.
 
     A robot starts in the origin's heading and stops in the destination's, so the time of a leg depends on its two
     ends alone: a matrix over sites is exact.
@@ -114,7 +114,7 @@ def plan_travel_times(world: World, model: RobotModel, planner: PathPlanner = "p
     lost = None
     for margin in CLEARANCE_MARGINS_M:
         if room < model.radius_m + margin and margin != CLEARANCE_MARGINS_M[-1]:
-            continue  # a site stands closer to an obstacle than such a path may come
+            continue  # a site is nearer to an obstacle than such a path may be
         kept = min(model.radius_m + margin, room)
         paths = plan_paths(world.obstacles, points, kept, planner=planner)
         lost = _unreachable(world, paths)
@@ -133,7 +133,7 @@ def plan_travel_times(world: World, model: RobotModel, planner: PathPlanner = "p
 
 
 def _unreachable(world: World, paths: list[list[FloatArray | None]]) -> tuple[int, list[int]] | None:
-    """A site and those that no path joins it to; from the base, where that isn't joined to all."""
+    """The first site that some others have no path from or to, and those; ``None`` if all are connected."""
     for i in range(len(world.sites)):
         lost = [j for j in range(len(world.sites)) if j != i and (paths[i][j] is None or paths[j][i] is None)]
         if lost:
@@ -142,7 +142,7 @@ def _unreachable(world: World, paths: list[list[FloatArray | None]]) -> tuple[in
 
 
 def _largest_radius(world: World, points: FloatArray, room: float) -> float:
-    """The largest robot that gets from place to place, in millimetres rounded down."""
+    """Radius of the largest robot that can get between the points [m], rounded down to millimetres."""
     widest = widest_passage(world.obstacles, points) * (1 - _ROUNDING) - 2e-4
     radius = min(widest - CLEARANCE_MARGINS_M[-1], room)
     return max(math.floor(radius * 1000) / 1000, 0.0)

@@ -1,1 +1,1 @@
-"""Jobs in processes of this machine or of a cluster; nothing here knows what a job is about."""
+"""Execution of jobs in processes of this machine or of a cluster, independent of what the jobs compute."""

@@ -1,4 +1,4 @@
-"""What comes back of a job."""
+"""The outcome of a job, and its limits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Done:
-    """A job's result, and what was warned of on the way."""
+    """A job's result, and the warnings logged while it ran."""
 
     result: Any
     warnings: tuple[str, ...] = ()
@@ -20,7 +20,7 @@ class Failed:
 
     Attributes:
         reason: What happened.
-        mendable: It is the user's to mend: trying again changes nothing.
+        mendable: Whether the user must correct the input: another attempt would fail too.
     """
 
     reason: str
@@ -32,12 +32,12 @@ Answer = Done | Failed
 
 @dataclass(frozen=True, kw_only=True)
 class Caps:
-    """How much one job may take.
+    """Limits of one job.
 
     Attributes:
         time_s: Longest time [s].
-        memory_mb: Most memory [MB]; 0 = any.
-        preload: Module that jobs are of; a worker loads it before time is counted.
+        memory_mb: Most memory [MB]; 0 = no limit.
+        preload: Module that workers import before the time limit starts.
     """
 
     time_s: float

@@ -1,4 +1,4 @@
-"""Where jobs run: a Dask cluster. The only importer of distributed, which is an optional extra."""
+"""The engine of a Dask cluster. The only importer of distributed, which is an optional extra."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from sva_bench.workers.guarded import GuardedWorker
 
 _CONNECT_S = 10.0
 _LOST_S = 60.0
-"""A scheduler that is away for longer is taken for gone."""
+"""Time without contact after which the scheduler counts as lost [s]."""
 _COUNT_S = 2.0
 
 
 class DaskCluster:
-    """The workers of a Dask scheduler; each runs jobs in a guarded process, so that a crash or a hang is held."""
+    """The workers of a Dask scheduler; each runs jobs in a guarded process that contains crashes and hangs."""
 
     def __init__(self, address: str, caps: Caps) -> None:
         try:
@@ -33,7 +33,7 @@ class DaskCluster:
                 from distributed import Client
         except ImportError:
             raise BadInput("--dask: distributed isn't installed; pip install 'sva-bench[dask]'") from None
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters of it is said by us
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # relevant events have messages of our own
         where = {"scheduler_file": address} if Path(address).is_file() else {"address": address}
         try:
             self._client = Client(**where, timeout=_CONNECT_S)
@@ -46,7 +46,7 @@ class DaskCluster:
 
     @property
     def slots(self) -> int:
-        """Two for each thread of the cluster, so that none waits for its next job; workers may come and go."""
+        """Two jobs for each thread of the cluster, so that none idles; workers may come and go."""
         if time.monotonic() - self._counted > _COUNT_S:
             self._threads = sum(self._client.nthreads().values()) if self._client.status == "running" else self._threads
             self._counted = time.monotonic()
@@ -81,7 +81,7 @@ class DaskCluster:
         return found
 
     def close(self) -> None:
-        """Drop what is in flight and leave the cluster."""
+        """Cancel all jobs in flight and disconnect."""
         try:
             self._client.cancel(list(self._futures))
         finally:

@@ -1,4 +1,4 @@
-"""What jobs are, and what takes them."""
+"""The interfaces of jobs and of the engines that run them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class Job(Protocol):
     """One piece of work.
 
     Attributes:
-        kind: What sort of result it has.
-        kept: Whether its result goes into the cache.
+        kind: Kind of its result, for the cache.
+        kept: Whether its result is cached.
         result: Type of its result.
     """
 
@@ -27,28 +27,28 @@ class Job(Protocol):
 
     @property
     def what(self) -> str:
-        """For a person: what is being done."""
+        """A description for messages."""
 
     def run(self) -> Any:
-        """Do it."""
+        """Compute the result."""
 
     def fits(self, result: Any) -> bool:
-        """Whether a result of the right type can be this job's, and nothing that follows would trip over it."""
+        """Whether a result of the right type is consistent with this job, so that later steps can rely on it."""
 
 
 
 class Engine(Protocol):
-    """Takes jobs and gives answers, in any order; every job is answered."""
+    """Runs jobs and returns their answers in any order; every job is answered."""
 
     @property
     def slots(self) -> int:
-        """How many jobs it wants at a time."""
+        """How many jobs it runs at a time."""
 
     def submit(self, key: str, job: Job) -> None:
-        """Take a job."""
+        """Accept a job under a key."""
 
     def answers(self, timeout_s: float) -> Sequence[tuple[str, Answer]]:
-        """Wait for answers; what there is after so long."""
+        """The answers that arrive within the timeout, by the keys of their jobs."""
 
     def close(self) -> None:
-        """Drop what is in flight."""
+        """Cancel all jobs in flight."""

@@ -1,4 +1,4 @@
-"""The far end of a guarded worker: runs one job at a time, within its memory, for as long as its parent lives."""
+"""The process of a guarded worker: runs one job at a time within a memory limit, as long as its parent lives."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from importlib import import_module
 from multiprocessing.connection import Connection
 
 from sva_bench.workers.answers import Answer, Done, Failed
-from sva_bench.workers.pool import die_with
+from sva_bench.workers.pool import kill_with_parent
 
-_FAILURES_TOLD = 300
+_MOST_REASON_LENGTH = 300
 
 
 def main() -> None:
-    """Serve: ``python -m sva_bench.workers.far_end FD PARENT MEMORY_MB PRELOAD``."""
+    """The worker's main loop: ``python -m sva_bench.workers.far_end FD PARENT MEMORY_MB PRELOAD``."""
     line, parent, memory_mb = int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
-    die_with(parent)
+    kill_with_parent(parent)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if memory_mb:  # what is written to, not what is mapped: libraries reserve far more than they use
+    if memory_mb:  # limits written data, not address space: libraries map far more than they use
         resource.setrlimit(resource.RLIMIT_DATA, (memory_mb << 20, memory_mb << 20))
-    warned = _Warnings()
-    logging.basicConfig(level=logging.WARNING, handlers=[warned], force=True)
+    captured = _Warnings()
+    logging.basicConfig(level=logging.WARNING, handlers=[captured], force=True)
     with Connection(line) as connection:
         import_module(sys.argv[4])  # before time is counted
         connection.send_bytes(b"ready")
@@ -33,36 +33,36 @@ def main() -> None:
                 content = connection.recv_bytes()
             except EOFError:
                 return
-            answer = _answer(content, memory_mb, warned)
+            answer = _answer(content, memory_mb, captured)
             connection.send_bytes(pickle.dumps(answer, protocol=5))
             if isinstance(answer, Failed) and not answer.mendable:
-                return  # what a failure leaves behind should meet no other job
+                return  # a failure may leave the process in a bad state: no further job runs in it
 
 
 class _Warnings(logging.Handler):
-    """Keeps what was said, for the parent to say it."""
+    """Collects log messages for the parent process to log."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.said: list[str] = []
+        self.messages: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        self.said.append(record.getMessage())
+        self.messages.append(record.getMessage())
 
 
-def _answer(content: bytes, memory_mb: int, warned: _Warnings) -> Answer:
+def _answer(content: bytes, memory_mb: int, captured: _Warnings) -> Answer:
     from sva_bench.errors import SvaBenchError
 
-    warned.said = []
+    captured.messages = []
     try:
         result = pickle.loads(content).run()
-        return Done(result=result, warnings=tuple(warned.said))
+        return Done(result=result, warnings=tuple(captured.messages))
     except SvaBenchError as error:
         return Failed(reason=str(error), mendable=True)
     except MemoryError:
         return Failed(reason=f"it wanted more than {memory_mb} MB of memory; give it more with --memory-mb")
     except Exception as error:
-        return Failed(reason=f"{type(error).__name__}: {error}"[:_FAILURES_TOLD])
+        return Failed(reason=f"{type(error).__name__}: {error}"[:_MOST_REASON_LENGTH])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A worker process whose crash, hang or death is an answer like any other."""
+"""A worker process whose crash or hang is reported as an answer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sva_bench.safe_path import environment_of_children
 from sva_bench.workers.answers import Answer, Caps, Failed
 
 _START_S = 300.0
-"""A worker that takes longer to load its libraries is taken for hung; a busy machine needs half a minute."""
+"""Time limit of a worker's start [s]; on a busy machine its imports take half a minute."""
 
 _HINTS = {"SIGKILL": ", sent by somebody, or for want of memory", "SIGABRT": ", raised by a library, perhaps for want "
           "of memory"}
@@ -26,7 +26,7 @@ _HINTS = {"SIGKILL": ", sent by somebody, or for want of memory", "SIGABRT": ", 
 class GuardedWorker:
     """One process, one job at a time.
 
-    Not of ``multiprocessing``: a worker of Dask may have no children of that kind.
+    Not a ``multiprocessing`` process, which a Dask worker may not have as a child.
     """
 
     def __init__(self, caps: Caps) -> None:
@@ -34,8 +34,8 @@ class GuardedWorker:
         ours, theirs = socket.socketpair()
         environment = environment_of_children() | dict.fromkeys(
             ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-        with theirs, holding_back_ctrl_c():  # it inherits the mask for good: Ctrl-C is the parent's to handle
-            # Libraries print to standard output, which is ours.
+        with theirs, holding_back_ctrl_c():  # the child inherits the signal mask: only the parent handles Ctrl-C
+            # Libraries may print to standard output, which belongs to the command.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "sva_bench.workers.far_end", str(theirs.fileno()), str(os.getpid()),
                  str(caps.memory_mb), caps.preload],
@@ -51,7 +51,7 @@ class GuardedWorker:
         return self._process.pid
 
     def ask(self, content: bytes) -> Answer:
-        """Give it a job, pickled, and wait for the answer."""
+        """Run a pickled job and wait for the answer."""
         if self.ready:
             self.give(content)
         while True:
@@ -63,41 +63,41 @@ class GuardedWorker:
             self.give(content)
 
     def give(self, content: bytes) -> None:
-        """Give it a job, pickled; it must be ready and idle. If it died meanwhile, ``take`` says so."""
+        """Send a pickled job; the worker must be ready and idle. If it has died, ``take`` reports it."""
         self._due = time.monotonic() + self.caps.time_s
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self.connection.send_bytes(content)
 
     def left_s(self) -> float:
-        """Time until its job or its start is overdue."""
+        """Time until the limit of its job or start [s]."""
         return self._due - time.monotonic()
 
     def take(self) -> Answer | None:
-        """What it has to say; ``None`` if that is only that it is ready. To be called when there is something."""
+        """Receive its message: an answer, or ``None`` if it became ready. Call it when the connection has data."""
         try:
             content = self.connection.recv_bytes()
         except (EOFError, OSError):
-            return Failed(reason=self._death())
+            return Failed(reason=self._cause_of_death())
         if not self.ready:
             self.ready = True
             return None
-        answer: Answer = pickle.loads(content)  # from our own child, by a pipe that nobody else holds
+        answer: Answer = pickle.loads(content)  # trusted: from a child process by a private pipe
         return answer
 
     def overdue(self) -> Failed:
-        """End it, since its time is over."""
+        """Kill it, since its time limit has passed."""
         self.close()
         if not self.ready:
             return Failed(reason=f"the worker process didn't start within {_START_S:g} s")
         return Failed(reason=f"it took longer than {self.caps.time_s:g} s; give it more with --unit-time-limit")
 
     def close(self) -> None:
-        """End it."""
+        """Kill the process and close the connection."""
         self._process.kill()
         self._process.wait()
         self.connection.close()
 
-    def _death(self) -> str:
+    def _cause_of_death(self) -> str:
         try:
             status = self._process.wait(timeout=5.0)
         except subprocess.TimeoutExpired:

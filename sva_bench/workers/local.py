@@ -1,4 +1,4 @@
-"""Where jobs run: processes of this machine."""
+"""The engine of guarded worker processes on this machine."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class LocalProcesses:
     def __init__(self, count: int, caps: Caps) -> None:
         self._caps = caps
         self._workers = [GuardedWorker(caps) for _ in range(count)]
-        self._at: dict[GuardedWorker, str] = {}
+        self._job_of: dict[GuardedWorker, str] = {}
         self._waiting: deque[tuple[str, Job]] = deque()
 
     @property
     def slots(self) -> int:
-        """As many as there are workers."""
+        """The number of workers."""
         return len(self._workers)
 
     @property
@@ -31,13 +31,13 @@ class LocalProcesses:
         return [worker.pid for worker in self._workers]
 
     def submit(self, key: str, job: Job) -> None:
-        """Give the job to an idle worker, or to the next that becomes idle."""
+        """Queue the job for the next idle worker."""
         self._waiting.append((key, job))
-        self._hand_out()
+        self._assign()
 
     def answers(self, timeout_s: float) -> list[tuple[str, Answer]]:
-        """Wait for workers to answer, die or be overdue."""
-        busy = [worker for worker in self._workers if worker in self._at or not worker.ready]
+        """Wait for workers to answer, die or exceed their time limit."""
+        busy = [worker for worker in self._workers if worker in self._job_of or not worker.ready]
         until = min([timeout_s, *(max(worker.left_s(), 0.0) for worker in busy)])
         heard = set(wait([worker.connection for worker in self._workers], until))
         found: list[tuple[str, Answer]] = []
@@ -50,14 +50,14 @@ class LocalProcesses:
                 continue
             if answer is None:
                 continue
-            job = self._at.pop(worker, None)
+            job = self._job_of.pop(worker, None)
             if isinstance(answer, Failed) and not answer.mendable:
                 self._replace(worker)
                 if not worker.ready and job is None and self._waiting:
-                    job = self._waiting.popleft()[0]  # else workers that can't start would be started for ever
+                    job = self._waiting.popleft()[0]  # fail a job, else workers that can't start are started for ever
             if job is not None:
                 found.append((job, answer))
-        self._hand_out()
+        self._assign()
         return found
 
     def close(self) -> None:
@@ -69,10 +69,10 @@ class LocalProcesses:
         worker.close()
         self._workers[self._workers.index(worker)] = GuardedWorker(self._caps)
 
-    def _hand_out(self) -> None:
-        idle = [worker for worker in self._workers if worker.ready and worker not in self._at]
+    def _assign(self) -> None:
+        idle = [worker for worker in self._workers if worker.ready and worker not in self._job_of]
         for worker, _ in zip(idle, list(self._waiting), strict=False):
             key, job = self._waiting.popleft()
-            self._at[worker] = key
-            # Pickled, both ways: a pipe between this process and its own child, which nobody else can write to.
+            self._job_of[worker] = key
+            # Pickle is safe here: a private pipe between this process and its own child.
             worker.give(pickle.dumps(job, protocol=5))

@@ -1,4 +1,4 @@
-"""Local worker processes: spawned, one thread each, deaf to Ctrl-C, which is the parent's; they die with it."""
+"""Local worker processes: spawned, single-threaded, ignoring Ctrl-C, and killed with their parent."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from sva_bench.errors import BadInput, ExitCode, SvaBenchError
 from sva_bench.interrupts import holding_back_ctrl_c
 
 MOST_PER_CORE, FEWEST_MOST = 4, 16
-"""More workers a core, or in all where there are few cores, would only take memory from each other."""
+"""Most workers per core, and least value of the maximum: more would only compete for memory."""
 
 
 class WorkerLost(SvaBenchError):
-    """A worker process died, or there was no memory left for it: nothing of what it was to do can be kept."""
+    """A worker process died or ran out of memory, so that its work is lost."""
 
     exit_code = ExitCode.UNFINISHED_TRIALS
 
@@ -41,7 +41,7 @@ class WorkerLost(SvaBenchError):
 
 
 def usable_cores() -> int:
-    """How many cores this process may run on; where the system doesn't tell (macOS), all that there are."""
+    """Number of cores that this process may run on; where the system has no affinity (macOS), all cores."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:
@@ -49,10 +49,10 @@ def usable_cores() -> int:
 
 
 def count_of(wanted: int | None) -> int:
-    """How many worker processes: as many as wanted, else one a core.
+    """Number of worker processes: as given, else one per core.
 
     Raises:
-        BadInput: If that is more than this machine can have any use for.
+        BadInput: If it exceeds the maximum for this machine.
     """
     cores = usable_cores()
     most = max(MOST_PER_CORE * cores, FEWEST_MOST)
@@ -63,11 +63,11 @@ def count_of(wanted: int | None) -> int:
 
 @contextmanager
 def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]:
-    """An executor of so many processes (default: one a core); ``None`` for one, since this process can do its work.
+    """An executor of worker processes (default: one per core); ``None`` for one, since this process does its work.
 
     Args:
-        wanted: How many processes.
-        preload: Module that workers load while this process goes on.
+        wanted: Number of processes; ``None`` = one per core.
+        preload: Module that workers import in the background.
     """
     count = count_of(wanted)
     if count <= 1:
@@ -78,7 +78,7 @@ def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]
     before = set(multiprocessing.active_children())
     started: set[BaseProcess] = set()
     executor = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"),
-                                   initializer=die_with, initargs=(os.getpid(),))
+                                   initializer=kill_with_parent, initargs=(os.getpid(),))
     _end_tracker_at_exit()
     try:
         with holding_back_ctrl_c(), _without_main_module():  # workers inherit the former for good
@@ -88,7 +88,7 @@ def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]
         yield executor
     except BaseException as error:
         for worker in set(multiprocessing.active_children()) - before:
-            worker.terminate()  # what they are at is of no use any more, and may take long
+            worker.terminate()  # their results are no longer needed, and may take long
         if isinstance(error, BrokenProcessPool):
             executor.shutdown(wait=True, cancel_futures=True)
             raise WorkerLost(_death_of(started)) from None
@@ -100,7 +100,7 @@ def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]
 
 
 def _death_of(workers: set[BaseProcess]) -> str:
-    """How the first of some worker processes died; the others were terminated because of it."""
+    """Cause of death of the first of some worker processes; the others were terminated because of it."""
     codes = {worker.exitcode for worker in workers} - {None, 0, -signal.SIGTERM}
     if -signal.SIGKILL in codes:
         return "SIGKILL, sent by somebody, or for want of memory"
@@ -108,10 +108,10 @@ def _death_of(workers: set[BaseProcess]) -> str:
 
 
 def _end_tracker_at_exit() -> None:
-    """Have multiprocessing's own helper process end before this process does, not a moment later.
+    """Stop multiprocessing's resource tracker before this process ends.
 
-    It ends when its line is closed; that is left to the kernel, so it outlives every program that had a pool. It must
-    go last, when all else is released that it keeps track of.
+    By default it ends when the kernel closes its pipe, so it briefly outlives the program. It must
+    be stopped last, after all resources that it tracks are released.
     """
     if not _at_exit:
         _at_exit.append(util.Finalize(None, _end_tracker, exitpriority=-1000))
@@ -128,7 +128,7 @@ _at_exit: list[util.Finalize] = []
 
 @contextmanager
 def _without_main_module() -> Iterator[None]:
-    """Workers that are started meanwhile don't import the program's main module again: they have no use for it."""
+    """A block in which workers are started without importing the program's main module, which they don't need."""
     main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     try:
         yield
@@ -136,13 +136,13 @@ def _without_main_module() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
-def die_with(parent: int) -> None:
-    """Have this process killed as soon as its parent has gone, however it went and whatever this one is at.
+def kill_with_parent(parent: int) -> None:
+    """Have this process killed as soon as its parent ends, for whatever reason.
 
-    By the kernel where it does that (Linux); elsewhere by a thread that looks each second, when compiled code lets it.
+    By the kernel on Linux; elsewhere by a thread that polls each second, when compiled code releases the GIL.
 
     Args:
-        parent: The parent's process id, for it may have gone already.
+        parent: The parent's process id, since it may have ended already.
     """
     prctl = getattr(ctypes.CDLL(None, use_errno=True), "prctl", None)
     if prctl is None:

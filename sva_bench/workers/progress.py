@@ -1,8 +1,8 @@
-"""How whoever waits for a piece of work hears of it."""
+"""The type of progress callbacks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 OnProgress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
+"""Called with the name of a phase, the number of steps done, and the number of steps."""

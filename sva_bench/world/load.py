@@ -1,4 +1,4 @@
-"""World files in, resolved worlds out."""
+"""Loading of world files into resolved worlds."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from sva_bench.choices import SiteKind
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_yaml, validate
-from sva_bench.geometry.buckets import open_heading, view_checker
-from sva_bench.geometry.cells import MAX_BOXES, TooRagged, bounds_of, boxes_of
+from sva_bench.geometry.buckets import longest_view_heading, sight_checker
+from sva_bench.geometry.cells import MAX_BOXES, TooManyBoxes, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, marginals, without_joint
@@ -37,7 +37,7 @@ from sva_bench.world.schema import (
     WorldFile,
 )
 
-_Entry = tuple[SiteKind, str, SiteEntry, tuple[str, ...]]  # a site, and where the file speaks of it
+_Entry = tuple[SiteKind, str, SiteEntry, tuple[str, ...]]  # a site, and its location in the file
 
 
 def load_world(path: Path) -> World:
@@ -52,12 +52,12 @@ def load_world(path: Path) -> World:
 def world_of(
     document: Document, folder: Path | None = None, ground: tuple[Obstacles, MapSource] | None = None
 ) -> World:
-    """Resolve a world file's content.
+    """The resolved world of a world file's content.
 
     Args:
         document: The content.
-        folder: Where the files are that it names; by default where it is itself.
-        ground: What they hold, where that is known already.
+        folder: Folder of the files that it names; by default its own.
+        ground: Obstacles and source of its map, if read already.
 
     Raises:
         BadFile: As ``load_world``.
@@ -86,17 +86,17 @@ def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSo
     if section.shapes is not None:
         return obstacles_of(section.shapes), None
     found = section.source()
-    assert found is not None, "the schema lets nothing else in"
+    assert found is not None, "the schema requires one of them"
     kind, source = found
     try:
         cells, files = source.read(root)
     except BadFile as error:
-        if error.path == source.file:  # said of a name, not of a file: the world's to mend
+        if error.path == source.file:  # about the name given in the world file, not about the map's content
             raise document.error(("map", kind, "file"), f"{error.path}: {error.problem}") from None
         raise
     try:
         boxes = boxes_of(cells)
-    except TooRagged:
+    except TooManyBoxes:
         raise document.error(("map", kind, "file"), f"its occupied cells take more than the {MAX_BOXES} boxes that "
                              "physics holds; clean the map of speckles, or cut it") from None
     obstacles = Obstacles(bounds_m=bounds_of(cells), boxes=boxes, cylinders=np.empty((0, 3)), cells=cells)
@@ -104,7 +104,7 @@ def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSo
 
 
 def obstacles_of(shapes: Shapes) -> Obstacles:
-    """What a description by shapes puts into the world."""
+    """The obstacles that a description by shapes defines."""
     boxes, cylinders = [], []
     for shape in shapes.obstacles:
         if isinstance(shape, Cylinder):
@@ -122,10 +122,10 @@ def obstacles_of(shapes: Shapes) -> Obstacles:
 def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: float) -> tuple[Site, ...]:
     base: _Entry = ("base", "base", file.sites.base, ("sites", "base"))
     entries = [base]
-    if clearance(obstacles, *file.sites.base.at_m) >= widest_m:  # else that is what to mend first
+    if clearance(obstacles, *file.sites.base.at_m) >= widest_m:  # else the error is the base's place
         entries += _stations_and_pois(document, file.sites, obstacles, widest_m)
     sites: list[Site] = []
-    sight = view_checker(obstacles)
+    sight = sight_checker(obstacles)
     for kind, name, entry, loc in entries:
         if any(site.name == name for site in sites):
             raise document.error(loc, f"there is another site named {name!r}; names must differ")
@@ -135,7 +135,7 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
             where = "inside an obstacle or outside the bounds" if gap <= 0 else f"only {gap:.3f} m from an obstacle"
             raise document.error((*loc, "at_m"), f"{name} is {where}; a robot of radius {widest_m} m doesn't fit "
                                  "there: move the site")
-        heading = (_radians(math.degrees(open_heading(obstacles, x, y, sight))) if entry.heading_deg is None
+        heading = (_radians(math.degrees(longest_view_heading(obstacles, x, y, sight))) if entry.heading_deg is None
                    else _radians(entry.heading_deg))
         sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s))
     for k, site in enumerate(sites):
@@ -146,7 +146,7 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
 
 
 def _stations_and_pois(document: Document, sites: Sites, obstacles: Obstacles, widest_m: float) -> list[_Entry]:
-    """Those that the file names, and those that it leaves to us."""
+    """The stations and POIs that the file lists, and those that it has placed automatically."""
     spread = sites.stations if isinstance(sites.stations, SpreadStations) else None
     drawn = sites.pois if isinstance(sites.pois, RandomPois) else None
     stations: list[_Entry] = [] if isinstance(sites.stations, SpreadStations) else [
@@ -204,7 +204,7 @@ def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) ->
 
 
 def draw_incentives(drawn: Drawn, pois: list[str]) -> dict[str, float]:
-    """Incentives of all POIs, to the hundredth: uniform, with a share of them zero.
+    """Uniform random incentives of all POIs, rounded to 0.01, with a share of them zero.
 
     Source:
         Section 5.1 of the paper: U(0, 150) with half of the POIs at zero, and U(0, 170).
@@ -246,7 +246,7 @@ def _known(document: Document, loc: tuple[str | int, ...], robot: str, robots: M
 
 
 def _radians(angle_deg: float) -> float:
-    """An angle of a file in radians; to the nanodegree, so that ``_degrees`` gives the same file again."""
+    """An angle of a file [rad], rounded to the nanodegree, so that ``_degrees`` inverts it exactly."""
     return math.radians(round(angle_deg, 9))
 
 
@@ -255,7 +255,7 @@ def _degrees(angle_rad: float) -> float:
 
 
 def world_as_dict(world: World) -> dict[str, Any]:
-    """The resolved world as the content of a world file that gives the same world again."""
+    """The resolved world as the content of a world file, from which the same world is loaded."""
     def entry(site: Site) -> dict[str, Any]:
         return {"at_m": [site.x_m, site.y_m], "heading_deg": _degrees(site.heading_rad),
                 "stop_s": site.stop_s}

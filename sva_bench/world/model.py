@@ -1,4 +1,4 @@
-"""The world as data: what stands where, who drives, and what may fail."""
+"""The world as data: obstacles, sites, robots, scenarios and failure processes."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Site:
     Attributes:
         name: Its name; the base is called ``base``.
         kind: Base, refuelling station or point of interest.
-        x_m, y_m: Where it is.
-        heading_rad: Heading in which a robot stops there.
-        stop_s: Time that a stop takes.
+        x_m, y_m: Its place [m].
+        heading_rad: Heading in which a robot stops there [rad].
+        stop_s: Duration of a stop [s].
     """
 
     name: str
@@ -40,10 +40,10 @@ class Robot:
     Attributes:
         name: Its name.
         model: Its figures.
-        fuel_capacity_s: Driving time on one filling; ``inf`` = no limit.
-        mission_limit_s: Longest mission; ``inf`` = no limit.
-        availability: Availability where a scenario doesn't say otherwise.
-        incentives: What it earns at each POI, by name.
+        fuel_capacity_s: Fuel capacity [s of driving]; ``inf`` = no limit.
+        mission_limit_s: Longest mission [s]; ``inf`` = no limit.
+        availability: Default of its availability in scenarios.
+        incentives: Incentive of its visit to each POI, by name.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Scenario:
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """What differs from one rollout to the next.
+    """What varies between rollouts.
 
     Attributes:
         wheel_gain_sd: Standard deviation of each wheel's speed gain about 1, drawn per rollout and robot.
@@ -81,24 +81,24 @@ class Noise:
 
     @property
     def silent(self) -> bool:
-        """Whether every rollout is the same."""
+        """Whether all rollouts are equal."""
         return self.wheel_gain_sd == 0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MapSource:
-    """Where a world's occupancy grid comes from.
+    """The origin of a world's occupancy grid.
 
     Attributes:
-        section: What stands under ``map:`` in the world file.
-        files: The files behind it, as they were read.
+        section: The content of ``map:`` in the world file.
+        files: Its files, as read.
     """
 
     section: Mapping[str, Mapping[str, str | float]]
     files: tuple[MapFile, ...]
 
     def digests(self) -> dict[str, str]:
-        """SHA-256 of each file, by name: what results depend on beside the world file."""
+        """SHA-256 of each file, by name: results depend on them besides the world file."""
         return {file.name: hashlib.sha256(file.content).hexdigest() for file in self.files}
 
 
@@ -108,15 +108,15 @@ class World:
 
     Attributes:
         name: Its name.
-        obstacles: What stands in it.
+        obstacles: Its obstacles.
         sites: Base first, then stations, then POIs.
         robots: The robots.
         scenarios: The scenarios, at least one.
         plan_failure: Failure process that plans are made for.
         execute_failure: Failure process that they are executed under.
-        margin: Planning costs are twin times x (1 + margin).
+        margin: Planning costs are the kinematic twin's times x (1 + margin).
         noise: Noise of the execution.
-        map_source: Files that the obstacles come from; ``None`` if they are shapes.
+        map_source: Origin of the occupancy grid; ``None`` if the obstacles are shapes.
     """
 
     name: str

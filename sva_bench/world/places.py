@@ -1,7 +1,7 @@
-"""Places for sites on any ground: in the connected free region about a base, spread out or drawn at random.
+"""Placement of sites: in the connected free region about a base, spread out or drawn at random.
 
-All of it happens on a lattice, the half cells of an occupancy grid or a fine one laid over shapes: whatever is
-connected on it can be driven, so no place lies beyond an outer wall that the base is inside of.
+Places are nodes of a lattice, the half cells of an occupancy grid or a fine one laid over shapes: whatever is
+connected on it can be driven, so no place is outside walls that enclose the base.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from sva_bench.seeds import Stream, rng_for
 Point = tuple[float, float]
 
 CLEARANCE_MARGINS_M = (0.12, 0.06, 0.03)
-"""Distance to obstacles that paths keep beyond the robot's radius; the first that connects all sites.
+"""Distances to obstacles that paths keep beyond the robot's radius [m]; the first that connects all sites is used.
 
 The follower cuts gentle corners by up to 0.05 m and tracks to 0.01 m: at 0.12 m no robot touches anything.
 """
 
 APART_M = 0.5
-"""Least distance from one placed site to another, where nothing else is asked for."""
+"""Default of the least distance between placed sites [m]."""
 
-_SURE_M = 2e-3  # places are rounded to millimetres, and the roadmap goes about corners in polygons
-_FINEST_M, _PLACES = 0.05, 1_000_000  # finest lattice over shapes, and about how many places of it at most
-_ENCLOSED = 0.25  # share of the largest free region from which on an enclosed one is taken for the inside of a building
-_WORTH_SAYING = 0.05  # share of its region from which on a base outside an enclosed one is pointed out
-_LOOSE, _TIGHTER, _CLOSEST_M = 0.8, 0.85, 0.25  # spacing tried first, in that of a square grid; then so much less
-_CHUNK = 4096  # places looked at together
+_SURE_M = 2e-3  # covers the rounding of places to millimetres, and the roadmap's polygons about corners
+_FINEST_M, _PLACES = 0.05, 1_000_000  # finest lattice step over shapes, and about the greatest number of nodes
+_ENCLOSED = 0.25  # least share of the largest free region at which an enclosed one counts as a building's inside
+_WORTH_SAYING = 0.05  # least share of the base's region at which an enclosed one gives a warning
+_LOOSE, _TIGHTER, _CLOSEST_M = 0.8, 0.85, 0.25  # first spacing tried, relative to a square grid's; factor; least
+_CHUNK = 4096  # candidates tested together
 
 
 @dataclass(frozen=True, kw_only=True)
 class Places:
-    """Where the sites are [m]."""
+    """Places of the sites, as x, y [m]."""
 
     base: Point
     stations: tuple[Point, ...]
@@ -52,7 +52,7 @@ class Places:
 
 
 class NoRoom(ValueError):
-    """Sites that found no place."""
+    """No free place for some sites."""
 
     def __init__(self, kind: Literal["base", "stations", "pois"], found: int, spacing_m: float) -> None:
         super().__init__(kind, found, spacing_m)
@@ -67,7 +67,7 @@ class NoRoom(ValueError):
 
 
 def field_of(obstacles: Obstacles) -> DistanceField:
-    """Distances on a lattice, between whose neighbours nothing is nearer than at the nearer of the two."""
+    """Distances to obstacles at the nodes of a lattice: lower bounds on the lines between neighbouring nodes."""
     if obstacles.cells is not None:
         return distance_field(obstacles.cells)
     x0, y0, x1, y1 = obstacles.bounds_m.tolist()
@@ -77,7 +77,7 @@ def field_of(obstacles: Obstacles) -> DistanceField:
     shape = (2 * rows + 1, 2 * columns + 1)
     lattice = DistanceField(cells=frame, distance_m=np.zeros(shape, dtype=np.float32))
     index = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1).reshape(-1, 2)
-    # Halfway to a neighbour it may be nearer by half a step.
+    # Halfway to a neighbour an obstacle may be nearer by half a step.
     distance = np.maximum(clearances(obstacles, lattice.places(index)) - step / 2, 0.0)
     return DistanceField(cells=frame, distance_m=distance.reshape(shape).astype(np.float32))
 
@@ -86,27 +86,27 @@ def find_places(
     field: DistanceField, *, base: Point | None, radius_m: float, stations: int, pois: int, spacing_m: float | None,
     seed: int, others: Sequence[Point] = (), key: tuple[int, ...] = (),
 ) -> tuple[Places, float]:
-    """Places in the connected free region about the base that a robot reaches, keeping as far from obstacles as can be.
+    """Places in the free region connected with the base, at the widest clearance margin at which they fit.
 
-    Stations are each the farthest from base and stations before it, by path length; POIs are drawn. So more of
-    either leaves the first where they are.
+    Each station is the place farthest from the base and the stations before it, by path length; POIs are drawn at
+    random. So with more of either, the first ones stay in place.
 
     Args:
-        field: The ground.
-        base: The base; ``None`` = near the middle of the largest enclosed region.
-        radius_m: Radius of the robot.
-        stations, pois: How many.
-        spacing_m: Least distance from one POI to the next and to all other sites; ``None`` = as wide as it easily goes.
-            Stations keep no more than the usual distance from what was there before them.
+        field: Distances to obstacles.
+        base: The base [m]; ``None`` = near the middle of the largest enclosed region.
+        radius_m: Radius of the robot [m].
+        stations, pois: Number of each.
+        spacing_m: Least distance of POIs from each other and all other sites [m]; ``None`` = as wide as easily fits.
+            Stations keep at most ``APART_M`` from other sites.
         seed: Seed of the POIs.
-        others: Sites that stand already, beside the base.
-        key: Index of the stream that POIs are drawn from: of the map, where maps are to be independent samples.
+        others: Sites with given places, besides the base [m].
+        key: Key of the POIs' random stream, such as of the map, so that maps are independent samples.
 
     Returns:
-        The places; and the spacing.
+        The places; and the spacing [m].
 
     Raises:
-        NoRoom: If they don't fit.
+        NoRoom: If there are too few free places.
     """
     missing = NoRoom("base", 0, 0.0)
     for margin in CLEARANCE_MARGINS_M:
@@ -125,7 +125,7 @@ def find_places(
             candidates = np.argwhere(region)
             candidates = candidates[rng_for(seed, Stream.DRAWN_PLACES, *key).permutation(len(candidates))]
             for spacing in _spacings(widest) if spacing_m is None else [spacing_m]:
-                drawn = _drawn(field, candidates, pois, [here, *others, *spread], spacing)
+                drawn = _greedily_drawn(field, candidates, pois, [here, *others, *spread], spacing)
                 if len(drawn) == pois:
                     return Places(base=here, stations=spread, pois=drawn), spacing
             raise NoRoom("pois", len(drawn), spacing)
@@ -136,7 +136,7 @@ def find_places(
 
 
 def _spacings(widest_m: float) -> list[float]:
-    """Spacings to try one after the other, in steps of 0.05 m."""
+    """Decreasing spacings to try [m], multiples of 0.05 m."""
     tried = [max(widest_m, _CLOSEST_M)]
     while tried[-1] > _CLOSEST_M:
         tried.append(max(tried[-1] * _TIGHTER, _CLOSEST_M))
@@ -144,31 +144,32 @@ def _spacings(widest_m: float) -> list[float]:
 
 
 def enclosed_beside(field: DistanceField, base: Point, radius_m: float) -> tuple[float, Point] | None:
-    """An enclosed region beside that of a base which reaches the grid's rim: the base may be outside of all walls.
+    """The largest enclosed region, if a base's own region reaches the grid's boundary: it may be outside the building.
 
     Returns:
-        Area of the largest one [m2], and a place near its middle; ``None`` if the base is enclosed itself, or all that
-        is enclosed is small beside its region.
+        Area of that region [m2], and a place near its middle; ``None`` if the base's region is enclosed, or all
+        enclosed ones are small relative to it.
     """
     needed = radius_m + CLEARANCE_MARGINS_M[0] + _SURE_M
-    parts, sizes, enclosed = _regions(field, needed)
+    components, sizes, enclosed = _regions(field, needed)
     row, column = field.index_of(np.array([base]))[0].tolist()
-    mine = int(parts[row, column])
-    if mine == 0 or enclosed[mine] > 0 or enclosed.max() < _WORTH_SAYING * sizes[mine]:
+    component = int(components[row, column])
+    if component == 0 or enclosed[component] > 0 or enclosed.max() < _WORTH_SAYING * sizes[component]:
         return None
-    return float(enclosed.max()) * (field.cells.cell_m / 2) ** 2, _near_middle(field, parts == int(enclosed.argmax()))
+    largest = components == int(enclosed.argmax())
+    return float(enclosed.max()) * (field.cells.cell_m / 2) ** 2, _near_middle(field, largest)
 
 
 def _middle(field: DistanceField, needed_m: float) -> Point | None:
-    """The place nearest to the middle of the largest region that is enclosed by more than the grid's rim.
+    """The place nearest to the middle of the largest enclosed region; ``None`` if there is no free node.
 
-    What reaches the rim is the outside of a building's walls, unless all that is enclosed is small beside it.
+    A region that reaches the grid's boundary is outside the building, unless all enclosed ones are relatively small.
     """
-    parts, sizes, enclosed = _regions(field, needed_m)
+    components, sizes, enclosed = _regions(field, needed_m)
     if not sizes.any():
         return None
     best = int(np.argmax(enclosed if enclosed.max() >= _ENCLOSED * sizes.max() else sizes))
-    return _near_middle(field, parts == best)
+    return _near_middle(field, components == best)
 
 
 def _near_middle(field: DistanceField, region: BoolArray) -> Point:
@@ -178,26 +179,26 @@ def _near_middle(field: DistanceField, region: BoolArray) -> Point:
 
 
 def _regions(field: DistanceField, needed_m: float) -> tuple[NDArray[np.int32], IntArray, IntArray]:
-    """Connected regions with so much room, by number from 1; their sizes; and those of the enclosed, 0 for others."""
-    roomy = field.distance_m >= needed_m
-    found, count = label(roomy)
-    parts: NDArray[np.int32] = found.astype(np.int32, copy=False)
-    sizes: IntArray = np.bincount(parts.ravel(), minlength=count + 1).astype(np.int64)
+    """Connected regions of nodes with this clearance, numbered from 1; their sizes; sizes of enclosed ones, else 0."""
+    has_room = field.distance_m >= needed_m
+    found, count = label(has_room)
+    components: NDArray[np.int32] = found.astype(np.int32, copy=False)
+    sizes: IntArray = np.bincount(components.ravel(), minlength=count + 1).astype(np.int64)
     sizes[0] = 0
-    # A wall along the rim is a cell thick at least, which is two steps.
+    # A wall along the boundary is at least a cell thick, which is two steps.
     width = math.floor(needed_m / (field.cells.cell_m / 2) + 1.5) + 1
-    inner = np.zeros(parts.shape, dtype=np.bool_)
+    inner = np.zeros(components.shape, dtype=np.bool_)
     inner[width:-width, width:-width] = True
     enclosed = sizes.copy()
-    enclosed[np.unique(parts[~inner])] = 0
-    return parts, sizes, enclosed
+    enclosed[np.unique(components[~inner])] = 0
+    return components, sizes, enclosed
 
 
 def _region_about(field: DistanceField, base: Point, needed_m: float) -> BoolArray:
-    """Places that are connected to the base; none if there is too little room about it."""
+    """Nodes connected with the base, of the field's shape; none if there is too little room about it."""
     row, column = field.index_of(np.array([base]))[0].tolist()
     rows, columns = field.distance_m.shape
-    # The nearest place may have less room than the base has, but not all places about it.
+    # The nearest node may have less clearance than the base, but not all nodes about it.
     around = [(r, c) for r in range(max(row - 1, 0), min(row + 2, rows)) for c in range(
         max(column - 1, 0), min(column + 2, columns)) if field.distance_m[r, c] >= needed_m]
     if not around:
@@ -210,25 +211,25 @@ def _region_about(field: DistanceField, base: Point, needed_m: float) -> BoolArr
 def _spread(
     field: DistanceField, region: BoolArray, count: int, taken: Sequence[Point], spacing_m: float
 ) -> tuple[Point, ...]:
-    """Places that are each the farthest, by path length, from what is taken and from those before it."""
+    """Places, each the farthest by path length from the sites taken and from the places before it."""
     if count == 0:
         return ()
     step = field.cells.cell_m / 2
     steps = np.full(region.shape, np.iinfo(np.int32).max, dtype=np.int32)
     found: list[Point] = []
-    for row, column in _inside(field, region, taken):
-        _reach(region, steps, row, column)
+    for row, column in _nodes_near(field, region, taken):
+        _update_steps(region, steps, row, column)
     for _ in range(count):
         row, column = map(int, np.unravel_index(int(np.argmax(np.where(region, steps, -1))), region.shape))
         if not region[row, column] or steps[row, column] * step < spacing_m:
             raise NoRoom("stations", len(found), spacing_m)
         found += _points(field, np.array([[row, column]]))
-        _reach(region, steps, row, column)
+        _update_steps(region, steps, row, column)
     return tuple(found)
 
 
-def _inside(field: DistanceField, region: BoolArray, places: Sequence[Point]) -> list[tuple[int, int]]:
-    """The places of the region that are nearest to some points; none for points that are not by it."""
+def _nodes_near(field: DistanceField, region: BoolArray, places: Sequence[Point]) -> list[tuple[int, int]]:
+    """A node of the region beside each point, as row and column; none for points that aren't beside it."""
     found = []
     for point in places:
         row, column = field.index_of(np.array([point]))[0].tolist()
@@ -239,8 +240,8 @@ def _inside(field: DistanceField, region: BoolArray, places: Sequence[Point]) ->
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _reach(region: BoolArray, steps: NDArray[np.int32], row: int, column: int) -> None:
-    """Lower the least number of steps to each place to that from one place more."""
+def _update_steps(region: BoolArray, steps: NDArray[np.int32], row: int, column: int) -> None:
+    """Update the least number of steps from a set of nodes to each node by one more node, in place."""
     queue = np.empty((region.size, 2), dtype=np.int32)
     queue[0, 0], queue[0, 1] = row, column
     steps[row, column] = 0
@@ -256,10 +257,10 @@ def _reach(region: BoolArray, steps: NDArray[np.int32], row: int, column: int) -
                 tail += 1
 
 
-def _drawn(
+def _greedily_drawn(
     field: DistanceField, candidates: IntArray, count: int, taken: Sequence[Point], spacing_m: float
 ) -> tuple[Point, ...]:
-    """The first candidates that are far enough from what is taken and from those before them; fewer if there are."""
+    """The first ``count`` candidates that keep the spacing from taken sites and those before; fewer if too few do."""
     found: list[Point] = []
     for begin in range(0, len(candidates), _CHUNK):
         if len(found) == count:

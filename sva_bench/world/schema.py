@@ -1,4 +1,4 @@
-"""The world file's schema: what may stand in it, key by key."""
+"""The schema of world files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
 from sva_bench.choices import FailureProcess
-from sva_bench.files.fields import Bounded, Name, Number, Positive, Probability, Section, WholeNumber
+from sva_bench.files.fields import Bounded, Name, NonNegativeInt, Number, Positive, Probability, Section
 from sva_bench.seeds import MOST_SEED
 from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
@@ -16,9 +16,9 @@ from sva_bench.world.places import APART_M
 
 KIND = "sva-bench/world@1"
 Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
-Size = Annotated[Positive, Field(ge=1e-6, le=1e5)]  # physics knows nothing smaller
+Size = Annotated[Positive, Field(ge=1e-6, le=1e5)]  # smaller sizes are lost in physics
 Angle = Annotated[Number, Field(ge=-1e6, le=1e6)]
-Seed = Annotated[WholeNumber, Field(le=MOST_SEED)]
+Seed = Annotated[NonNegativeInt, Field(le=MOST_SEED)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 
 
@@ -51,7 +51,7 @@ class Shapes(Section):
 
     @field_validator("bounds_m")
     @classmethod
-    def _enclose_something(cls, bounds: list[float]) -> list[float]:
+    def _are_not_empty(cls, bounds: list[float]) -> list[float]:
         if not (bounds[0] < bounds[2] and bounds[1] < bounds[3]):
             raise ValueError(f"expected x_min, y_min, x_max, y_max with min below max, found {bounds}")
         if max(bounds[2] - bounds[0], bounds[3] - bounds[1]) > 2000 or max(map(abs, bounds)) > 1e5:
@@ -63,13 +63,13 @@ KINDS_OF_MAP = ("shapes", *FORMATS)
 
 
 class _MapWithoutFormats(Section):
-    """Exactly one of these."""
+    """The map: exactly one of these keys."""
 
     shapes: Shapes | None = None
 
     @model_validator(mode="before")
     @classmethod
-    def _is_of_one_kind(cls, data: object) -> object:
+    def _has_one_kind(cls, data: object) -> object:
         if isinstance(data, dict):
             kinds = [kind for kind in KINDS_OF_MAP if kind in data]
             if len(kinds) != 1 and not set(data) - set(KINDS_OF_MAP):
@@ -104,23 +104,23 @@ class SiteEntry(Section):
 
 
 class SpreadStations(Section):
-    """Stations placed as far apart as can be."""
+    """Stations placed automatically, as far apart as possible."""
 
-    spread: Annotated[WholeNumber, Field(ge=1, le=100)]
+    spread: Annotated[NonNegativeInt, Field(ge=1, le=100)]
     stop_s: Bounded = 0.0
 
 
 class RandomPois(Section):
-    """POIs drawn from what is free and connected to the base."""
+    """POIs drawn at random from the free region connected with the base."""
 
-    random: Annotated[WholeNumber, Field(ge=1, le=1000)]
+    random: Annotated[NonNegativeInt, Field(ge=1, le=1000)]
     seed: Seed
     min_spacing_m: Annotated[Positive, Field(ge=0.01, le=1000)] = APART_M
     stop_s: Bounded = 0.0
 
 
 def _how_placed(data: object) -> str:
-    """Whether sites are named or to be placed: a site may be called ``random`` too, but it is no number."""
+    """The tag of named or automatically placed sites; a named site may be called ``random``, but has a mapping."""
     placed = isinstance(data, dict) and any(
         key in data and not isinstance(data[key], dict) for key in ("random", "spread"))
     return "[placed]" if placed else "[named]"
@@ -137,10 +137,10 @@ class Sites(Section):
 
 
 class Figures(Section):
-    """Figures of a robot that isn't built in; the model itself checks how they go together.
+    """Parameters of a robot that isn't built in; ``RobotModel`` checks their combination.
 
-    Smaller hulls, wheels and tracks than these are lost in what physics takes for contact; with less turn acceleration
-    a robot takes a second to mend the heading errors that it may stop with, more than 1 % of many a leg.
+    Smaller hulls, wheels and tracks are below the contact tolerance of physics; with less turn acceleration a robot
+    takes a second to correct the heading errors that are allowed at a stop, more than 1 % of many legs.
     """
 
     radius_m: Annotated[Positive, Field(ge=0.05, le=5)]
@@ -154,7 +154,7 @@ class Figures(Section):
 
 
 class Drawn(Section):
-    """Incentives drawn per POI: uniform, a share of them zero."""
+    """Incentives drawn at random for each POI: uniform, with a share of them zero."""
 
     uniform: Annotated[list[Bounded], Field(min_length=2, max_length=2)]
     zero_share: Probability = 0.0
@@ -210,7 +210,7 @@ class WorldFile(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _say_what_is_not_there_yet(cls, data: object) -> object:
+    def _refuse_shared_interaction(cls, data: object) -> object:
         if isinstance(data, dict) and data.get("interaction") == "shared":
             raise ValueError("this version knows only 'interaction: independent'")
         return data

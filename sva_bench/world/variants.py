@@ -1,4 +1,4 @@
-"""Worlds with other values at some of their keys, and what those values make wrong, said of whoever asked for them."""
+"""Variants of worlds: other values at some keys, with errors attributed to the option or file that set them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sva_bench.world.load import world_of
 from sva_bench.world.model import World
 
 Blame = Callable[[str, str], SvaBenchError]
-"""Makes an error of a key that was asked for and what is wrong with it."""
+"""Makes the error for a key and the problem with its value."""
 
 _NAMED: dict[Loc, str] = {("robots",): "robot", ("sites", "stations"): "station", ("sites", "pois"): "POI",
                           ("scenarios",): "scenario"}
-"""Sections whose keys are names that the file gives: to set something of one, it has to be there."""
+"""Sections whose keys are names given in the file: values can be set below existing names only."""
 
 
 def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> World:
@@ -28,11 +28,11 @@ def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> W
     Args:
         document: The world file.
         values: The values by key.
-        blame: Makes the error where one of them is wrong.
+        blame: Makes the error if one of them is wrong.
 
     Raises:
-        BadFile: If the file is wrong by itself.
-        SvaBenchError: As ``blame`` makes it.
+        BadFile: If the file is wrong without the values.
+        SvaBenchError: From ``blame``, if a value is wrong.
     """
     changed = document
     for key, value in values.items():
@@ -45,18 +45,18 @@ def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> W
     except BadFile as error:
         if not values:
             raise
-        world_of(document)  # what is wrong without them is said of the file
-        key = _at_fault(document, values, error)
-        where = "" if error.key == _as_in_messages(key) else f"{error.key}: "
+        world_of(document)  # an error without the values is the file's
+        key = _key_at_fault(document, values, error)
+        where = "" if error.key == _with_indices(key) else f"{error.key}: "
         raise blame(key, f"{where}{error.problem} (in {document.path})") from None
 
 
-def _at_fault(document: Document, values: Mapping[str, Any], error: BadFile) -> str:
-    """Which of the values an error comes from: one that is about the same key, else one that is wrong alone."""
+def _key_at_fault(document: Document, values: Mapping[str, Any], error: BadFile) -> str:
+    """The key whose value causes an error: one that the error is about, else one that is wrong alone."""
     for key in values:
-        told = _as_in_messages(key)
+        dotted = _with_indices(key)
         if any(longer == shorter or longer.startswith((f"{shorter}.", f"{shorter}["))
-               for longer, shorter in ((error.key, told), (told, error.key))):
+               for longer, shorter in ((error.key, dotted), (dotted, error.key))):
             return key
     for key, value in values.items():
         try:
@@ -66,24 +66,32 @@ def _at_fault(document: Document, values: Mapping[str, Any], error: BadFile) -> 
     return list(values)[-1]
 
 
-def _as_in_messages(key: str) -> str:
+def _with_indices(key: str) -> str:
     """``obstacles.2.radius_m`` as ``obstacles[2].radius_m``."""
     words = key.split(".")
     return words[0] + "".join(f"[{word}]" if word.isdecimal() else f".{word}" for word in words[1:])
 
 
 def option_of(key: str, values: Mapping[str, Any]) -> str:
-    """A value as the command line asks for it."""
+    """A value as the option that sets it."""
     word = json.dumps(values[key])
     return f"--set {key}={word if len(word) <= 60 else word[:57] + '...'}"
-
 
 
 def adapted(
     world: World, scenarios: Sequence[str] | None = None, margin: float | None = None,
     plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
 ) -> World:
-    """A world with some of its settings replaced."""
+    """A world with some of its settings replaced.
+
+    Args:
+        world: The world.
+        scenarios: Names of the scenarios to keep; ``None`` = all.
+        margin, plan_failure, execute_failure: In place of the world's own; ``None`` = unchanged.
+
+    Raises:
+        BadInput: If a scenario is unknown or listed twice, or a process doesn't support its joint distribution.
+    """
     if scenarios:
         world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
             scenarios, [s.name for s in world.scenarios])))

@@ -89,7 +89,7 @@ def test_a_new_entry_adds_up_over_ranges_of_trials(tmp_path: Path) -> None:
         done.summary.scenarios[0].plans["stochastic"].statistics["everybody_home"].mean
 
 
-def test_without_such_an_entry_a_summary_says_nothing_of_it() -> None:
+def test_without_measured_statistics_a_summary_has_no_such_key() -> None:
     assert "statistics" not in as_dict(figures(3.0))
 
 
@@ -100,7 +100,7 @@ def test_the_table_in_the_docs_is_that_of_the_catalogue() -> None:
     assert held == as_markdown(), "put what `as_markdown()` gives between the two marks"
 
 
-def test_every_entry_names_the_place_in_the_summary_where_its_figure_stands() -> None:
+def test_every_entry_names_the_key_of_its_figure_in_the_summary() -> None:
     # A plan whose every figure is another one: what an entry reads must be what stands at its place.
     numbers = iter(range(1, 100))
     plan = plan_result(0.0)

@@ -45,7 +45,7 @@ def test_what_is_written_is_read_again_as_it_was(tmp_path: Path) -> None:
         assert summary_form(as_dict(record)) is form
 
 
-def test_what_was_not_asked_for_is_absent_and_what_has_no_meaning_is_null() -> None:
+def test_results_not_requested_are_absent_and_undefined_ones_are_null() -> None:
     data = as_dict(summary((1.0, 3.0), 20.0))
     (scenario,) = data["scenarios"]
     assert not {"evpi_executed", "assumptions"} & set(scenario)
@@ -77,7 +77,7 @@ def test_lists_and_minus_zeros_are_plain() -> None:
     ("trials", 0, "expected at least 1"),
     ("reach", None, "expected a mapping"),
 ])
-def test_a_summary_that_is_none_is_told_by_file_line_and_key(at: str, value: Any, said: str, tmp_path: Path) -> None:
+def test_an_invalid_summary_is_an_error_with_file_line_and_key(at: str, value: Any, said: str, tmp_path: Path) -> None:
     data: Any = as_dict(summary((1.0, 3.0), 20.0))
     held, *keys = data, *at.split(".")
     for key in keys[:-1]:
@@ -97,7 +97,7 @@ def test_a_summary_of_nothing_is_of_a_run() -> None:
         assert summary_form(data) is Summary
 
 
-def test_units_are_told_by_their_map() -> None:
+def test_units_are_labelled_by_their_map() -> None:
     assert unit("a", 1.0).label == "a"
     swept: UnitSummary = replace(unit("a", 1.0), variant="x=1")
     assert swept.label == "a (x=1)"

@@ -184,7 +184,7 @@ def test_one_map_or_maps_that_agree_leave_open_how_maps_differ(figures: list[flo
 
 
 def test_an_empty_sample_is_refused() -> None:
-    with pytest.raises(ValueError, match="no sample"):
+    with pytest.raises(ValueError, match="sample is empty"):
         sample_mean([])
 
 

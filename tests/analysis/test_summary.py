@@ -217,7 +217,7 @@ def test_one_trial_has_figures_and_no_intervals() -> None:
     assert summary.distribution.q50 == 160.0
 
 
-def test_pairs_are_told_apart_by_intervals_adjusted_for_their_number() -> None:
+def test_pairs_are_compared_by_simultaneous_intervals() -> None:
     def plan(name: str, worth: float) -> Judged:
         ends: list[list[End]] = [["home", "home" if there else "failed"] for there in (True, False) * 6]
         trials = executed([[10, worth if there else 0] for there in (True, False) * 6], ends, [10, worth],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import nct, norm
 
-from sva_bench.analysis.unseen import UNHAPPY, exposure_of, share_below
+from sva_bench.analysis.unseen import EXECUTION_LOSSES, exposure_of, share_below
 from sva_bench.execution.margins import Margins, margins_of, margins_of_team
 from sva_bench.execution.outcome import Assignment, Driven
 
@@ -83,7 +83,7 @@ def test_the_bound_holds_in_97_per_cent_of_normal_samples(draws: int, distance: 
 
 def exposed(drives: list[Driven], *, noisy: bool = True) -> tuple[float, dict[str, float]]:
     found = exposure_of([margins_of(0, ORDERS, drives)], 1, noisy=noisy)
-    return float(found.incentive[0]), dict(zip(UNHAPPY, found.ends[0].tolist(), strict=True))
+    return float(found.incentive[0]), dict(zip(EXECUTION_LOSSES, found.ends[0].tolist(), strict=True))
 
 
 def test_a_robot_that_is_far_from_every_end_has_nothing_to_lose() -> None:
@@ -106,7 +106,7 @@ def test_what_was_seen_counts_in_full() -> None:
     assert (lost, ends["stuck"]) == (50.0, 1.0)
 
 
-def test_without_noise_the_one_drive_tells_all() -> None:
+def test_without_noise_a_single_drive_determines_the_shares() -> None:
     assert exposed([driven(8, 11.8, 10, 5)], noisy=False)[0] == 0.0
     assert exposed([driven(8, 12.5, 10, 5)], noisy=False)[0] == 50.0
 

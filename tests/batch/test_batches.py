@@ -23,8 +23,8 @@ from sva_bench.batch.schema import BatchSettings
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.options import Options
-from tests.test_batch import rows_of
-from tests.test_cli import sva_bench
+from tests.batch.test_commands import rows_of
+from tests.cli.test_commands import sva_bench
 from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -100,7 +100,7 @@ def test_worlds_that_crash_or_hang_the_physics_are_named_and_the_rest_goes_on(
     assert (tmp_path / "out" / "outcomes-sound-seed0.parquet").stat().st_mtime_ns == kept
 
 
-def test_a_batch_that_did_nothing_yet_is_in_nobodys_way(tmp_path: Path) -> None:
+def test_a_folder_of_a_batch_without_results_can_be_used_again(tmp_path: Path) -> None:
     world, out = world_of(tmp_path), tmp_path / "out"
     out.mkdir()
 
@@ -144,7 +144,7 @@ def test_ctrl_c_ends_a_batch_with_130_and_resume_goes_on(tmp_path: Path, cache: 
     assert rows_of(out).num_rows == 3000 * 2 * 2 * 2
 
 
-def test_a_folder_that_cannot_be_written_to_is_told_and_loses_nothing(tmp_path: Path, cache: Path) -> None:
+def test_an_unwritable_folder_is_an_error_and_loses_nothing(tmp_path: Path, cache: Path) -> None:
     world = posted(tmp_path, "small", 1)
     command = ("batch", world, "--trials", 40, "--fidelity", "kinematic", "--workers", 1, "--cache", cache)
     (tmp_path / "file").write_text("", encoding="utf-8")

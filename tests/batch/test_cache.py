@@ -117,7 +117,7 @@ def test_what_is_no_value_of_the_type_is_refused(content: bytes) -> None:
         decoded(content, Odd)
 
 
-def test_an_array_that_says_it_is_larger_than_its_file_takes_no_memory() -> None:
+def test_an_array_declared_larger_than_its_file_allocates_nothing() -> None:
     head = b"[[99999999999,99999999999],false,[0],[0],[0,3],[0]]"
     with pytest.raises(NotOfType, match="cut off"):
         decoded(len(head).to_bytes(8, "little") + head, Driven)
@@ -209,7 +209,7 @@ def test_a_cache_that_others_can_write_to_is_refused(cache: Cache, mode: int) ->
         cache.put(OddJob(), "ab12", ODD)
 
 
-def test_a_new_cache_is_its_users_alone_whatever_the_mask(tmp_path: Path) -> None:
+def test_a_new_cache_is_private_for_any_umask(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
         kept = Cache(folder=tmp_path / "cache")

@@ -16,8 +16,8 @@ import pyarrow as pa
 import pytest
 
 from tests.batch.test_batches import posted, started, wait_for
-from tests.test_batch import rows_of
-from tests.test_cli import sva_bench
+from tests.batch.test_commands import rows_of
+from tests.cli.test_commands import sva_bench
 
 TRIALS = ("--trials", 1200, "--unit-trials", 10, "--rollouts", 2, "--fidelity", "kinematic")
 UNITS = 2 * 120
@@ -152,7 +152,7 @@ def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(
 
 
 @pytest.mark.long  # it waits for one
-def test_a_dask_scheduler_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_missing_dask_scheduler_is_an_error(tmp_path: Path) -> None:
     world = posted(tmp_path, "small", 1)
     done = sva_bench("batch", world, *TRIALS, "--dask", "tcp://127.0.0.1:9", "--out", "out", "--cache", "cache",
                      cwd=tmp_path)

@@ -62,13 +62,13 @@ def test_a_process_goes_by_its_name(process: Process) -> None:
 
 
 @every_process
-def test_a_route_earns_on_average_what_the_closed_form_says(process: Process) -> None:
+def test_the_mean_reward_of_a_route_is_its_closed_form(process: Process) -> None:
     # Standard deviation of the earnings is at most 35 / 2; four of them over sqrt(20000): 0.5.
     assert np.mean(earned(drawn(process), 0)) == pytest.approx(process.route_value(ROUTE, RELIABILITY), abs=0.5)
 
 
 @every_process
-def test_what_planners_are_told_is_the_closed_form(process: Process) -> None:
+def test_planning_terms_agree_with_the_closed_form(process: Process) -> None:
     terms = process.terms([Reliability(availability=1.0), RELIABILITY])
     survival = np.ones(2) if terms.survival is None else terms.survival
     told = sum(terms.share[1] * survival[1]**k * e for k, e in enumerate(ROUTE.incentives, start=1))
@@ -165,7 +165,7 @@ class TestAProcessWithoutJointDistributions:
             read_instance(path)
 
 
-def test_nobody_else_compares_names_of_processes() -> None:
+def test_no_other_module_compares_names_of_processes() -> None:
     names = set(get_args(FailureProcess))
     for path in sorted(PACKAGE.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

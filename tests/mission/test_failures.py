@@ -43,7 +43,7 @@ def test_draws_of_a_robot_do_not_depend_on_the_others_or_the_scenario() -> None:
     assert not np.any((safer == 0) & (alone == NEVER))  # common random numbers: more reliable fails in fewer trials
 
 
-def test_as_many_missions_fail_as_the_availability_says() -> None:
+def test_the_share_of_failed_missions_is_one_minus_the_availability() -> None:
     fails = draw_failures(1, ["a", "b", "c"], {"a": 0.75, "b": 1.0, "c": 0.0}, "mission", trials=TRIALS, pois=3)
     assert set(np.unique(fails)) == {0, NEVER}
     # Four standard deviations of a frequency at p = 0.75: 4 sqrt(0.1875 / 20000) = 0.0122.
@@ -59,7 +59,7 @@ def test_the_poi_before_which_a_robot_fails_is_geometric() -> None:
     assert np.mean(fails == NEVER) == pytest.approx(0.6**4, abs=0.0142)
 
 
-def test_a_route_earns_on_average_what_the_closed_form_says() -> None:
+def test_the_mean_reward_of_a_route_is_its_closed_form() -> None:
     incentives = np.array([10.0, 20.0, 5.0])
     fails = draw_failures(3, ["a"], {"a": 0.7}, "per_leg", trials=TRIALS, pois=3)[:, 0]
     earned = [incentives[:min(int(k) - 1, 3)].sum() for k in fails]

@@ -39,7 +39,7 @@ def written(folder: Path, data: object) -> Path:
     return path
 
 
-def test_an_instance_file_says_what_the_instance_holds(tmp_path: Path) -> None:
+def test_an_instance_file_has_the_content_of_the_instance(tmp_path: Path) -> None:
     instance = read_instance(written(tmp_path, TINY))
     robot = instance.vehicles[0]
     assert (instance.base, instance.stations, instance.pois) == (0, (1,), (2, 3))

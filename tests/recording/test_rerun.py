@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rerun.chunk import RrdReader
 
 from sva_bench.recording.rerun import TIMELINE, end_s, record
-from sva_bench.recording.story import BLUE, DEAD, ROBOT_COLORS, YELLOW
+from sva_bench.recording.story import BLUE, DISABLED, ROBOT_COLORS, YELLOW
 from sva_bench.recording.viewer import program, verify
 from tests.recording.missions import WORLD, trace
 
@@ -37,14 +37,14 @@ def tour(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_recording_is_whole_and_nothing_else_is_left(tour: Path) -> None:
+def test_a_recording_is_complete_and_no_draft_is_left(tour: Path) -> None:
     verify(tour)
     assert [file.name for file in tour.parent.iterdir()] == ["tour.rrd"]
     assert len(RrdReader(tour).blueprints()) == 1
     assert end_s(tour) == 14.0
 
 
-def test_robots_stand_where_their_traces_say(tour: Path) -> None:
+def test_robots_are_shown_at_the_poses_of_their_traces(tour: Path) -> None:
     expected = trace("uv2", fails_before=2)
     times, places = rows(tour, "world/robots/uv2", "Transform3D:translation")
     _, turns = rows(tour, "world/robots/uv2/hull", "Transform3D:quaternion")
@@ -63,7 +63,7 @@ def test_a_poi_changes_its_colour_when_it_is_collected(tour: Path) -> None:
 def test_a_robot_that_failed_is_dark_from_then_on(tour: Path) -> None:
     times, colors = rows(tour, "world/robots/uv2/hull/body", "Cylinders3D:colors")
     assert_array_equal(times, [0, 6])
-    assert [rgb(row[0]) for row in colors] == [ROBOT_COLORS[1], DEAD]
+    assert [rgb(row[0]) for row in colors] == [ROBOT_COLORS[1], DISABLED]
 
 
 def test_each_event_is_in_the_log(tour: Path) -> None:
@@ -87,7 +87,7 @@ def test_robots_that_never_leave_are_recorded(tmp_path: Path) -> None:
     path = tmp_path / "idle.rrd"
     record(path, WORLD, [trace("uv1", ()), trace("uv2", fails_before=0)], title="idle")
     verify(path)
-    for robot, color in (("uv1", BLUE), ("uv2", DEAD)):
+    for robot, color in (("uv1", BLUE), ("uv2", DISABLED)):
         times, places = rows(path, f"world/robots/{robot}", "Transform3D:translation")
         assert_array_equal(times, [0])
         assert_array_equal(places, [[[1, 1, 0]]])

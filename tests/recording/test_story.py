@@ -12,14 +12,14 @@ from sva_bench.recording.story import BLUE, ROBOT_COLORS, VERMILLION, YELLOW, Le
 from tests.recording.missions import WORLD, trace
 
 
-def told(story: Story) -> list[tuple[float, Level, str]]:
+def entries(story: Story) -> list[tuple[float, Level, str]]:
     return [(sentence.time_s, sentence.level, sentence.text) for sentence in story.log]
 
 
-def test_each_event_is_told_in_order_of_time() -> None:
+def test_events_are_logged_in_order_of_time() -> None:
     # p1 after 2 m, r1 after 2 m more and 2 s of refuelling, p2 after 2 m, 6 m home; all at 1 m/s.
     story = story_of(WORLD, [trace("uv1")], "tour")
-    assert told(story) == [
+    assert entries(story) == [
         (0.0, "INFO", "uv1 left base"), (2.0, "DEBUG", "uv1 reached p1"), (2.0, "INFO", "uv1 collected p1: 30"),
         (4.0, "DEBUG", "uv1 reached r1"), (6.0, "INFO", "uv1 refuelled at r1"), (8.0, "DEBUG", "uv1 reached p2"),
         (8.0, "INFO", "uv1 collected p2: 12.5"), (14.0, "DEBUG", "uv1 reached base"),
@@ -27,20 +27,20 @@ def test_each_event_is_told_in_order_of_time() -> None:
     assert story.duration_s == 14
 
 
-def test_unhappy_ends_are_told_and_stop_the_robot_for_good() -> None:
+def test_failed_and_stuck_robots_are_logged_and_stop_for_good() -> None:
     late = trace("uv1", limit_s=5.0)  # p2 is reached after 8 s
     empty = trace("uv2", fuel_s=3.0)  # r1 is 4 s away
     failed = trace("uv3", fails_before=2)  # on leaving r1 for p2, at 6 s
     story = story_of(WORLD, [failed, late, empty], "unhappy")  # in any order
-    texts = [entry for entry in told(story) if entry[1] in ("WARN", "ERROR")]
+    texts = [entry for entry in entries(story) if entry[1] in ("WARN", "ERROR")]
     assert texts == [
         (3.0, "ERROR", "uv2 ran out of fuel on the way to r1, with 30 collected"),
         (6.0, "WARN", "uv1 passed its limit of 5 s at r1: earns no more"),
         (6.0, "ERROR", "uv3 failed at r1, with 30 collected"),
         (14.0, "WARN", "uv1 came home late, with 30 collected")]
-    assert [(robot.name, robot.dies_s) for robot in story.cast] == [("uv1", None), ("uv2", 3.0), ("uv3", 6.0)]
+    assert [(robot.name, robot.disabled_s) for robot in story.views] == [("uv1", None), ("uv2", 3.0), ("uv3", 6.0)]
     stuck = story_of(WORLD, [trace("uv1", ("base", "p1"), stuck=True)], "stuck")
-    assert told(stuck)[-1] == (2.0, "ERROR", "uv1 got stuck on the way to p1, with 0 collected")
+    assert entries(stuck)[-1] == (2.0, "ERROR", "uv1 got stuck on the way to p1, with 0 collected")
 
 
 def test_a_poi_takes_the_colour_of_the_robot_that_collected_it_first() -> None:
@@ -52,29 +52,29 @@ def test_a_poi_takes_the_colour_of_the_robot_that_collected_it_first() -> None:
 
 
 def test_a_robot_keeps_its_colour_whoever_else_is_shown() -> None:
-    assert story_of(WORLD, [trace("uv3")], "alone").cast[0].color == ROBOT_COLORS[2]
+    assert story_of(WORLD, [trace("uv3")], "alone").views[0].color == ROBOT_COLORS[2]
 
 
 def test_fuel_falls_while_driving_and_rises_during_the_refuelling_stop() -> None:
-    fuel = story_of(WORLD, [trace("uv1")], "tour").cast[0].fuel
+    fuel = story_of(WORLD, [trace("uv1")], "tour").views[0].fuel
     assert fuel is not None
     # 20 s at first, 16 s left at r1 (4 s), full again when the stop is over (6 s), 8 s more to drive.
     assert_allclose(np.column_stack([fuel.time_s, fuel.value]), [[0, 20], [4, 16], [6, 20], [14, 12]], atol=1e-9)
 
 
 def test_fuel_without_a_limit_is_not_shown() -> None:
-    assert story_of(WORLD, [trace("uv3")], "no limit").cast[0].fuel is None
+    assert story_of(WORLD, [trace("uv3")], "no limit").views[0].fuel is None
 
 
 def test_the_total_is_the_sum_of_the_robots_and_ends_with_the_mission() -> None:
     story = story_of(WORLD, [trace("uv1"), trace("uv2", ("base", "p2", "base"))], "sum")
     assert_array_equal(story.total.time_s, [0, 2, 6, 8, 14])
     assert_array_equal(story.total.value, [0, 30, 42.5, 55, 55])
-    assert_array_equal(story.cast[1].collected.time_s, [0, 6, 14])
+    assert_array_equal(story.views[1].collected.time_s, [0, 6, 14])
 
 
 def test_the_trail_leads_from_the_base_to_where_the_drive_ended() -> None:
-    robot = story_of(WORLD, [trace("uv1", fails_before=2)], "trail").cast[0]
+    robot = story_of(WORLD, [trace("uv1", fails_before=2)], "trail").views[0]
     assert_array_equal(robot.trail[0, 0], [1, 1])
     assert_array_equal(robot.trail[1:, 0], robot.trail[:-1, 1])
     assert_allclose(robot.trail[-1, 1], [5, 1])
@@ -83,8 +83,8 @@ def test_the_trail_leads_from_the_base_to_where_the_drive_ended() -> None:
 
 def test_a_robot_that_stays_home_or_fails_at_once_is_there_all_the_same() -> None:
     story = story_of(WORLD, [trace("uv1", ()), trace("uv2", fails_before=0)], "idle")
-    assert told(story) == [(0.0, "INFO", "uv1 stays home"), (0.0, "ERROR", "uv2 failed at base, with 0 collected")]
-    assert [(len(robot.trail), robot.dies_s) for robot in story.cast] == [(0, None), (0, 0.0)]
+    assert entries(story) == [(0.0, "INFO", "uv1 stays home"), (0.0, "ERROR", "uv2 failed at base, with 0 collected")]
+    assert [(len(robot.trail), robot.disabled_s) for robot in story.views] == [(0, None), (0, 0.0)]
     assert story.duration_s == 0
 
 

@@ -63,7 +63,7 @@ def test_a_truncated_recording_is_named(recording: Path, tmp_path: Path) -> None
         view(cut, web=True, screenshot=None, at_s=None)
 
 
-def test_a_missing_driver_is_told_with_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_of_a_missing_driver_names_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(NoVulkanDriver, match=r"mesa-vulkan-drivers.* VK_ICD_FILENAMES"):
         drawing_environment({"VK_ICD_FILENAMES": str(tmp_path / "gone.json")})
     driver = tmp_path / "lvp.json"

@@ -161,7 +161,7 @@ def test_a_straight_line_takes_the_time_of_the_trapezoid(model: RobotModel, leng
 
 @pytest.mark.parametrize("heading", [0.0, 1.0, math.pi, -2.0, 7.0])
 @pytest.mark.parametrize("start", [0.0, 3.0, -1.5])
-def test_it_stops_at_the_end_in_the_heading_asked_for(start: float, heading: float) -> None:
+def test_it_stops_at_the_end_in_the_given_heading(start: float, heading: float) -> None:
     time_s, pose = course_time(TURTLEBOT, [[0, 0], [1, 0.2], [2, 0], [2, 1]], heading, start)
     assert math.isfinite(time_s)
     assert abs(wrap(heading - pose[2])) < 0.02

@@ -172,4 +172,4 @@ def test_ctrl_c_ends_the_search_for_chains_of_very_many_stations(monkeypatch: py
             made, fuel_capacity_s=150.0, mission_limit_s=1000.0, fuel_s=fuel, incentives=np.eye(602)[601]),))
     at_call(monkeypatch, routes, "_station_chains")
     with pytest.raises(KeyboardInterrupt):
-        routes.tables_of(instance)
+        routes.leg_tables(instance)

@@ -57,7 +57,7 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
     for k in range(5):
         chosen = tuple(sorted(int(j) for j in rng.choice(pois, 2 if k == 4 else 3, replace=False)))
         memory = frozenset(chosen) | {int(j) for j in np.flatnonzero(rng.random(n) < 0.5)}
-        cuts.append(SubsetRow(pois=chosen, kind=0 if k == 4 else None, memory=memory))
+        cuts.append(SubsetRow(pois=chosen, vehicle_class=0 if k == 4 else None, memory=memory))
     duals = rng.uniform(0, 6, len(cuts))
     # Detours just to forget a visit aren't examined: neither over a station that is of no use ...
     routes = [route for route in partial_routes(instance) if len(route) > 2
@@ -75,7 +75,7 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
 
 
 @pytest.mark.parametrize("seed", range(25))
-def test_enumerated_routes_cover_each_set_of_pois_that_is_worth_enough(seed: int) -> None:
+def test_enumeration_finds_every_set_of_pois_above_the_threshold(seed: int) -> None:
     instance, rng = small(seed), np.random.default_rng(seed)
     n, pois = len(instance.sites), np.array(instance.pois)
     graph = graph_of(instance, scope_of(instance, instance.vehicles[0], np.isin(np.arange(n), pois)), 1.0)
@@ -94,8 +94,8 @@ def test_enumerated_routes_cover_each_set_of_pois_that_is_worth_enough(seed: int
 
 
 def test_a_cut_counts_a_route_that_takes_two_of_its_rows() -> None:
-    cut = SubsetRow(pois=(1, 2, 3), kind=None, memory=frozenset({1, 2, 3}))
-    of_vehicle = SubsetRow(pois=(1, 2), kind=7, memory=frozenset({1, 2}))
+    cut = SubsetRow(pois=(1, 2, 3), vehicle_class=None, memory=frozenset({1, 2, 3}))
+    of_vehicle = SubsetRow(pois=(1, 2), vehicle_class=7, memory=frozenset({1, 2}))
     counter = Counter((cut, of_vehicle), 6)
     # 1, 2: two of three POIs; for vehicle 7 the first of them is a second row.
     assert counter.of(0, (0, 1, 2, 0)).tolist() == [1, 1]
@@ -107,7 +107,7 @@ def test_a_cut_counts_a_route_that_takes_two_of_its_rows() -> None:
 def test_halves_of_three_routes_over_pairs_of_three_pois_are_cut_off() -> None:
     # Routes {1, 2}, {2, 3} and {1, 3}, half of each: 1.5 of them take two of the POIs, and only one may.
     routes = ((0, 1, 2, 0), (0, 2, 3, 0), (0, 1, 3, 0))
-    used = [(0, Column(kind=0, route=route, visits=np.isin(np.arange(4), route[1:-1]).astype(float), value=1.0,
+    used = [(0, Column(vehicle_class=0, route=route, visits=np.isin(np.arange(4), route[1:-1]).astype(float), value=1.0,
                        floors=np.zeros(0)), 0.5) for route in routes]
     (cut,) = separate(used, (), (), (1, 2, 3))
     assert cut.pois == (1, 2, 3)

@@ -252,7 +252,7 @@ def test_plans_are_the_best_however_seldom_anybody_is_available(most: float) -> 
         assert (ties.most, ties.least) == pytest.approx((best.most, best.least), rel=1e-6, abs=0.0)
 
 
-def test_the_second_stage_of_the_paper_is_refused_where_next_to_nobody_is_available() -> None:
+def test_the_papers_second_stage_is_refused_at_tiny_availabilities() -> None:
     made = random_instance(10)
     instance = replace(made, vehicles=tuple(replace(v, availability=1e-8) for v in made.vehicles))
     for method in (name for name, method in METHODS.items() if method.second_stage):

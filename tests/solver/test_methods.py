@@ -32,7 +32,7 @@ def test_a_method_proves_the_plan_that_auto_proves(method: Method) -> None:
 
 
 @every_method
-def test_a_method_says_what_it_is(method: Method) -> None:
+def test_every_method_has_a_description(method: Method) -> None:
     assert METHODS[method].name == method
     assert METHODS[method].description
 
@@ -48,7 +48,7 @@ def test_failures_along_the_route_go_to_the_methods_that_serve_them(method: Meth
 
 
 def test_the_edge_model_refuses_robots_that_refuel() -> None:
-    with pytest.raises(BadInput, match=r"the method undirected \(.*\) doesn't serve it; take the method auto"):
+    with pytest.raises(BadInput, match=r"the method undirected \(.*\) doesn't support it; take the method auto"):
         plan_stochastic(REFUELLING, method="undirected")
 
 

@@ -34,7 +34,7 @@ from sva_bench.solver.highs import MipResult, maximise
 from sva_bench.solver.knowledge import SolveLimits
 from sva_bench.solver.preprocess import is_metric, scope_of
 from sva_bench.solver.routes.heuristic import Found
-from sva_bench.solver.routes.refuelling import quickest, road_of
+from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.solver.two_stage import (
     knowledge_of,
     plan_deterministic,
@@ -158,7 +158,7 @@ def test_a_robot_that_can_earn_nothing_stays_home(
     assert wait_and_see(instance) == 0.0
 
 
-def test_a_poi_worth_nothing_is_visited_only_as_a_shortcut() -> None:
+def test_a_poi_without_reward_is_visited_only_as_a_shortcut() -> None:
     # p1 is worth nothing. The way over it to p2, 1 + 1, beats the direct one, 50, which is over the limit of 30.
     fuel = np.array([[0, 1, 50], [9, 0, 1], [9, 9, 0]], dtype=float)
     plan = plan_stochastic(instance_of("base p1 p2", (), vehicle(fuel, [0, 0, 5], limit=30)))
@@ -191,13 +191,13 @@ def test_correlated_failures_count_for_foresight_but_not_for_the_plan() -> None:
     robots = [vehicle(TRIANGLE, [0, 10, 9], name=n, limit=20, availability=0.5) for n in ("a", "b")]
     joint = (JointState(probability=0.5, available=frozenset({"a"})),
              JointState(probability=0.5, available=frozenset({"b"})))
-    together, disjoint = instance_of("base p1 p2", (), *robots, joint=joint), instance_of("base p1 p2", (), *robots)
-    assert plan_stochastic(together).value == plan_stochastic(disjoint).value == 9.5
-    assert wait_and_see(together) == pytest.approx(10.0)  # always exactly one robot, and it takes the better POI
+    stacked, disjoint = instance_of("base p1 p2", (), *robots, joint=joint), instance_of("base p1 p2", (), *robots)
+    assert plan_stochastic(stacked).value == plan_stochastic(disjoint).value == 9.5
+    assert wait_and_see(stacked) == pytest.approx(10.0)  # always exactly one robot, and it takes the better POI
     assert wait_and_see(disjoint) == pytest.approx(0.25 * 19 + 0.5 * 10)
 
 
-def test_foresight_over_many_outcomes_is_worked_out_only_when_asked() -> None:
+def test_wait_and_see_over_many_outcomes_is_computed_only_on_request() -> None:
     robots = [vehicle(TRIANGLE, [0, 10, 9], name=f"a{k}", limit=20, availability=0.5) for k in range(5)]
     instance = instance_of("base p1 p2", (), *robots)
     assert wait_and_see(instance) is None
@@ -256,7 +256,7 @@ def test_out_of_time_the_best_plan_so_far_comes_with_a_valid_bound(limit_s: floa
     assert wait_and_see(instance, SolveLimits(time_limit_s=limit_s)) is None
 
 
-def test_a_wide_gap_is_enough_when_asked_for() -> None:
+def test_a_solve_stops_at_a_wide_gap() -> None:
     plan = plan_stochastic(scattered(25), SolveLimits(gap=5.0))
     assert plan.status == "optimal"
     value, bound = value_and_bound(plan)
@@ -308,11 +308,11 @@ def test_refuelling_in_a_given_order_is_exact() -> None:
     # 10 s of fuel: base p1 p2 base is 4 + 6 + 4; by the station between p1 and p2, 4 + 3 | 3 + 4, it goes.
     fuel = np.array([[0, 5, 4, 4], [5, 0, 3, 3], [4, 3, 0, 6], [4, 3, 6, 0]], dtype=float)
     instance = instance_of("base r1 p1 p2", (1,), vehicle(fuel, [0, 0, 1, 1], capacity=10, limit=14))
-    road = road_of(instance, instance.vehicles[0])
-    assert quickest(road, (2, 3)) == (14.0, (0, 2, 1, 3, 0))
-    assert quickest(road, ()) == (0.0, ())
+    own_legs = vehicle_legs(instance, instance.vehicles[0])
+    assert quickest_route(own_legs, (2, 3)) == (14.0, (0, 2, 1, 3, 0))
+    assert quickest_route(own_legs, ()) == (0.0, ())
     short = instance_of("base r1 p1 p2", (1,), vehicle(fuel, [0, 0, 1, 1], capacity=10, limit=13.9))
-    assert quickest(road_of(short, short.vehicles[0]), (2, 3)) is None
+    assert quickest_route(vehicle_legs(short, short.vehicles[0]), (2, 3)) is None
 
 
 def test_an_euler_walk_drives_every_leg_that_is_connected_with_the_base() -> None:

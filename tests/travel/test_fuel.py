@@ -100,7 +100,7 @@ def test_no_greater_matrix_would_do(times: IntArray) -> None:
 
 
 @given(time_matrices())
-def test_a_chain_adds_up_to_its_cost_and_visits_nothing_twice(times: IntArray) -> None:
+def test_a_chain_adds_up_to_its_cost_and_has_no_duplicates(times: IntArray) -> None:
     costs = fuel_costs(times_of(times), 0.0)
     sites = costs.times.sites
     for i, j in itertools.permutations(range(len(times)), 2):

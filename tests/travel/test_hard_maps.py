@@ -19,11 +19,11 @@ from sva_bench.travel.roadmap import plan_paths
 from sva_bench.travel.samples import arc_points
 from sva_bench.travel.tangents import tangents
 from sva_bench.world.load import load_world
+from tests.geometry.test_cells import cells_of, obstacles_of
 from tests.oracles.distances import path_clearance
 from tests.oracles.worlds import random_obstacles
 from tests.travel.test_maps import places_on
 from tests.travel.test_roadmap import length_of
-from tests.world.test_cells import cells_of, obstacles_of
 
 CLEARANCE_M = 0.297
 
@@ -87,7 +87,7 @@ def test_the_search_for_tangents_stops_when_the_work_is_done_and_keeps_the_short
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7])
-def test_ways_on_the_lattice_keep_the_clearance_and_get_through_every_passage(yaw: float) -> None:
+def test_lattice_paths_keep_the_clearance_and_find_every_passage(yaw: float) -> None:
     # Squares of 6 cells, shifted from row to row: the gaps between them, of 10 cells, lie askew.
     y, x = np.mgrid[:120, :120]
     occupied = ((x + (y // 16) % 2 * 8) % 16 < 6) & (y % 16 < 6)
@@ -102,7 +102,7 @@ def test_ways_on_the_lattice_keep_the_clearance_and_get_through_every_passage(ya
         assert path_clearance(obstacles, way) >= clearance - 1e-6
 
 
-def test_no_way_leads_through_a_wall() -> None:
+def test_no_path_leads_through_a_wall() -> None:
     occupied = np.zeros((40, 40), dtype=np.bool_)
     occupied[:, 20] = True
     cells = cells_of(occupied, 0.1)

@@ -17,11 +17,11 @@ from sva_bench.geometry.passages import widest_passage
 from sva_bench.travel.roadmap import plan_paths
 from sva_bench.world.maps.movingai import read_movingai_map
 from sva_bench.world.maps.ros import read_ros_map
+from tests.geometry.test_cells import cells_of, obstacles_of
 from tests.oracles.grids import shortest_lengths
 from tests.oracles.octile import octile_length, read_scen
 from tests.travel.test_roadmap import MEAN_RATIO, WORST_RATIO, length_of
 from tests.world.maps_for_tests import shared_map
-from tests.world.test_cells import cells_of, obstacles_of
 
 CLEARANCE_M = 0.297
 MOVINGAI = ["room-32-32-4", "maze-32-32-2", "random-32-32-20", "empty-32-32"]
@@ -50,7 +50,7 @@ def distance_to_cells(occupied: BoolArray, a: FloatArray, b: FloatArray) -> floa
 @settings(max_examples=8)
 @given(arrays(np.bool_, (6, 7), elements=st.sampled_from([False, False, True])), st.floats(0.1, 0.6),
        st.sampled_from([0.0, 0.9]))
-def test_no_path_comes_nearer_to_an_occupied_cell_than_asked(occupied: BoolArray, radius: float, yaw: float) -> None:
+def test_every_path_keeps_the_clearance_from_occupied_cells(occupied: BoolArray, radius: float, yaw: float) -> None:
     cells = cells_of(occupied, 1.0, (0.0, 0.0, yaw))
     points = places_on(cells, 6, 0, radius)
     for row in plan_paths(obstacles_of(cells), points, radius):

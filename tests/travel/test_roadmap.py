@@ -89,7 +89,7 @@ def test_the_edges_shown_are_those_of_the_roadmap_that_paths_are_planned_on() ->
                 assert 0.98 * on_edges < length_of(path) <= on_edges + 1e-9
 
 
-def test_the_oracle_finds_the_way_round_a_box_by_hand() -> None:
+def test_the_oracle_finds_the_shortest_path_round_a_box_by_hand() -> None:
     # Half length 1, clearance 1: from (-2, 0) to (2, 0) round a square of side 2 about the origin. The straight parts
     # touch the rounded corners: from (-2, 0) the corner's circle of radius 1 about (-1, 1) is met at (-2, 1). So
     # 1 up, a quarter circle, 2 along, a quarter circle, 1 down: 4 + pi.
@@ -101,7 +101,7 @@ def test_the_oracle_finds_the_way_round_a_box_by_hand() -> None:
     assert exact * (1 - 1e-3) < lower <= exact <= upper < exact * (1 + 1e-3)
 
 
-def test_the_oracle_finds_the_way_round_a_cylinder_by_hand() -> None:
+def test_the_oracle_finds_the_shortest_path_round_a_cylinder_by_hand() -> None:
     # Radius 0.5 + 0.5, points at distance 2 on either side: two tangents of length sqrt(4 - 1), each leaving the axis
     # by 30 degrees, so the arc between them spans 180 - 2 x 60 = 60 degrees: 2 sqrt(3) + pi / 3.
     obstacles = Obstacles(bounds_m=np.array([-9.0, -9, 9, 9]), boxes=np.empty((0, 5)),
@@ -131,7 +131,7 @@ def digest(planner: PathPlanner) -> str:
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_planning_twice_gives_the_same_paths_bit_for_bit(planner: PathPlanner) -> None:
+def test_planning_again_gives_equal_paths_to_the_bit(planner: PathPlanner) -> None:
     first = digest(planner)
     assert digest(planner) == first
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as fresh:

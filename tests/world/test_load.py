@@ -65,8 +65,8 @@ def test_a_world_file_gives_its_world(tmp_path: Path) -> None:
     ("noise: {wheel_gain_sd: 0.01}", "noise: {wheel_gain: 0.01}", "noise.wheel_gain", "did you mean 'wheel_gain_sd'"),
     ("name: small\n", "", "name", "is missing; add it"),
     ("base: {at_m: [0.8, 0.8], heading_deg: 45}", "base: {heading_deg: 45}", "sites.base.at_m", "is missing; add it"),
-    ("name: small\n", "name: small\nname: other\n", "name", "stands twice"),
-    ("p2: {at_m: [0.8, 5.0], stop_s: 2}", "p1: {at_m: [0.8, 5.0]}", "sites.pois.p1", "stands twice"),
+    ("name: small\n", "name: small\nname: other\n", "name", "is a duplicate"),
+    ("p2: {at_m: [0.8, 5.0], stop_s: 2}", "p1: {at_m: [0.8, 5.0]}", "sites.pois.p1", "is a duplicate"),
     ("[2.2, 0.8]", "[.nan, 0.8]", "sites.pois.p1.at_m[0]", "finite"),
     ("[2.2, 0.8]", "[2.2, .inf]", "sites.pois.p1.at_m[1]", "finite"),
     ("[2.2, 0.8]", "[2.2]", "sites.pois.p1.at_m", "at least 2"),
@@ -150,7 +150,7 @@ def test_an_anchor_that_nothing_refers_to_does_no_harm(tmp_path: Path) -> None:
     assert world_of(tmp_path, SMALL.replace("name: small", "name: &n small")).name == "small"
 
 
-def test_an_alias_is_refused_where_it_stands(tmp_path: Path) -> None:
+def test_an_alias_is_refused_with_its_line(tmp_path: Path) -> None:
     text = SMALL.replace("p3: {at_m", "p3: &p {at_m").replace("p4: {at_m: [4.2, 0.8]}", "p4: *p")
     error = complaint(tmp_path, text)
     assert "aliases are not allowed" in str(error)
@@ -237,7 +237,7 @@ def test_failure_processes_of_planning_and_execution_may_differ(tmp_path: Path) 
 # Drawn incentives
 
 
-def test_so_many_drawn_incentives_are_zero_as_asked_for() -> None:
+def test_the_given_share_of_drawn_incentives_is_zero() -> None:
     pois = [f"p{k}" for k in range(40)]
     drawn = draw_incentives(Drawn(uniform=[10, 150], zero_share=0.5, seed=3), pois)
     assert list(drawn) == pois

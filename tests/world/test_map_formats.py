@@ -83,7 +83,7 @@ def test_a_map_is_read_with_the_digests_of_its_files(form: MapFormat, tmp_path: 
 @pytest.mark.parametrize(("name", "problem"), [
     ("missing", "no such file"), (".", "not a file"), ("../outside", "lies outside the world's folder"),
     ("/etc/hostname", "no name relative to the world's folder")])
-def test_a_file_that_is_missing_or_elsewhere_is_said_of_the_key(
+def test_a_file_that_is_missing_or_outside_the_folder_is_an_error_of_its_key(
     form: MapFormat, name: str, problem: str, tmp_path: Path,
 ) -> None:
     sample(form, tmp_path / "here")
@@ -122,7 +122,7 @@ def test_a_map_is_known_by_its_name_and_by_its_content(form: MapFormat, tmp_path
 
 
 @every_format
-def test_a_world_made_of_a_map_says_how_and_can_be_read(form: MapFormat, tmp_path: Path) -> None:
+def test_a_world_from_a_map_records_its_command_and_can_be_read(form: MapFormat, tmp_path: Path) -> None:
     file, target = sample(form, tmp_path), tmp_path / "made.yaml"
     text, files = world_from_map(tmp_path / file, target, base=None, pois=4, stations=1, robots=2, spacing_m=None,
                                  settings=SAMPLES[form.key][1], seed=0, progress=lambda *_: None)

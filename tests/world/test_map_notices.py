@@ -45,13 +45,13 @@ def made(folder: Path, target: Path, **asked: object) -> str:
 @pytest.mark.parametrize(("picture", "says"), [
     ("##\n##", "4 are occupied and 0 unknown; look at negate"),
     ("#?\n??", "1 are occupied and 3 unknown; look at whether unknown cells are free .*--unknown free")])
-def test_a_map_without_a_free_cell_says_what_it_holds(tmp_path: Path, picture: str, says: str) -> None:
+def test_a_map_without_a_free_cell_is_refused_with_counts_of_its_cells(tmp_path: Path, picture: str, says: str) -> None:
     write_ros_map(tmp_path, picture)
     with pytest.raises(BadFile, match=f"no cell of the map is free: {says}"):
         read_ros_map(tmp_path, "map.yaml")
 
 
-def test_an_octile_map_without_a_free_cell_says_so(tmp_path: Path) -> None:
+def test_an_octile_map_without_a_free_cell_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.map").write_text("type octile\nheight 1\nwidth 3\nmap\n@TW\n")
     with pytest.raises(BadFile, match="all 3 are solid"):
         read_movingai_map(tmp_path, "a.map", 1.0)
@@ -80,7 +80,7 @@ def test_a_usual_map_is_read_without_a_word(tmp_path: Path, caplog: pytest.LogCa
     assert not caplog.records
 
 
-def test_sites_outside_of_the_walls_are_told_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_sites_outside_the_walls_give_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     inner = ROOM.splitlines()
     picture = "\n".join(["." * 40] * 10 + ["." * 12 + line + "." * 12 for line in inner] + ["." * 40] * 10)
     write_ros_map(tmp_path, picture)

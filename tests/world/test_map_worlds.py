@@ -84,7 +84,7 @@ def test_a_benchmark_map_is_a_world_in_metres_of_ones_choice(tmp_path: Path) -> 
     ("file: map.yaml", "file: /tmp/map.yaml", "map.ros.file", "no name relative to the world's folder"),
     ("[4, 2.5]", "[2.1, 2.5]", "sites.pois.p2.at_m", "inside an obstacle"),
     ("[4, 2.5]", "[5.5, 2.5]", "sites.pois.p2.at_m", "outside the bounds")])
-def test_what_is_wrong_with_a_map_world_is_told_of_its_key(tmp_path: Path, old: str, new: str, key: str, says: str
+def test_an_error_in_a_map_world_names_its_key(tmp_path: Path, old: str, new: str, key: str, says: str
                                                            ) -> None:
     with pytest.raises(BadFile, match=says) as caught:
         two_rooms(tmp_path, WORLD.replace(old, new))
@@ -122,7 +122,7 @@ def test_a_run_keeps_the_maps_files_and_is_another_run_with_another_map(tmp_path
     assert run(other, options, tmp_path / "runs", None, lambda *_: None).folder != done.folder
 
 
-def test_the_complaint_of_a_door_too_narrow_says_which_robot_would_fit(tmp_path: Path) -> None:
+def test_the_error_of_a_narrow_door_names_the_largest_robot_that_fits(tmp_path: Path) -> None:
     # The door is two cells of 0.5 m wide; a path keeps 0.03 m beside the robot at least.
     world = two_rooms(tmp_path)
     wide = replace(world.robots[0].model, radius_m=0.49, track_m=0.5)
@@ -132,7 +132,7 @@ def test_the_complaint_of_a_door_too_narrow_says_which_robot_would_fit(tmp_path:
     plan_travel_times(world, replace(wide, radius_m=caught.value.widest_m))
 
 
-def test_where_nothing_is_reached_the_base_is_told_to_move(tmp_path: Path) -> None:
+def test_where_no_site_is_reachable_the_error_suggests_to_move_the_base(tmp_path: Path) -> None:
     world = two_rooms(tmp_path, WORLD.replace("[1, 2.5]", "[4, 1.8]"))  # all sites but the base are beyond the door
     wide = replace(world.robots[0].model, radius_m=0.49, track_m=0.5)
     with pytest.raises(BadFile, match="no path from 'base' to 'r1', 'p1', 'p2'") as caught, about(

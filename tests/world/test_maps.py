@@ -117,7 +117,7 @@ def test_transparent_pixels_are_unknown_but_in_raw_mode() -> None:
     assert_array_equal(occupancy(clear, mode="raw", **thresholds), [[-1, 0]])  # type: ignore[arg-type]
 
 
-def test_quotes_whole_numbers_words_and_unused_keys_are_taken_as_ros_takes_them(
+def test_quotes_integers_truth_values_and_unused_keys_are_read_as_in_ros(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     write_ros_map(tmp_path, "#.")
@@ -169,7 +169,7 @@ def test_a_broken_lying_or_huge_image_is_one_complaint(tmp_path: Path, content: 
     ("negate: 0", "negate: 2", "negate", "expected 0 or 1"),
     ("free_thresh: 0.196", "free_thresh: 0.9", "free_thresh", "above occupied_thresh"),
     ("negate: 0", "negate: 0\nmode: trinaryy", "mode", "did you mean 'trinary'")])
-def test_what_is_wrong_in_the_yaml_is_told_with_key_and_line(
+def test_an_error_in_the_yaml_names_key_and_line(
     tmp_path: Path, old: str, new: str, key: str, complaint: str
 ) -> None:
     write_ros_map(tmp_path, "#.")
@@ -207,7 +207,7 @@ def test_an_octile_map_has_its_first_row_in_the_north(tmp_path: Path) -> None:
     (".GS@", ".GS", 5, "expected 4 cells, as 'width' says, found 3"),
     ("OTW.", "OTWx", 6, "column 4: 'x' is no terrain"),
     ("map\n", "", 4, "expected 'map'"), ("height 2", "height 99999999", 2, "at most 16000000")])
-def test_a_broken_octile_map_is_told_with_its_line(tmp_path: Path, old: str, new: str, line: int, complaint: str
+def test_an_error_in_an_octile_map_names_its_line(tmp_path: Path, old: str, new: str, line: int, complaint: str
                                                    ) -> None:
     (tmp_path / "a.map").write_text(OCTILE.replace(old, new))
     with pytest.raises(BadFile, match=complaint) as caught:

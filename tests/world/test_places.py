@@ -75,7 +75,7 @@ def test_a_map_without_outer_walls_has_its_base_in_the_middle_of_all() -> None:
     assert 1.5 < base[0] < 4.5
 
 
-def test_stations_are_each_the_farthest_by_the_way_there() -> None:
+def test_each_station_is_the_farthest_place_by_path_length() -> None:
     # A U of corridors 1 m wide: from the left end, the farthest is the right end, though it is near across the wall.
     cells = grid("###########\n#..#######.\n#..####..#.\n#..####..#.\n#........#.\n#........##\n###########".replace(
         ".\n", "#\n"))
@@ -146,7 +146,7 @@ def test_a_world_of_shapes_may_leave_its_sites_to_us(tmp_path: Path) -> None:
     assert [(s.x_m, s.y_m) for s in others.pois] != [(s.x_m, s.y_m) for s in world.pois]
 
 
-def test_placed_sites_keep_away_from_those_that_the_file_names(tmp_path: Path) -> None:
+def test_placed_sites_keep_their_distance_from_those_in_the_file(tmp_path: Path) -> None:
     world = world_of(tmp_path, PLACED.replace("{spread: 2, stop_s: 4}", "{depot: {at_m: [3.2, 5.2]}}"))
     (depot,) = world.stations
     assert depot.name == "depot"
@@ -165,7 +165,7 @@ def test_more_stations_than_fit_are_refused() -> None:
     # Stations keep their own distance: what is asked of POIs is no matter of theirs.
     ("min_spacing_m: 0.8", "min_spacing_m: 6", "sites.pois", "no POIs .* keep 6 m .* a smaller min_spacing_m"),
     ("random: 4, seed: 7", "random: 4", "sites.pois.seed", "the key 'seed' is missing"),
-    ("random: 4", "random: many", "sites.pois.random", "expected a whole number"),
+    ("random: 4", "random: many", "sites.pois.random", "expected an integer"),
     ("random: 4", "random: 4, spacing: 1", "sites.pois.spacing", "unknown key 'spacing'; did you mean 'min_spacing_m'"),
     ("spread: 2", "spread: 0", "sites.stations.spread", "expected at least 1"),
     ("[0.8, 0.8]", "[0.1, 0.8]", "sites.base.at_m", "doesn't fit there"),
@@ -173,7 +173,7 @@ def test_more_stations_than_fit_are_refused() -> None:
     ("{random: 4, seed: 7, min_spacing_m: 0.8}", "{random: {at_m: [2.2, 0.8]}, p1: {x: 1, y: 2}}", "sites.pois.p1.x",
      "unknown key 'x'"),
 ])
-def test_what_is_wrong_with_placed_sites_is_told_of_its_key(tmp_path: Path, old: str, new: str, key: str, says: str
+def test_an_error_in_placed_sites_names_its_key(tmp_path: Path, old: str, new: str, key: str, says: str
                                                             ) -> None:
     assert old in PLACED
     with pytest.raises(BadFile, match=says) as caught:

@@ -1,7 +1,7 @@
-"""Failure processes: how they are drawn, and what a route is worth under them in closed form.
+"""Failure processes: how failures are drawn, and the closed-form value of routes under them.
 
-A new process is a file here with a class as ``process.Process`` says, its name in ``choices.FailureProcess`` and a line
-in ``PROCESSES``. Nothing else in the package compares names of processes.
+A new process is a file here with a class that implements ``process.Process``, its name in ``choices.FailureProcess``
+and a line in ``PROCESSES``. No other code compares names of processes.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ PROCESSES: Mapping[FailureProcess, Process] = {process.name: process for process
 """The processes by name, in the order in which results list them."""
 
 MODEL: FailureProcess = MissionFailure().name
-"""The process of the two-stage model: ties, wait-and-see and the value of perfect information are those under it."""
+"""The process of the two-stage model, under which ties, wait-and-see value and EVPI are computed."""
 
 
 def process_of(name: FailureProcess) -> Process:
@@ -60,12 +60,12 @@ def process_of(name: FailureProcess) -> Process:
 
 
 def without_joint(names: Iterable[FailureProcess]) -> FailureProcess | None:
-    """The first of some processes under which availabilities can't have a joint distribution."""
+    """The first of some processes that doesn't support joint distributions of availabilities; ``None`` if all do."""
     return next((name for name in names if not process_of(name).joint), None)
 
 
 def route_value(incentives: Sequence[float], availability: float, process: FailureProcess) -> float:
-    """Expected incentive of one route, for processes that take no account of driving times.
+    """Expected incentive of one route, under a process that doesn't depend on driving times.
 
     Args:
         incentives: Incentive of each POI in the order of the route.
@@ -73,7 +73,7 @@ def route_value(incentives: Sequence[float], availability: float, process: Failu
         process: The failure process.
 
     Raises:
-        ValueError: If driving times matter under it.
+        ValueError: If the process depends on driving times.
     """
     return process_of(process).route_value(
         RouteProfile(incentives=tuple(incentives)), Reliability(availability=availability))
@@ -83,8 +83,10 @@ def draw_failures(
     seed: int, vehicles: Sequence[str], availability: Mapping[str, float], process: FailureProcess, *,
     trials: int, pois: int, first: int = 0, joint: Sequence[JointState] | None = None,
 ) -> IntArray:
-    """Number of the POI before which each robot fails in each trial (``Failures.before_poi``), for vehicles of which
-    nothing but the availability is known; arguments as in ``FailureDraw``."""
+    """POI number before which each robot fails in each trial (``Failures.before_poi``), shape (trials, vehicles).
+
+    Only availabilities are given; arguments as in ``FailureDraw``.
+    """
     return process_of(process).draw(FailureDraw(
         seed=seed, vehicles=tuple(vehicles), trials=trials, first=first, pois=pois,
         reliability=tuple(Reliability(availability=availability[name]) for name in vehicles),

@@ -22,19 +22,19 @@ from sva_bench.mission.failures.process import (
 
 @dataclass(frozen=True, kw_only=True)
 class PerLegFailure:
-    """Failures along the route, as the paper executes them; robots fail independently, by their marginals."""
+    """Failures along the route, as in the paper's simulations; robots fail independently, by their marginals."""
 
     name: FailureProcess = "per_leg"
     how: str = "per leg"
     collapses: bool = False
     joint: bool = True
 
-    def draw(self, asked: FailureDraw) -> Failures:
-        """A uniform for each POI that a robot could try; the first that reaches ``s`` is where it fails."""
-        fails = no_failures(asked.trials, len(asked.vehicles))
-        for column, s in enumerate(availabilities(asked.reliability)):
-            for k in range(asked.pois, 0, -1):  # downwards, so that the first failure stands
-                u = failure_uniforms(asked.seed, column, k, asked.trials, asked.first)
+    def draw(self, request: FailureDraw) -> Failures:
+        """Failures by one uniform per robot, trial and POI number; the first that reaches ``s`` is the failure."""
+        fails = no_failures(request.trials, len(request.vehicles))
+        for column, s in enumerate(availabilities(request.reliability)):
+            for k in range(request.pois, 0, -1):  # downwards, so that the first failure overwrites later ones
+                u = failure_uniforms(request.seed, column, k, request.trials, request.first)
                 fails.before_poi[u >= s, column] = k
         return fails
 
@@ -47,9 +47,9 @@ class PerLegFailure:
         return float(sum(reliability.availability**k * e for k, e in enumerate(route.incentives, start=1)))
 
     def terms(self, reliability: Sequence[Reliability]) -> PlanningTerms:
-        """All of an incentive is earned if the vehicle gets there, with chance ``s`` from each POI to the next."""
+        """All of an incentive is earned if the vehicle gets there, with probability ``s`` from each POI to the next."""
         return PlanningTerms(share=np.ones(len(reliability)), survival=availabilities(reliability))
 
     def can_leave(self, reliability: Reliability) -> bool:  # noqa: ARG002
-        """Always: it fails on the way."""
+        """Always ``True``: it fails on the way to a POI."""
         return True

@@ -1,4 +1,4 @@
-"""What a failure process is: how failures are drawn, what a route is worth under them, what planning needs to know."""
+"""The interface of failure processes: draws, closed-form values of routes, and terms for planning."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from sva_bench.mission.failures.joint import JointState
 from sva_bench.seeds import Stream, uniforms
 
 NEVER = np.iinfo(np.int64).max
-"""Number of the POI before which a robot that doesn't fail would fail."""
+"""``Failures.before_poi`` of a robot that doesn't fail."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reliability:
-    """How far one vehicle can be relied upon; each process reads it in its own way.
+    """The reliability parameters of one vehicle; each process has its own interpretation.
 
     Attributes:
-        availability: Probability of no failure: in the mission, or on the way to the next POI.
+        availability: Probability of no failure: in the whole mission, or on the way to the next POI.
         mission_limit_s: Longest mission [s]; ``inf`` = no limit.
     """
 
@@ -33,11 +33,11 @@ class Reliability:
 
 @dataclass(frozen=True, kw_only=True)
 class RouteProfile:
-    """A route as far as failures matter.
+    """What of a route its value under failures depends on.
 
     Attributes:
         incentives: Incentive of each POI, in the order of visits.
-        arrival_s: Driving time until each of them [s], stops left out; ``None`` = not known.
+        arrival_s: Driving time until each of them [s], without stops; ``None`` = not known.
         home_s: Driving time until the base [s]; ``None`` = not known.
     """
 
@@ -48,11 +48,11 @@ class RouteProfile:
 
 @dataclass(frozen=True, kw_only=True)
 class FailureDraw:
-    """What to draw.
+    """The parameters of a draw of failures.
 
     Attributes:
         seed: Root seed.
-        vehicles: Names; the position of a vehicle is its key.
+        vehicles: Names; a vehicle's position is the key of its stream.
         reliability: Of each vehicle.
         trials: Number of trials.
         first: Number of the first trial.
@@ -71,12 +71,12 @@ class FailureDraw:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Failures:
-    """When each robot fails in each trial, whatever it drives.
+    """When each robot fails in each trial, independent of its route.
 
     Attributes:
         before_poi: Shape (trials, vehicles). 0: fails before leaving the base; k >= 1: fails on its way to the k-th POI
-            that it tries; ``NEVER``: neither.
-        lifetime_s: Driving time after which it fails [s], wherever that is; ``inf`` = never, shape (trials, vehicles).
+            of its route; ``NEVER``: no such failure.
+        lifetime_s: Driving time after which it fails [s], shape (trials, vehicles); ``inf`` = never.
     """
 
     before_poi: IntArray
@@ -85,14 +85,14 @@ class Failures:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanningTerms:
-    """What failures make of incentives, in numbers: all that a solver learns of a process.
+    """The expected rewards under a process: all that a solver knows of it.
 
     The k-th POI of vehicle m's route earns ``share[m] * survival[m]**k`` times its incentive. A process that discounts
     by driving time needs a field of its own here (a rate a second), in ``solver/goal.py`` and in pricing.
 
     Attributes:
-        share: Share of every incentive that a vehicle earns, whatever its route, shape (M,).
-        survival: Chance of a vehicle to get to its next POI, shape (M,); ``None`` = certain, and the order of visits
+        share: Share of every incentive that a vehicle earns on average, independent of its route, shape (M,).
+        survival: Probability of a vehicle to get to its next POI, shape (M,); ``None`` = 1, and the order of visits
             makes no difference.
     """
 
@@ -101,12 +101,12 @@ class PlanningTerms:
 
 
 class Process(Protocol):
-    """A failure process. It holds no state; ``sva_bench.mission.failures.PROCESSES`` has one of each.
+    """A failure process. It has no state; ``sva_bench.mission.failures.PROCESSES`` holds one of each.
 
     Attributes:
-        name: How files and options call it.
-        how: How a robot fails, as messages say it: "the instance fails ...".
-        collapses: Whether what a visit earns on average depends on the vehicle alone, not on its route. Then the
+        name: Its name in files and options.
+        how: How a robot fails, as a phrase of messages: "the instance fails ...".
+        collapses: Whether the expected reward of a visit depends on the vehicle alone, not on its route. Then the
             two-stage problem is a one-stage problem, and the methods that keep the second stage apply.
         joint: Whether availabilities may have a joint distribution.
     """
@@ -120,9 +120,12 @@ class Process(Protocol):
     @property
     def joint(self) -> bool: ...
 
-    def draw(self, asked: FailureDraw) -> Failures:
-        """Draw failures: keyed by (seed, trial, robot, POI number), so that plans, scenarios and processes meet the
-        same uniforms, compared with each scenario's probabilities."""
+    def draw(self, request: FailureDraw) -> Failures:
+        """Failures of each trial and robot.
+
+        Uniforms are keyed by (seed, trial, robot, POI number): plans, scenarios and processes are compared under the
+        same ones (common random numbers).
+        """
 
     def route_value(self, route: RouteProfile, reliability: Reliability) -> float:
         """Expected incentive of one route, in closed form.
@@ -132,20 +135,20 @@ class Process(Protocol):
         """
 
     def terms(self, reliability: Sequence[Reliability]) -> PlanningTerms:
-        """What the vehicles' visits earn on average, for a solver."""
+        """The expected rewards of the vehicles' visits, for a solver."""
 
     def can_leave(self, reliability: Reliability) -> bool:
         """Whether a robot leaves the base in any trial."""
 
 
 def no_failures(trials: int, vehicles: int) -> Failures:
-    """Every robot works in every trial; for a process to enter its failures in."""
+    """Failures of no robot in any trial, to which a process adds its own."""
     return Failures(before_poi=np.full((trials, vehicles), NEVER, dtype=np.int64),
                     lifetime_s=np.full((trials, vehicles), np.inf))
 
 
 def failure_uniforms(seed: int, vehicle: int, poi: int, trials: int, first: int = 0) -> FloatArray:
-    """The uniform of each trial that decides on one vehicle before its ``poi``-th POI, shape (trials,)."""
+    """The uniforms that decide the failures of one vehicle before its ``poi``-th POI, shape (trials,)."""
     return uniforms(seed, Stream.FAILURE, vehicle, poi, first=first, count=trials)
 
 

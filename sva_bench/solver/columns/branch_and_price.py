@@ -1,4 +1,4 @@
-"""Branch-and-price: the best plan as a choice of routes, which labels find as they are needed.
+"""Branch-and-price: the best plan as a choice of routes, which pricing generates as they are needed.
 
 Source:
     Boussier, Feillet, Gendreau (2007), "An exact algorithm for team orienteering problems".
@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sva_bench.solver.columns.column_generation import ColumnGeneration, Generated
-from sva_bench.solver.columns.master import BranchState, Column, Duals, Unit, without
+from sva_bench.solver.columns.master import BranchState, Column, Duals, VehicleGroup, without
 from sva_bench.solver.highs import Relaxed
 
 _log = logging.getLogger(__name__)
 
-_SLACK = 0.03  # of the gap: a relaxation this close to its bound counts as solved
-_VIOLATED = 1e-6  # of what is required: no more than rounding
-_COARSE = 0.3  # ... as long as its routes visit POIs again: they tell what to remember soon enough
+_SLACK = 0.03  # share of the gap: a relaxation this close to its bound counts as solved
+_VIOLATED = 1e-6  # violation of a requirement that counts as rounding
+_COARSE = 0.3  # the same while ng-sets still grow: cycles show before the relaxation is solved to the end
 _STRONG = 8  # candidates of strong branching
 CUTTING = 6  # vehicles from which subset-row cuts shorten the proof
-_TAIL = 0.02  # of the gap: cuts that lower the bound by less aren't worth it
+_TAIL = 0.02  # share of the gap: a round of cuts that lowers the bound by less is the last (tailing off)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,36 +38,36 @@ class _Node:
 
 @dataclass(eq=False, kw_only=True)
 class BranchAndPrice:
-    """A search for the best plan.
+    """A branch-and-price search for the best plan, best bound first.
 
     Attributes:
-        generation: The routes.
+        generation: The columns, and the pricing that generates them.
         offer: Takes a plan, as POIs of each vehicle in order, and keeps it if it is better.
         left_s: Time left [s].
-        tell: Takes every upper bound on the goal.
+        report_bound: Takes every upper bound on the goal.
         nodes: Nodes of the search tree so far.
     """
 
     generation: ColumnGeneration
     offer: Callable[[tuple[tuple[int, ...], ...]], None]
     left_s: Callable[[], float]
-    tell: Callable[[float], None]
+    report_bound: Callable[[float], None]
     nodes: int = 0
 
     def run(self) -> bool:
-        """Search until nothing above the cutoff is left; ``False`` if time is up or labels overflow before."""
-        root = BranchState(units=tuple(
-            Unit(kind=k, count=len(c.vehicles)) for k, c in enumerate(self.generation.classes)))
+        """Search until no node's bound is above the cutoff; ``False`` if time runs out or labels overflow before."""
+        root = BranchState(groups=tuple(
+            VehicleGroup(vehicle_class=k, count=len(c.vehicles)) for k, c in enumerate(self.generation.classes)))
         ticket = itertools.count()
         waiting = [(-math.inf, next(ticket), _Node(state=root, bound=math.inf, duals=None))]
         while waiting and -waiting[0][0] > self.generation.cutoff():
             node = heapq.heappop(waiting)[2]
-            if self.generation.out():
+            if self.generation.is_over():
                 return False
             self.nodes += 1
             children, bound = self._process(node)
             left = max((-entry[0] for entry in waiting), default=-math.inf)
-            self.tell(max(left, bound, self.generation.cutoff()))
+            self.report_bound(max(left, bound, self.generation.cutoff()))
             if children is None:
                 return False
             for child in children:
@@ -77,14 +77,14 @@ class BranchAndPrice:
         return True
 
     def _process(self, node: _Node) -> tuple[list[_Node] | None, float]:
-        """Solve a node; its children, ``None`` if time ran out or labels overflowed, and its bound."""
+        """Solve a node: its children, ``None`` if time ran out or labels overflowed; and its upper bound."""
         generation, cutoff = self.generation, self.generation.cutoff
         centre, best, slack, before, dived = node.duals, node.bound, _COARSE, math.inf, False
         penalty = generation.penalty
         while True:
             master = generation.master(node.state, centre, penalty=penalty)
             made = generation.generate(master, node.state, centre, known=best, slack=slack,
-                                       tell=self.tell if self.nodes == 1 else None)
+                                       report_bound=self.report_bound if self.nodes == 1 else None)
             solved, centre = made.relaxed, made.duals
             best = min(best, made.bound)
             if best <= cutoff():
@@ -101,7 +101,7 @@ class BranchAndPrice:
                 slack = _SLACK
                 continue
             if master.violation(solved.values) > _VIOLATED:
-                # Violating a requirement cost less than any plan that keeps it. Branching would decide the same again;
+                # Violating a requirement cost less than any plan that keeps it, and branching would not change that:
                 # a greater penalty gives a point that keeps it, or if there is none a bound below every plan.
                 penalty *= 10.0
                 continue
@@ -110,7 +110,7 @@ class BranchAndPrice:
                 self._offer_columns(used)
                 if best <= cutoff() or slack == 0.0:
                     return [], min(best, cutoff())
-                slack = 0.0  # the plan is the best of the node only if nothing was left
+                slack = 0.0  # the plan is the node's optimum only if the relaxation is solved to the end
                 continue
             if not dived and (self.nodes == 1 or self.nodes % 10 == 0):
                 self._dive(node.state, centre)
@@ -124,12 +124,12 @@ class BranchAndPrice:
             before = best
 
     def _cutting(self) -> bool:
-        """Whether to separate cuts: they pay where vehicles are many, and discounted labels have no duals of cuts."""
+        """Whether to separate cuts: worthwhile with many vehicles; labels with survival < 1 carry no duals of cuts."""
         survival = self.generation.survival
         return len(survival) >= CUTTING and bool((survival == 1.0).all())
 
     def _enumerate(self, state: BranchState, made: Generated) -> float | None:
-        """Choose among all routes that count, if they are few; an upper bound on the node then."""
+        """Solve the node over all routes that can be in a better plan, if few: its upper bound, else ``None``."""
         entries, penalty = self.generation.enumerate(state, made), self.generation.penalty
         if entries is None:
             return None
@@ -155,35 +155,35 @@ class BranchAndPrice:
         """
         free = [list(c.vehicles) for c in self.generation.classes]
         plan: list[tuple[int, ...]] = [()] * len(self.generation.instance.vehicles)
-        parted: set[int] = set()
+        split: set[int] = set()
         for number, column, share in sorted(used, key=lambda entry: -entry[1].value):
             times = round(share)
             if abs(share - times) > 1e-6:
-                times = int(number not in parted)
-                parted.add(number)
+                times = int(number not in split)
+                split.add(number)
             for _ in range(times):
-                order = tuple(j for j in column.route if self.generation.graphs[column.kind].bit[j] >= 0)
-                plan[free[column.kind].pop(0)] = order
+                order = tuple(j for j in column.route if self.generation.graphs[column.vehicle_class].bit[j] >= 0)
+                plan[free[column.vehicle_class].pop(0)] = order
         self.offer(tuple(plan))
 
     def _dive(self, state: BranchState, centre: Duals | None) -> None:
-        """Diving: fix the column of largest share and price again without its POIs, until a plan is complete."""
+        """Diving heuristic: fix the column of largest value and price again without its POIs, until none is left."""
         fixed: list[tuple[int, Column, float]] = []
-        units = list(state.units)
+        groups = list(state.groups)
         while True:
-            state = BranchState(units=tuple(units))
+            state = BranchState(groups=tuple(groups))
             master = self.generation.master(state, centre)
             for _ in range(50):
                 solved = master.solve(math.inf)
-                if solved.values is None or self.generation.out():
+                if solved.values is None or self.generation.is_over():
                     return
                 duals = master.duals(solved)
                 added = 0
-                for number, unit in enumerate(units):
-                    if unit.count:
-                        threshold = float(duals.unit[number]) + self.generation.tolerance
-                        priced = self.generation.price(unit, duals, threshold, exact=False)
-                        added += self.generation.add(master, number, unit, priced)
+                for number, group in enumerate(groups):
+                    if group.count:
+                        threshold = float(duals.group[number]) + self.generation.tolerance
+                        priced = self.generation.price(group, duals, threshold, exact=False)
+                        added += self.generation.add(master, number, group, priced)
                 if not added:
                     break
             assert solved.values is not None
@@ -192,26 +192,29 @@ class BranchAndPrice:
                 break
             number, column, _ = max(used, key=lambda entry: entry[2])
             fixed.append((number, column, 1.0))
-            gone = frozenset(j for j in self.generation.instance.pois if column.visits[j])
-            units[number] = replace(units[number], count=units[number].count - 1)
-            units = [replace(u, forbidden=u.forbidden | gone) for u in units]
+            visited = frozenset(j for j in self.generation.instance.pois if column.visits[j])
+            groups[number] = replace(groups[number], count=groups[number].count - 1)
+            groups = [replace(u, forbidden=u.forbidden | visited) for u in groups]
         self._offer_columns(fixed)
 
     def _undecided(
         self, state: BranchState, used: Sequence[tuple[int, Column, float]],
     ) -> list[tuple[float, int, int]]:
-        """Fractional visits of a relaxation: distance from a half, POI, and unit, or -1: visited at all?."""
-        each = np.zeros((len(state.units), len(self.generation.instance.sites)))
+        """Fractional visits of a relaxation, most fractional first: distance from 1/2, POI, and vehicle group or -1.
+
+        A group is given where the POI is visited for sure, but it is open by which group.
+        """
+        each = np.zeros((len(state.groups), len(self.generation.instance.sites)))
         for number, column, share in used:
             each[number] += share * column.visits
         total = each.sum(axis=0)
         found = [(abs(total[j] - 0.5), j, -1) for j in self.generation.rows
                  if j not in state.required and 1e-6 < total[j] < 1 - 1e-6]
         if not found:
-            found = [(abs(each[u, j] - 0.5), j, u) for u in range(len(state.units)) for j in self.generation.rows
+            found = [(abs(each[u, j] - 0.5), j, u) for u in range(len(state.groups)) for j in self.generation.rows
                      if 1e-6 < each[u, j] < 1 - 1e-6]
-        if not found:  # identical vehicles on integral visits: single out one of them
-            found = [(1.0, j, u) for u, unit in enumerate(state.units) if unit.count > 1
+        if not found:  # integral visits by a group of several vehicles: branch on one vehicle of it
+            found = [(1.0, j, u) for u, group in enumerate(state.groups) if group.count > 1
                      for j in self.generation.rows if each[u, j] > 1e-6][:1]
         return sorted(found)
 
@@ -219,7 +222,7 @@ class BranchAndPrice:
         self, state: BranchState, solved: Relaxed, candidates: Sequence[tuple[float, int, int]], bound: float,
         duals: Duals | None,
     ) -> list[_Node]:
-        """The two branches of a decision: whether a POI is visited, or whether a unit visits it."""
+        """Two children, by strong branching: on whether a POI is visited, or whether a vehicle group visits it."""
         if not candidates:
             raise RuntimeError("a fractional solution without a fractional visit")
         best, chosen = -math.inf, self._children(state, *candidates[0][1:])
@@ -235,24 +238,24 @@ class BranchAndPrice:
 
     def _children(self, state: BranchState, poi: int, number: int) -> tuple[BranchState, BranchState]:
         if number < 0:
-            nobody = replace(state, units=tuple(without(u, poi) for u in state.units))
-            return nobody, replace(state, required=state.required | {poi})
-        unit = state.units[number]
-        others = [without(u, poi) for u in state.units]
-        if unit.count > 1:
-            others[number] = replace(others[number], count=unit.count - 1)
-            others.append(replace(unit, count=1))
+            unvisited = replace(state, groups=tuple(without(u, poi) for u in state.groups))
+            return unvisited, replace(state, required=state.required | {poi})
+        group = state.groups[number]
+        others = [without(u, poi) for u in state.groups]
+        if group.count > 1:
+            others[number] = replace(others[number], count=group.count - 1)
+            others.append(replace(group, count=1))
         else:
-            others[number] = unit
-        barred = [without(u, poi) if k == number else u for k, u in enumerate(state.units)]
-        return (replace(state, units=tuple(barred)),
-                replace(state, units=tuple(others), required=state.required | {poi}))
+            others[number] = group
+        barred = [without(u, poi) if k == number else u for k, u in enumerate(state.groups)]
+        return (replace(state, groups=tuple(barred)),
+                replace(state, groups=tuple(others), required=state.required | {poi}))
 
 
 def _fitted(duals: Duals, state: BranchState, child: BranchState) -> Duals:
-    """Duals for a child, which may have one more unit."""
-    unit = duals.unit
-    if len(child.units) > len(state.units):
-        number = next(k for k, (a, b) in enumerate(zip(state.units, child.units, strict=False)) if a.count != b.count)
-        unit = np.append(unit, unit[number])
-    return replace(duals, unit=unit)
+    """A node's duals for a child, which may have one more vehicle group."""
+    group = duals.group
+    if len(child.groups) > len(state.groups):
+        number = next(k for k, (a, b) in enumerate(zip(state.groups, child.groups, strict=False)) if a.count != b.count)
+        group = np.append(group, group[number])
+    return replace(duals, group=group)

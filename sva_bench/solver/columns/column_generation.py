@@ -1,4 +1,4 @@
-"""Columns for the master program, as they are needed: duals from the program, routes from labels, and the same again.
+"""Column generation: duals from the master program, routes from pricing, until no route has positive reduced value.
 
 Source:
     Roberti, Mingozzi (2014), "Dynamic ng-path relaxation for the delivery man problem"; Pessoa et al. (2018),
@@ -20,7 +20,7 @@ from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.columns.enumeration import routes_above
 from sva_bench.solver.columns.graph import NG_MOST, Graph, allowed, graph_of, neighbours
-from sva_bench.solver.columns.master import BranchState, Column, Duals, Master, Unit, VehicleClass
+from sva_bench.solver.columns.master import BranchState, Column, Duals, Master, VehicleClass, VehicleGroup
 from sva_bench.solver.columns.pricing import Priced
 from sva_bench.solver.columns.pricing import price as best_routes
 from sva_bench.solver.columns.subset_row import Counter, SubsetRow, cut_duals_of, separate
@@ -30,26 +30,26 @@ from sva_bench.solver.preprocess import Scope
 
 _log = logging.getLogger(__name__)
 
-ROUTES_A_ROUND = 40  # columns of one unit and pricing
+ROUTES_A_ROUND = 40  # columns of one vehicle group and pricing run
 MOST_LABELS = 4_000_000
-_SMOOTHING = 0.5  # share of the best duals so far
+_SMOOTHING = 0.5  # weight of the stability centre, the duals of the best bound so far
 _EPSILON = 1e-7
-ENUMERATED = 0.03  # gap from which routes may be few enough to list them all
-RETRIED = 0.7  # of the last gap that left too many
+ENUMERATED = 0.03  # relative gap below which routes may be few enough to enumerate
+RETRIED = 0.7  # share of the gap that last left too many, below which enumeration is tried again
 MOST_ENUMERATED = 6000
-_POOL = 4000  # columns that a new node begins with at most
+_POOL = 4000  # most columns that a node's master program begins with
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Generated:
-    """What column generation came to.
+    """The result of column generation at a node.
 
     Attributes:
         relaxed: The last relaxation.
         bound: Upper bound on the node.
-        duals: The duals that give it, if any were tried.
-        most: With them the greatest reduced value of each unit's routes, shape (units,).
-        complete: Whether no column is missing that counts.
+        duals: The duals that give the bound; ``None`` if none were priced exactly.
+        most: Greatest reduced value of each vehicle group's routes at these duals, shape (groups,).
+        complete: Whether the bound is proved: neither time nor labels ran out.
     """
 
     relaxed: Relaxed
@@ -61,22 +61,22 @@ class Generated:
 
 @dataclass(eq=False, kw_only=True)
 class ColumnGeneration:
-    """Routes found so far, and what is known to find more.
+    """The pool of columns, and all that pricing needs to generate more.
 
     Attributes:
         instance: The instance.
         goal: What to maximise.
-        scopes: What each vehicle may do.
+        scopes: Legs and bounds of each vehicle.
         survival: Chance of each vehicle to get to its next POI, shape (M,).
         cutoff: Bound at or below which a node holds no better plan.
-        out: Whether to stop.
+        is_over: Whether time is up.
         left_s: Time left [s].
         classes: The vehicle classes.
-        graphs: What each class may drive.
-        penalty: What it costs to miss a required visit, or a floor by its size, unless a node wants more.
-        calls: Pricing runs and labels.
+        graphs: The pricing graph of each class.
+        penalty: Cost of violating a required visit, or a floor by its size; nodes may raise it.
+        calls: Number of heuristic and exact pricing runs, and of labels.
         rows: POIs that can be visited.
-        memory: POIs that each site remembers (ng-sets), bit by bit, for each class, shape (n, words).
+        memory: ng-sets of each class: the POIs that each site remembers, as bits, shape (n, words).
         pool: The routes, by class and sites.
         cuts: Subset-row cuts.
     """
@@ -86,7 +86,7 @@ class ColumnGeneration:
     scopes: Sequence[Scope]
     survival: FloatArray
     cutoff: Callable[[], float]
-    out: Callable[[], bool]
+    is_over: Callable[[], bool]
     left_s: Callable[[], float]
     classes: list[VehicleClass] = field(init=False, default_factory=list)
     graphs: list[Graph] = field(init=False, default_factory=list)
@@ -109,11 +109,11 @@ class ColumnGeneration:
             else:
                 self.classes.append(own)
                 self.graphs.append(graph)
-        # Without the triangle inequality a stop without reward can be of use; the legs tell.
+        # Without the triangle inequality a stop without reward can shorten a route; the legs of the scopes allow it.
         self.rows = tuple(j for j in self._pois if any(graph.legs[j].any() for graph in self.graphs))
         self.memory = [neighbours(graph, self._pois) for graph in self.graphs]
         self.pool: dict[tuple[int, tuple[int, ...]], Column] = {}
-        self._single = [k for k, c in enumerate(self.classes) if len(c.vehicles) == 1]
+        self._single_vehicle = [k for k, c in enumerate(self.classes) if len(c.vehicles) == 1]
         self._too_many = math.inf
         self.cuts: tuple[SubsetRow, ...] = ()
         self._counter = Counter((), n)
@@ -123,7 +123,7 @@ class ColumnGeneration:
         longest = sum(graph.limit_s for graph in self.graphs)
         self.penalty = 10.0 * (float(rates.max(axis=0, initial=0.0).sum()) + self.goal.driving * longest) or 1.0
         self._sizes = sizes_of(self.goal.floors)
-        if self.goal.risk is not None:  # columns of its own stand in all rows
+        if self.goal.risk is not None:  # its columns have entries in several floors' rows: one scale for all
             self._sizes[:] = self._sizes.max(initial=0.0)
 
     @property
@@ -132,16 +132,23 @@ class ColumnGeneration:
         return self.calls["heuristic"] + self.calls["exact"]
 
     def add_route(self, vehicle: int, route: tuple[int, ...]) -> None:
-        """Offer a route of a vehicle as a column."""
+        """Add a route of a vehicle to the pool."""
         if len(route) > 2:
-            kind = next(k for k, c in enumerate(self.classes) if vehicle in c.vehicles)
-            self._column(kind, route)
+            vehicle_class = next(k for k, c in enumerate(self.classes) if vehicle in c.vehicles)
+            self._column(vehicle_class, route)
 
     def master(
         self, state: BranchState, duals: Duals | None, entries: Sequence[Sequence[Column]] | None = None,
         penalty: float | None = None,
     ) -> Master:
-        """The program at a node, with columns that are good at given duals, or with given columns of each unit."""
+        """The master program of a node.
+
+        Args:
+            state: The branching decisions.
+            duals: Duals by whose reduced values the pool's best columns are chosen; ``None`` = all columns.
+            entries: Columns of each vehicle group, in place of the pool's.
+            penalty: Cost of violating a requirement; ``None`` = that of ``self``.
+        """
         master = Master(state=state, pois=self.rows, n=self._n, floors=self._floors, sizes=self._sizes,
                         cuts=len(self.cuts), counted=self._counted, penalty=penalty or self.penalty,
                         risk=self.goal.risk)
@@ -153,25 +160,25 @@ class ColumnGeneration:
         if len(columns) > _POOL and duals is not None:
             gain = np.array([self._reduced(c, self._padded(duals)) for c in columns])
             columns = [columns[k] for k in np.sort(np.argsort(-gain, kind="stable")[:_POOL])]
-        for number, unit in enumerate(state.units):
-            master.add(number, [c for c in columns if c.fits(unit)])
+        for number, group in enumerate(state.groups):
+            master.add(number, [c for c in columns if c.fits(group)])
         return master
 
     def generate(
         self, master: Master, state: BranchState, centre: Duals | None, *, known: float, slack: float,
-        tell: Callable[[float], None] | None = None,
+        report_bound: Callable[[float], None] | None = None,
     ) -> Generated:
-        """Add columns until the relaxation is as good as solved.
+        """Add columns until the relaxation is within ``slack`` of its bound, with dual smoothing.
 
         Args:
             master: The program.
-            state: Its decisions.
-            centre: Duals to begin near.
+            state: Its branching decisions.
+            centre: Stability centre to begin with; ``None`` = none.
             known: Upper bound on the node.
-            slack: Share of the gap within which the relaxation may stay of its bound.
-            tell: Takes every bound.
+            slack: Distance from relaxation to bound at which it counts as solved, as a share of the gap.
+            report_bound: Takes every improved bound.
         """
-        best, limits = math.inf, np.zeros(len(state.units))
+        best, limits = math.inf, np.zeros(len(state.groups))
         centre = None if centre is None else self._padded(centre)
         smooth = _SMOOTHING if centre is not None and slack > 0 else 0.0
         quick = True
@@ -179,29 +186,30 @@ class ColumnGeneration:
             solved = master.solve(math.inf)
             if solved.values is None:
                 raise RuntimeError(f"the master program is {solved.status}")
-            if self.out():
+            if self.is_over():
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
             duals = master.duals(solved)
             if quick:
-                added = sum(self.add(master, number, unit, self.price(
-                    unit, duals, max(float(duals.unit[number]), 0.0) + self.tolerance, exact=False))
-                    for number, unit in enumerate(state.units))
+                added = sum(self.add(master, number, group, self.price(
+                    group, duals, max(float(duals.group[number]), 0.0) + self.tolerance, exact=False))
+                    for number, group in enumerate(state.groups))
                 if added:
                     continue
-            at = duals if centre is None or smooth == 0.0 else duals.between(centre, smooth)
-            most, added, complete = self._price_exactly(master, state, at, duals, min(best, known) - solved.objective)
+            trial = duals if centre is None or smooth == 0.0 else duals.between(centre, smooth)
+            most, added, complete = self._price_exactly(
+                master, state, trial, duals, min(best, known) - solved.objective)
             if not complete:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
-            bound = master.bound(at, most)
+            bound = master.bound(trial, most)
             if bound < best or centre is None:
-                best, centre, limits = min(bound, best), at, most
-                if tell:
-                    tell(max(best, self.cutoff()))
+                best, centre, limits = min(bound, best), trial, most
+                if report_bound:
+                    report_bound(max(best, self.cutoff()))
             room = slack * (best - self.cutoff()) + 1e-9 * max(self._most, abs(best))
             if min(best, known) <= self.cutoff() or best <= solved.objective + room:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
             if not added:
-                if at is duals:
+                if trial is duals:
                     return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
                 smooth = smooth / 2 if smooth > 0.1 else 0.0
                 quick = False
@@ -209,81 +217,84 @@ class ColumnGeneration:
                 smooth, quick = _SMOOTHING, True
 
     def _price_exactly(
-        self, master: Master, state: BranchState, at: Duals, duals: Duals, width: float,
+        self, master: Master, state: BranchState, trial: Duals, duals: Duals, width: float,
     ) -> tuple[FloatArray, int, bool]:
         """Add the columns that exact pricing finds.
 
         Args:
             master: The program.
-            state: Its decisions.
-            at: Duals to price at.
-            duals: The program's own, at which columns must improve it.
-            width: How far below the best routes are looked for: they can be of use at the program's own duals.
+            state: Its branching decisions.
+            trial: Duals to price at.
+            duals: The program's own duals, at which columns must have positive reduced value.
+            width: Routes worth less than the best by up to so much are returned too: they may improve the program.
 
         Returns:
-            Greatest reduced value of each unit's routes, shape (units,); number of columns added; whether it is proved.
+            Greatest reduced value of each group's routes, shape (groups,); columns added; whether the former is proved.
         """
-        most, added, complete = master.most(at), 0, True
-        for number, unit in enumerate(state.units):
+        most, added, complete = master.most(trial), 0, True
+        for number, group in enumerate(state.groups):
             threshold = max(most[number] - (width if math.isfinite(width) else 0.0), 0.0)
-            priced = self.price(unit, at, threshold + self.tolerance, exact=True)
+            priced = self.price(group, trial, threshold + self.tolerance, exact=True)
             complete &= priced.complete
             most[number] = max(priced.best, most[number])
-            routes = [self._column(unit.kind, route) for route in priced.routes]
+            routes = [self._column(group.vehicle_class, route) for route in priced.routes]
             added += master.add(number, [c for c in routes if self._reduced(c, duals)
-                                         > max(duals.unit[number], 0.0) + self.tolerance])
+                                         > max(duals.group[number], 0.0) + self.tolerance])
         return most, added, complete
 
-    def _reward(self, unit: Unit, duals: Duals) -> FloatArray:
-        """Reward of each site for a unit, shape (n,); ``-inf`` = not to be visited."""
-        own = self.classes[unit.kind]
+    def _reward(self, group: VehicleGroup, duals: Duals) -> FloatArray:
+        """Reward of each site for a vehicle group, floors' duals included, shape (n,); ``-inf`` = forbidden."""
+        own = self.classes[group.vehicle_class]
         reward = own.weights - duals.floor @ own.floors if len(self._floors) else own.weights.copy()
         reward = np.array(reward, dtype=np.float64)
-        if unit.forbidden:
-            reward[list(unit.forbidden)] = -np.inf
+        if group.forbidden:
+            reward[list(group.forbidden)] = -np.inf
         return reward
 
-    def price(self, unit: Unit, duals: Duals, threshold: float, *, exact: bool) -> Priced:
-        """Routes of a unit worth more than a threshold."""
-        graph, reward = self.graphs[unit.kind], self._reward(unit, duals)
+    def price(self, group: VehicleGroup, duals: Duals, threshold: float, *, exact: bool) -> Priced:
+        """Routes of a vehicle group of reduced value above a threshold."""
+        graph, reward = self.graphs[group.vehicle_class], self._reward(group, duals)
         self.calls["exact" if exact else "heuristic"] += 1
-        cut_duals = cut_duals_of(self.cuts, duals.cut, unit.kind, self._n)
+        cut_duals = cut_duals_of(self.cuts, duals.cut, group.vehicle_class, self._n)
         with deferring_ctrl_c():
             priced = best_routes(
-                graph, reward, duals.visit, self.goal.driving, self.memory[unit.kind], threshold=threshold,
+                graph, reward, duals.visit, self.goal.driving, self.memory[group.vehicle_class], threshold=threshold,
                 exact=exact, most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS, cut_duals=cut_duals,
                 left_s=self.left_s())
         self.calls["labels"] += priced.labels
         return priced
 
     def enumerate(self, state: BranchState, made: Generated) -> list[list[Column]] | None:
-        """All columns of each unit that a plan above the cutoff can use; ``None`` if too many are possible."""
+        """All columns of each vehicle group that a plan above the cutoff can use; ``None`` if they are too many."""
         room = made.bound - self.cutoff()
         if made.duals is None or room > min(ENUMERATED * abs(self.cutoff()), RETRIED * self._too_many) \
                 or not bool((self.survival == 1.0).all()):
             return None
         found: list[tuple[tuple[int, ...], ...]] = []
-        for number, unit in enumerate(state.units):
+        for number, group in enumerate(state.groups):
             with deferring_ctrl_c():
                 routes = routes_above(
-                    self.graphs[unit.kind], self._reward(unit, made.duals), made.duals.visit, self.goal.driving,
-                    cut_duals_of(self.cuts, made.duals.cut, unit.kind, self._n),
+                    self.graphs[group.vehicle_class], self._reward(group, made.duals), made.duals.visit,
+                    self.goal.driving,
+                    cut_duals_of(self.cuts, made.duals.cut, group.vehicle_class, self._n),
                     best=float(made.most[number]), loss=room + self.tolerance, left_s=self.left_s())
-            _log.debug("unit %d: %s routes within %.6g", number, routes and len(routes), room)
+            _log.debug("group %d: %s routes within %.6g", number, routes and len(routes), room)
             if routes is None or len(routes) + sum(map(len, found)) > MOST_ENUMERATED:
                 self._too_many = room
                 return None
             found.append(routes)
-        return [[self._column(unit.kind, route) for route in routes]
-                for unit, routes in zip(state.units, found, strict=True)]
+        return [[self._column(group.vehicle_class, route) for route in routes]
+                for group, routes in zip(state.groups, found, strict=True)]
 
-    def add(self, master: Master, number: int, unit: Unit, priced: Priced) -> int:
-        return master.add(number, [self._column(unit.kind, route) for route in priced.routes])
+    def add(self, master: Master, number: int, group: VehicleGroup, priced: Priced) -> int:
+        """Add priced routes to the columns of a vehicle group; how many are new."""
+        return master.add(number, [self._column(group.vehicle_class, route) for route in priced.routes])
 
-    def _column(self, kind: int, route: tuple[int, ...]) -> Column:
-        key = (kind, route)
+    def _column(self, vehicle_class: int, route: tuple[int, ...]) -> Column:
+        """The column of a class's route, made once."""
+        key = (vehicle_class, route)
         if key not in self.pool:
-            own, graph = self.classes[kind], self.graphs[kind]
+            own, graph = self.classes[vehicle_class], self.graphs[vehicle_class]
             visits, value, chance = np.zeros(self._n), 0.0, 1.0
             floors = np.zeros(len(self._floors))
             for i, j in itertools.pairwise(route):
@@ -293,44 +304,50 @@ class ColumnGeneration:
                     value += chance * own.weights[j]
                     visits[j] += 1
                     floors += own.floors[:, j]
-            self.pool[key] = Column(kind=kind, route=route, visits=visits, value=float(value), floors=floors)
+            self.pool[key] = Column(vehicle_class=vehicle_class, route=route, visits=visits, value=float(value),
+                                    floors=floors)
         return self.pool[key]
 
     def _reduced(self, column: Column, duals: Duals) -> float:
-        """Reduced value of a route: its value less the duals of its visits."""
+        """Reduced value of a column: its value less the duals of its visits, floors and cuts."""
         return column.value - float(duals.visit @ column.visits) - float(duals.floor @ column.floors) \
             - (float(duals.cut @ self._counted(column)) if self.cuts else 0.0)
 
     def _counted(self, column: Column) -> FloatArray:
-        """How often each cut counts a route, shape (cuts,)."""
-        key = (column.kind, column.route)
+        """Coefficient of each cut for a column, shape (cuts,)."""
+        key = (column.vehicle_class, column.route)
         if key not in self._counts:
             with deferring_ctrl_c():
                 self._counts[key] = self._counter.of(*key)
         return self._counts[key]
 
     def cut(self, used: Sequence[tuple[int, Column, float]]) -> bool:
-        """Add or widen the cuts that a solution violates; whether there are any."""
-        cuts = separate(used, self.cuts, self._single, self.rows)
+        """Separate subset-row cuts at a solution, and widen the memory of present ones; whether any changed."""
+        cuts = separate(used, self.cuts, self._single_vehicle, self.rows)
         changed = cuts != self.cuts
         if changed:
             self.cuts, self._counts, self._counter = cuts, {}, Counter(cuts, self._n)
         return changed
 
     def _padded(self, duals: Duals) -> Duals:
-        """Duals from before the latest cuts."""
+        """Duals from before the latest cuts, with duals 0 for those."""
         return replace(duals, cut=np.pad(duals.cut, (0, len(self.cuts) - len(duals.cut))))
 
     @property
     def tolerance(self) -> float:
-        """By how much a route's reduced value must exceed its unit's dual to count as new."""
-        return _EPSILON * (self._most or 1.0)  # else seconds are all that counts
+        """By how much a route's reduced value must exceed its group's dual to enter the program."""
+        return _EPSILON * (self._most or 1.0)  # without rewards, values are seconds of driving
 
     def remember(self, used: Sequence[Column], *, ignore_most: bool) -> bool:
-        """Make sites remember the POIs that routes in use visit again, and drop routes that forget; whether any did."""
+        """Extend ng-sets by the cycles of columns in use, and drop columns they no longer allow; whether any changed.
+
+        Args:
+            used: Columns of a solution.
+            ignore_most: Whether ng-sets may exceed ``NG_MOST``.
+        """
         changed = False
         for column in used:
-            graph, memory = self.graphs[column.kind], self.memory[column.kind]
+            graph, memory = self.graphs[column.vehicle_class], self.memory[column.vehicle_class]
             last: dict[int, int] = {}
             for position, j in enumerate(column.route):
                 if graph.bit[j] < 0:
@@ -347,9 +364,9 @@ class ColumnGeneration:
                 last[j] = position
         if changed:
             self.pool = {key: c for key, c in self.pool.items()
-                         if c.visits.max() <= 1 or allowed(c.route, self.graphs[c.kind], self.memory[c.kind])}
+                         if c.visits.max() <= 1
+                         or allowed(c.route, self.graphs[c.vehicle_class], self.memory[c.vehicle_class])}
         return changed
-
 
 
 def _identical(one: VehicleClass, other: VehicleClass, graph: Graph, other_graph: Graph) -> bool:

@@ -1,4 +1,4 @@
-"""What a vehicle may drive, as pricing reads it, and which POIs each site remembers (ng-sets)."""
+"""The graph that pricing works on, and its ng-sets: the POIs that each site remembers."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from sva_bench.mission.instance import Instance
 from sva_bench.solver.preprocess import SLACK_S, Scope, is_metric
 
 NG_START, NG_MOST = 7, 14  # POIs that a site remembers at first, and at most
-_WITHIN = 0.9  # of the tolerance: sums in another order must not make a route infeasible
+_WITHIN = 0.9  # share of the feasibility tolerance used here: sums in another order differ by rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Graph:
-    """What a vehicle may drive, as pricing reads it.
+    """The graph of one vehicle, for pricing.
 
     Attributes:
         base: The base.
@@ -29,8 +29,8 @@ class Graph:
         fuel_s: Fuel of a leg [s], shape (n, n).
         capacity_s: Fuel capacity, tolerance included [s].
         limit_s: Mission limit, tolerance included [s]; finite.
-        survival: Chance to get to the next POI.
-        symmetric: Whether every leg costs the same both ways and the order of visits is indifferent.
+        survival: Probability to get to the next POI.
+        symmetric: Whether costs are symmetric and rewards independent of the order of visits.
         metric: Whether no detour is quicker, or burns less, than a direct leg.
     """
 
@@ -47,7 +47,13 @@ class Graph:
 
 
 def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
-    """What a vehicle may drive, for pricing."""
+    """The pricing graph of a vehicle.
+
+    Args:
+        instance: The instance.
+        scope: The vehicle's legs and bounds.
+        survival: Its probability to get to the next POI.
+    """
     n = len(instance.sites)
     bit = np.full(n, -1, dtype=np.int64)
     bit[list(instance.pois)] = np.arange(len(instance.pois))
@@ -56,7 +62,7 @@ def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
     drive = scope.time_s - instance.stop_s[None, :]
     time = drive + (instance.stop_s[:, None] + instance.stop_s[None, :]) / 2
     legs = scope.legs
-    # Without a limit no route worth driving takes longer: from a POI to the next by all stations at most.
+    # Without a mission limit this is an upper bound on a route: each POI once, all stations between any two.
     limit = scope.limit_s if math.isfinite(scope.limit_s) else \
         float(time[legs].max(initial=0.0)) * (len(instance.pois) + 1) * (len(instance.stations) + 1)
     symmetric = survival == 1.0 and np.array_equal(legs, legs.T) and np.array_equal(time[legs], time.T[legs]) \
@@ -68,7 +74,12 @@ def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
 
 
 def neighbours(graph: Graph, pois: Sequence[int]) -> NDArray[np.uint64]:
-    """First ng-sets: the nearest POIs of each site, shape (n, words), uint64."""
+    """Initial ng-sets: the nearest POIs of each site as bits, shape (n, words).
+
+    Source:
+        Baldacci, Mingozzi, Roberti (2011), "New route relaxation and pricing strategies for the vehicle routing
+        problem".
+    """
     n, words = len(graph.bit), max(1, -(-len(pois) // 64))
     memory = np.zeros((n, words), dtype=np.uint64)
     far = np.where(graph.legs, graph.time_s, np.inf)
@@ -81,7 +92,7 @@ def neighbours(graph: Graph, pois: Sequence[int]) -> NDArray[np.uint64]:
 
 
 def allowed(route: tuple[int, ...], graph: Graph, memory: NDArray[np.uint64]) -> bool:
-    """Whether the ng-sets allow a route."""
+    """Whether a route is an ng-route: it visits no POI again that its sites still remember."""
     mask = 0
     for j in route[1:-1]:
         b = int(graph.bit[j])

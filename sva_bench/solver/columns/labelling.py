@@ -5,8 +5,8 @@ that its site remembers (its ng-set). Labels grow up to half the mission limit f
 the leg that crosses the middle. A label is dominated by another one at its site that is nowhere worse. A label that
 can't exceed a threshold even with the completion bound is dropped, so a run without results proves that no route does.
 
-Under failure along the route a label also carries the chance to get so far; labels from the end carry what the rest
-is worth, if reached for sure, and what it costs.
+Under failure along the route a forward label also carries the probability to get so far; a backward label carries what
+the rest of the route is worth if its first site is reached, and its duals.
 
 Source:
     Baldacci, Mingozzi, Roberti (2011), "New route relaxation and pricing strategies for the vehicle routing problem";
@@ -22,7 +22,7 @@ from sva_bench.solver.polling import POLL_EVERY, now_s, poll
 
 CHUNK = 32  # labels of a site that are tested for dominance together
 KEYS = 5  # POIs by which a site's labels are grouped: only those with a subset of a label's can dominate it
-BUCKETS = 256  # of time, by which labels are treated in order
+BUCKETS = 256  # of time, in whose order labels are extended
 _EPSILON = 1e-9
 
 
@@ -30,7 +30,7 @@ _EPSILON = 1e-9
 def completion(legs, time, gain, charge, bit, base, step, steps, stop):
     """Upper bound on what a path from a site to the base can add within a number of time steps, shape (steps + 1, n).
 
-    Paths may repeat sites but not turn straight back to a POI, and fuel is ignored; a leg's steps are rounded down.
+    Paths may repeat sites, but have no 2-cycles of POIs; fuel is ignored; a leg's time steps are rounded down.
     """
     n = len(gain)
     best, second = np.full((steps + 1, n), -np.inf), np.full((steps + 1, n), -np.inf)
@@ -49,7 +49,7 @@ def completion(legs, time, gain, charge, bit, base, step, steps, stop):
                     continue
                 value = -charge * time[i, j]
                 if j != base:
-                    # Out of j to somewhere else than back to i, if i is a POI.
+                    # No 2-cycle: out of j to a site other than i, if i is a POI.
                     back = bit[i] >= 0 and by[left, j] == i
                     value += gain[j] + (second[left, j] if back else best[left, j])
                 if value > best[t, i]:
@@ -61,17 +61,18 @@ def completion(legs, time, gain, charge, bit, base, step, steps, stop):
 
 
 @njit(cache=True)
-def grow(following, count, time, fuel, bit, memory, reward, dual, charge, survival, base, half, capacity, limit, bound,
-         step, threshold, exact, forwards, most, touch, recall, once, cut_dual, stop, left_s):
-    """All labels from one end up to half the limit that aren't dominated.
+def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charge, survival, base, half, capacity,
+                  limit, bound, step, threshold, exact, forwards, most, in_cut, in_memory, at_first_visit, cut_dual,
+                  stop, left_s):
+    """All nondominated labels from one end of the route up to half the limit.
 
     Long because compiled: its arrays grow, and each part would need nearly all of them.
 
     Returns:
-        Site, time, fuel, value, second value, memory, cuts ahead, parent, and labels by site, each site's by
-        decreasing value: first a table of where a site's begin. Then whether there were too many, or no time was left
-        for more. The second value is the chance to get so far forwards; backwards minus the duals of the visits, which
-        is what the rest is worth if never reached.
+        Site, time, fuel, value, second value, memory, state of the cuts, parent, and labels by site, each site's by
+        decreasing value: first the index at which each site's begin. Then whether labels or time ran out. The second
+        value is, forwards, the probability to get so far; backwards, minus the duals of the visits, which is what the
+        rest is worth if never reached.
     """
     n, words = memory.shape
     room = 4096
@@ -79,22 +80,22 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
     t, q = np.zeros(room), np.zeros(room)
     x, y = np.zeros(room), np.zeros(room)
     mask = np.zeros((room, words), np.uint64)
-    due = np.zeros(room, np.uint64)  # cuts whose dual its next visit to one of their POIs costs
+    cut_state = np.zeros(room, np.uint64)  # cuts whose dual is subtracted at the next visit to one of their POIs
     kept = np.zeros(room, np.bool_)
-    site[0], y[0], due[0], size = base, 1.0 if forwards else 0.0, once, 1
+    site[0], y[0], cut_state[0], size = base, 1.0 if forwards else 0.0, at_first_visit, 1
     has_cuts = len(cut_dual) > 0
     width = half / BUCKETS
     head = np.full(BUCKETS + 1, -1, np.int64)
     head[0] = 0
-    # Labels that aren't dominated, in chunks by site and key, the latest chunk first.
+    # Nondominated labels, in chunks by site and key, the latest chunk first.
     chunks = 256
     chunk_of, chunk_next, chunk_size = np.full((n, 1 << KEYS), -1, np.int64), np.full(chunks, -1, np.int64), \
         np.zeros(chunks, np.int64)
     keys = _keys(bit, memory, time)
     c_t, c_q = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
     c_x, c_y = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
-    c_mask, c_due = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
-    c_least, c_most = np.zeros(chunks), np.zeros(chunks)
+    c_mask, c_cut_state = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
+    c_least_fuel, c_most_value = np.zeros(chunks), np.zeros(chunks)
     used, overflow = 0, False
     polled, end_s = 0, now_s() + left_s
     bounded = len(bound) > 0
@@ -119,39 +120,39 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                     overflow = True
                     break
                 i = site[label]
-                # Does a label dominate it?
-                beaten = False
+                # Dominance, against the labels whose key is a subset of this one's.
+                dominated = False
                 key = 0
                 if exact:
                     for k in range(KEYS):
                         b = keys[i, k]
                         if b >= 0 and mask[label, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
                             key |= 1 << k
-                some = key
-                while not beaten:
-                    chunk = chunk_of[i, some]
-                    while chunk >= 0 and not beaten:
-                        if c_most[chunk] >= x[label] - _EPSILON and c_least[chunk] <= q[label] + _EPSILON:
+                subset = key
+                while not dominated:
+                    chunk = chunk_of[i, subset]
+                    while chunk >= 0 and not dominated:
+                        if c_most_value[chunk] >= x[label] - _EPSILON and c_least_fuel[chunk] <= q[label] + _EPSILON:
                             for k in range(chunk_size[chunk]):
                                 if c_x[chunk, k] >= x[label] - _EPSILON and c_q[chunk, k] <= q[label] + _EPSILON \
                                         and c_t[chunk, k] <= t[label] + _EPSILON \
                                         and c_y[chunk, k] >= y[label] - _EPSILON:
-                                    beaten = True
+                                    dominated = True
                                     if exact:
                                         for w in range(words):
                                             if c_mask[chunk, k, w] & ~mask[label, w]:
-                                                beaten = False
+                                                dominated = False
                                                 break
-                                        if beaten and has_cuts:
-                                            more = sum_of(cut_dual, c_due[chunk, k] & ~due[label])
-                                            beaten = c_x[chunk, k] - more >= x[label] - _EPSILON
-                                    if beaten:
+                                        if dominated and has_cuts:
+                                            more = sum_of(cut_dual, c_cut_state[chunk, k] & ~cut_state[label])
+                                            dominated = c_x[chunk, k] - more >= x[label] - _EPSILON
+                                    if dominated:
                                         break
                         chunk = chunk_next[chunk]
-                    if some == 0:
+                    if subset == 0:
                         break
-                    some = (some - 1) & key  # the next subset
-                if beaten:
+                    subset = (subset - 1) & key  # the next subset
+                if dominated:
                     continue
                 kept[label] = True
                 chunk = chunk_of[i, key]
@@ -163,20 +164,21 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                             _taller(c_y, chunks)
                         larger = np.zeros((chunks, CHUNK, words), np.uint64)
                         larger[:used] = c_mask
-                        c_mask, c_due = larger, _taller(c_due, chunks)
-                        c_least, c_most = _longer(c_least, chunks), _longer(c_most, chunks)
+                        c_mask, c_cut_state = larger, _taller(c_cut_state, chunks)
+                        c_least_fuel, c_most_value = _longer(c_least_fuel, chunks), _longer(c_most_value, chunks)
                     chunk = used
                     used += 1
                     chunk_next[chunk], chunk_of[i, key], chunk_size[chunk] = chunk_of[i, key], chunk, 0
-                    c_least[chunk], c_most[chunk] = np.inf, -np.inf
+                    c_least_fuel[chunk], c_most_value[chunk] = np.inf, -np.inf
                 k = chunk_size[chunk]
                 chunk_size[chunk] += 1
                 c_t[chunk, k], c_q[chunk, k], c_x[chunk, k], c_y[chunk, k] = t[label], q[label], x[label], y[label]
-                c_least[chunk], c_most[chunk] = min(c_least[chunk], q[label]), max(c_most[chunk], x[label])
-                c_due[chunk, k] = due[label]
+                c_least_fuel[chunk] = min(c_least_fuel[chunk], q[label])
+                c_most_value[chunk] = max(c_most_value[chunk], x[label])
+                c_cut_state[chunk, k] = cut_state[label]
                 for w in range(words):
                     c_mask[chunk, k, w] = mask[label, w]
-                # Onward.
+                # Extension to the next sites.
                 for k in range(count[i]):
                     j = following[i, k]
                     if j == base:
@@ -202,10 +204,10 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                             worth = survival * (reward[j] + x[label] - y[label])
                             second = y[label] - dual[j]
                             value = worth + second
-                    ahead = due[label] & recall[j]
-                    if has_cuts and touch[j]:
-                        value -= sum_of(cut_dual, ahead & touch[j])
-                        ahead = (ahead ^ (touch[j] & ~once)) & ~(touch[j] & once)
+                    ahead = cut_state[label] & in_memory[j]
+                    if has_cuts and in_cut[j]:
+                        value -= sum_of(cut_dual, ahead & in_cut[j])
+                        ahead = (ahead ^ (in_cut[j] & ~at_first_visit)) & ~(in_cut[j] & at_first_visit)
                     if bounded and value + bound[int((limit - later) / step + 1e-9), j] <= threshold:
                         continue
                     if size == room:
@@ -215,12 +217,12 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
                         room *= 2
                         site, parent, after = _longer(site, room), _longer(parent, room), _longer(after, room)
                         t, q, x, y = _longer(t, room), _longer(q, room), _longer(x, room), _longer(y, room)
-                        mask, kept, due = _taller(mask, room), _longer(kept, room), _longer(due, room)
+                        mask, kept, cut_state = _taller(mask, room), _longer(kept, room), _longer(cut_state, room)
                     for w in range(words):
                         new[w] = mask[label, w] & memory[j, w]
                     if b >= 0:
                         new[b >> 6] |= np.uint64(1) << np.uint64(b & 63)
-                    site[size], parent[size], kept[size], due[size] = j, label, False, ahead
+                    site[size], parent[size], kept[size], cut_state[size] = j, label, False, ahead
                     t[size], q[size], x[size], y[size] = later, burnt, value, second
                     for w in range(words):
                         mask[size, w] = new[w]
@@ -239,19 +241,19 @@ def grow(following, count, time, fuel, bit, memory, reward, dual, charge, surviv
             begin[site[label] + 1] += 1
     for i in range(n):
         begin[i + 1] += begin[i]
-    standing = np.flatnonzero(kept[:size])
-    by_value = standing[np.argsort(-x[standing])]
-    placed, by_site = begin.copy(), np.zeros(len(standing), np.int64)
+    undominated = np.flatnonzero(kept[:size])
+    by_value = undominated[np.argsort(-x[undominated])]
+    placed, by_site = begin.copy(), np.zeros(len(undominated), np.int64)
     for label in by_value:
         by_site[placed[site[label]]] = label
         placed[site[label]] += 1
-    return site[:size], t[:size], q[:size], x[:size], y[:size], mask[:size], due[:size], parent[:size], \
+    return site[:size], t[:size], q[:size], x[:size], y[:size], mask[:size], cut_state[:size], parent[:size], \
         (begin, by_site), overflow
 
 
 @njit(cache=True)
 def _keys(bit, memory, time):
-    """The POIs by which each site's labels are grouped: the nearest that it remembers, shape (n, KEYS)."""
+    """The POIs by which each site's labels are grouped: the nearest of its ng-set, shape (n, KEYS)."""
     n = len(bit)
     keys, taken = np.full((n, KEYS), -1, np.int64), np.zeros(n, np.bool_)
     for i in range(n):
@@ -262,7 +264,7 @@ def _keys(bit, memory, time):
                 b = bit[j]
                 if b < 0 or j == i or taken[j] or not memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
                     continue
-                far = time[j, i] if time[j, i] > 0 else 1e300  # 0 stands for a leg of no use
+                far = time[j, i] if time[j, i] > 0 else 1e300  # 0 marks a leg outside the graph
                 if far < least:
                     best, least = j, far
             if best < 0:
@@ -299,12 +301,12 @@ def _taller(array, size):
 
 
 @njit(cache=True)
-def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, once, cut_dual, stop,
-         t, q, x, y, mask, due, of_site, t_b, q_b, x_b, y_b, mask_b, due_b, of_site_b):
-    """For each label from the start the best rest of the route worth more than the threshold.
+def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, at_first_visit, cut_dual,
+                stop, t, q, x, y, mask, cut_state, of_site, t_b, q_b, x_b, y_b, mask_b, cut_state_b, of_site_b):
+    """For each forward label the backward label that completes it to the best route above the threshold.
 
     Returns:
-        Value, label from the start, label from the end or -1 for a leg straight home; of each route found.
+        Value, forward label, and backward label or -1 for a leg straight to the base; of each route found.
     """
     begin, by_site = of_site
     begin_b, by_site_b = of_site_b
@@ -330,8 +332,8 @@ def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, disco
                 if most_fuel < 0 or most_time < 0:
                     continue
                 so_far = x[label] - charge * time[i, j]
-                # Cuts that count the first visit: both ends may have paid the dual.
-                refund = sum_of(cut_dual, once & ~due[label])
+                # Cuts that count the first visit alone: both labels may have subtracted the dual.
+                refund = sum_of(cut_dual, at_first_visit & ~cut_state[label])
                 for k_b in range(begin_b[j], begin_b[j + 1]):
                     other = by_site_b[k_b]
                     if so_far + x_b[other] + refund <= best:
@@ -340,8 +342,8 @@ def join(legs, time, fuel, charge, base, half, capacity, limit, threshold, disco
                         continue
                     total = so_far + x_b[other]
                     if len(cut_dual) > 0:
-                        total += sum_of(cut_dual, once & ~due[label] & ~due_b[other]) \
-                            - sum_of(cut_dual, ~once & due[label] & due_b[other])
+                        total += sum_of(cut_dual, at_first_visit & ~cut_state[label] & ~cut_state_b[other]) \
+                            - sum_of(cut_dual, ~at_first_visit & cut_state[label] & cut_state_b[other])
                     if discounted:
                         total = so_far + y[label] * (x_b[other] - y_b[other]) + y_b[other]
                     if total <= best:

@@ -1,4 +1,4 @@
-"""Enumeration of partial routes, and how often cuts count a route, in compiled code."""
+"""Enumeration of partial routes, and the coefficients of cuts for a route, in compiled code."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ _EPSILON = 1e-9
 
 @njit(cache=True)
 def partial_routes(legs, time, fuel, bit, words, gain, charge, base, capacity, limit, bound, step, threshold, most,
-                   touch, recall, once, cut_dual, stop, left_s):
-    """Partial routes from the base that none over the same POIs to the same site dominates in time and fuel.
+                   in_cut, in_memory, at_first_visit, cut_dual, stop, left_s):
+    """Partial routes from the base, nondominated in time, fuel and value among those of the same POIs and last site.
 
     Long because compiled: one loop over arrays that it fills, of which each part would need nearly all.
 
     Returns:
-        Last site and parent of each; the ends of the best routes, one for each set of POIs; whether there were
-        too many, or no time was left for more.
+        Last site and parent of each; the last labels of the best routes, one for each set of POIs; whether labels or
+        time ran out.
     """
     n = len(gain)
     site, parent = np.zeros(most, np.int32), np.full(most, -1, np.int32)
     t, q, x = np.zeros(most), np.zeros(most), np.zeros(most)
-    mask, due = np.zeros((most, words), np.uint64), np.zeros(most, np.uint64)
+    mask, cut_state = np.zeros((most, words), np.uint64), np.zeros(most, np.uint64)
     dead = np.zeros(most, np.bool_)
-    # Partial routes by site and set, and routes by set, in tables of open addressing.
+    # Partial routes by site and set, and routes by set, in hash tables with open addressing.
     places = 1
     while places < 2 * most:
         places *= 2
-    first, alike = np.full(places, -1, np.int64), np.full(most, -1, np.int64)
+    first, next_same_set = np.full(places, -1, np.int64), np.full(most, -1, np.int64)
     best, worth = np.full(places, -1, np.int64), np.zeros(places)
-    site[0], due[0], size = base, once, 1
+    site[0], cut_state[0], size = base, at_first_visit, 1
     new = np.zeros(words, np.uint64)
     label, end_s = 0, now_s() + left_s
     while label < size:
@@ -68,35 +68,35 @@ def partial_routes(legs, time, fuel, bit, words, gain, charge, base, capacity, l
             else:
                 burnt = 0.0
             value = x[label] + gain[j] - charge * time[i, j]
-            ahead = due[label] & recall[j]
-            if touch[j]:
-                value -= sum_of(cut_dual, ahead & touch[j])
-                ahead = (ahead ^ (touch[j] & ~once)) & ~(touch[j] & once)
+            ahead = cut_state[label] & in_memory[j]
+            if in_cut[j]:
+                value -= sum_of(cut_dual, ahead & in_cut[j])
+                ahead = (ahead ^ (in_cut[j] & ~at_first_visit)) & ~(in_cut[j] & at_first_visit)
             if value + bound[int((limit - later) / step + 1e-9), j] <= threshold:
                 continue
             place = _place(new, j, places)
             while first[place] >= 0 and not (site[first[place]] == j and _same(mask[first[place]], new)):
                 place = (place + 1) & (places - 1)
-            beaten, other = False, first[place]
+            dominated, other = False, first[place]
             while other >= 0:
                 if not dead[other]:
                     if t[other] <= later and q[other] <= burnt and x[other] >= value - _EPSILON:
-                        beaten = True
+                        dominated = True
                         break
                     if later <= t[other] and burnt <= q[other] and value >= x[other]:
-                        dead[other] = True  # partial routes that extend it stay: useless, but harmless
-                other = alike[other]
-            if beaten:
+                        dead[other] = True  # its extensions stay: dominated too, but harmless
+                other = next_same_set[other]
+            if dominated:
                 continue
             if size == most:
                 return site[:size], parent[:size], np.zeros(0, np.int64), True
-            site[size], parent[size], t[size], q[size], x[size], due[size] = j, label, later, burnt, value, ahead
+            site[size], parent[size], t[size], q[size], x[size], cut_state[size] = j, label, later, burnt, value, ahead
             for w in range(words):
                 mask[size, w] = new[w]
             if first[place] < 0:
                 first[place] = size
             else:
-                alike[size], alike[first[place]] = alike[first[place]], size
+                next_same_set[size], next_same_set[first[place]] = next_same_set[first[place]], size
             size += 1
         label += 1
     return site[:size], parent[:size], best[best >= 0], False
@@ -120,15 +120,15 @@ def _same(one, other):
 
 
 @njit(cache=True)
-def counts(member, memory, once, route):
-    """How often each cut counts a route, shape (cuts,); members and memory by cut and site, shape (cuts, n)."""
+def counts(member, memory, at_first_visit, route):
+    """Coefficient of each cut for a route, shape (cuts,); members and memory by cut and site, shape (cuts, n)."""
     count = np.zeros(len(member))
     for k in range(len(member)):
         visited = False
         for j in route:
             visited &= memory[k, j]
             if member[k, j]:
-                if once[k]:
+                if at_first_visit[k]:
                     count[k] = 1.0
                     break
                 if visited:

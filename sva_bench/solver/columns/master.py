@@ -1,6 +1,6 @@
 """The master program of branch-and-price: routes as columns, visits and vehicles as rows.
 
-A *unit* is a vehicle, or several identical ones, with the same branching decisions.
+A vehicle class holds identical vehicles; a vehicle group is those of a class with the same branching decisions.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Stops = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class VehicleClass:
-    """Identical vehicles: one vehicle class.
+    """A class of identical vehicles.
 
     Attributes:
         vehicles: Their numbers.
@@ -35,10 +35,16 @@ class VehicleClass:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unit:
-    """So many vehicles of a class, and the POIs that they may not visit."""
+class VehicleGroup:
+    """Vehicles of a class with the same branching decisions.
 
-    kind: int
+    Attributes:
+        vehicle_class: The class.
+        count: How many vehicles.
+        forbidden: POIs that they may not visit.
+    """
+
+    vehicle_class: int
     count: int
     forbidden: frozenset[int] = frozenset()
 
@@ -48,11 +54,11 @@ class BranchState:
     """The branching decisions that lead to a node of the search tree.
 
     Attributes:
-        units: The vehicles.
-        required: POIs that are visited.
+        groups: The vehicle groups.
+        required: POIs that must be visited.
     """
 
-    units: tuple[Unit, ...]
+    groups: tuple[VehicleGroup, ...]
     required: frozenset[int] = frozenset()
 
 
@@ -61,22 +67,22 @@ class Column:
     """A route of a class.
 
     Attributes:
-        kind: The class.
+        vehicle_class: The class.
         route: Sites from base to base.
         visits: Visits of each site, shape (n,).
         value: Its rewards less its cost.
         floors: What it adds to each floor, shape (floors,).
     """
 
-    kind: int
+    vehicle_class: int
     route: Stops
     visits: FloatArray
     value: float
     floors: FloatArray
 
-    def fits(self, unit: Unit) -> bool:
-        """Whether a unit may drive it."""
-        return unit.kind == self.kind and not any(self.visits[j] for j in unit.forbidden)
+    def fits(self, group: VehicleGroup) -> bool:
+        """Whether a vehicle group may drive it."""
+        return group.vehicle_class == self.vehicle_class and not any(self.visits[j] for j in group.forbidden)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,21 +90,21 @@ class Duals:
     """Duals of the master program.
 
     Attributes:
-        visit: Of each site's visit, shape (n,).
-        unit: Of each unit's vehicles.
+        visit: Of each site's row, shape (n,).
+        group: Of each vehicle group's row, shape (groups,).
         floor: Of each floor, not positive, shape (floors,).
         cut: Of each cut, not negative, shape (cuts,).
     """
 
     visit: FloatArray
-    unit: FloatArray
+    group: FloatArray
     floor: FloatArray
     cut: FloatArray
 
     def between(self, other: Duals, share: float) -> Duals:
-        """So much of the other, and the rest of this."""
+        """The convex combination with weight ``share`` on the other."""
         return Duals(visit=(1 - share) * self.visit + share * other.visit,
-                      unit=(1 - share) * self.unit + share * other.unit,
+                      group=(1 - share) * self.group + share * other.group,
                       floor=(1 - share) * self.floor + share * other.floor,
                       cut=(1 - share) * self.cut + share * other.cut)
 
@@ -108,15 +114,15 @@ class Master:
     """The master program at a node, open for more columns.
 
     Attributes:
-        state: The decisions.
-        pois: POIs with a row.
-        floors: Least sum of each floor.
+        state: The branching decisions.
+        pois: POIs that have a row.
+        floors: Right-hand side of each floor.
         sizes: Size of each floor's row, shape (floors,); all the same under a measure of risk.
-        cuts: How many cuts there are; of the routes a cut counts, one is in use at most.
-        counted: How often each cut counts a route, shape (cuts,).
-        penalty: What the violation of a required visit costs, or of a floor in units of its size.
+        cuts: Number of subset-row cuts, each with right-hand side 1.
+        counted: Coefficient of each cut for a column, shape (cuts,).
+        penalty: Cost of violating a required visit, or a floor by its size.
         risk: The measure of risk whose outcomes the floors are.
-        entries: Unit and column of each program column after the penalties and the measure's own.
+        entries: Vehicle group and column of each program column after those of penalties and risk measure.
     """
 
     state: BranchState
@@ -132,7 +138,7 @@ class Master:
 
     def __post_init__(self) -> None:
         self._row = {j: k for k, j in enumerate(self.pois)}
-        first = len(self.pois) + len(self.state.units)
+        first = len(self.pois) + len(self.state.groups)
         rows = first + len(self.floors)
         # Requirements may be violated at a penalty; under a risk measure the floors have columns of their own instead.
         missed = [self._row[j] for j in sorted(self.state.required)]
@@ -144,8 +150,8 @@ class Master:
         build = RowBuilder()
         for row in range(len(self.pois)):
             build.add([own[row]] if row in own else [], [1.0] * (row in own), 1.0 if row in own else -np.inf, 1.0)
-        for unit in self.state.units:
-            build.add([], [], -np.inf, float(unit.count))
+        for group in self.state.groups:
+            build.add([], [], -np.inf, float(group.count))
         for k, floor in enumerate(self.floors):
             used = np.flatnonzero(entries[k])
             columns, values = self.penalties + used, entries[k][used]
@@ -160,32 +166,32 @@ class Master:
         self._present: set[tuple[int, Stops]] = set()
         self._blocks: list[tuple[IntArray, FloatArray, FloatArray]] = []
 
-    def add(self, unit: int, columns: Sequence[Column]) -> int:
-        """Offer columns to a unit; how many are new."""
-        new = [c for c in columns if (unit, c.route) not in self._present]
+    def add(self, group: int, columns: Sequence[Column]) -> int:
+        """Add columns of a vehicle group; how many are new."""
+        new = [c for c in columns if (group, c.route) not in self._present]
         if not new:
             return 0
-        units, floors = len(self.state.units), len(self.floors)
+        groups, floors = len(self.state.groups), len(self.floors)
         visits = np.array([c.visits for c in new])
         counted = np.array([self.counted(c) for c in new]).reshape(len(new), self.cuts)
         levels = np.array([c.floors for c in new]).reshape(len(new), floors)
         values = np.array([c.value for c in new])
-        matrix = np.hstack([visits[:, list(self.pois)], np.zeros((len(new), units)), levels / self.sizes, counted])
-        matrix[:, len(self.pois) + unit] = 1.0
+        matrix = np.hstack([visits[:, list(self.pois)], np.zeros((len(new), groups)), levels / self.sizes, counted])
+        matrix[:, len(self.pois) + group] = 1.0
         column, row = np.nonzero(matrix)
         self._program.add_columns(values, np.searchsorted(column, np.arange(len(new) + 1)), row, matrix[column, row])
-        self._present.update((unit, c.route) for c in new)
-        self.entries += [(unit, c) for c in new]
-        self._blocks.append((np.full(len(new), unit), values, np.hstack([visits, levels, counted])))
+        self._present.update((group, c.route) for c in new)
+        self.entries += [(group, c) for c in new]
+        self._blocks.append((np.full(len(new), group), values, np.hstack([visits, levels, counted])))
         return len(new)
 
     def most(self, duals: Duals) -> FloatArray:
-        """Greatest value of each unit's routes less their rows' duals; 0 at least, shape (units,)."""
-        found = np.zeros(len(self.state.units))
+        """Greatest reduced value of each group's columns, at least 0, without the group's dual, shape (groups,)."""
+        found = np.zeros(len(self.state.groups))
         if self._blocks:
             self._blocks = [tuple(np.concatenate(part) for part in zip(*self._blocks, strict=True))]  # type: ignore[list-item]
-            unit, value, taken = self._blocks[0]
-            np.maximum.at(found, unit, value - taken @ np.concatenate([duals.visit, duals.floor, duals.cut]))
+            group, value, taken = self._blocks[0]
+            np.maximum.at(found, group, value - taken @ np.concatenate([duals.visit, duals.floor, duals.cut]))
         return found
 
     def solve(self, time_limit_s: float) -> Relaxed:
@@ -193,38 +199,38 @@ class Master:
         return self._program.solve(time_limit_s)
 
     def duals(self, solved: Relaxed) -> Duals:
-        """Its duals."""
+        """The duals of a solved relaxation."""
         visit = np.zeros(self.n)
         visit[list(self.pois)] = solved.duals[:len(self.pois)]
-        unit, floor, cut = np.split(solved.duals[len(self.pois):],
-                                    np.cumsum([len(self.state.units), len(self.floors)]))
-        return Duals(visit=visit, unit=unit, floor=floor / self.sizes, cut=np.maximum(cut, 0.0))
+        group, floor, cut = np.split(solved.duals[len(self.pois):],
+                                    np.cumsum([len(self.state.groups), len(self.floors)]))
+        return Duals(visit=visit, group=group, floor=floor / self.sizes, cut=np.maximum(cut, 0.0))
 
     def bound(self, duals: Duals, best: FloatArray) -> float:
-        """Upper bound on the program over all columns, from any duals of the right signs.
+        """Lagrangian bound: an upper bound on the program over all columns, from any duals of the right signs.
 
         Args:
             duals: The duals.
-            best: Upper bound on a route's value less its visits' duals, for each unit, shape (units,).
+            best: Upper bound on the reduced value of each group's routes, shape (groups,).
         """
-        counts = np.array([u.count for u in self.state.units], dtype=np.float64)
+        counts = np.array([u.count for u in self.state.groups], dtype=np.float64)
         return float(duals.visit.sum() + duals.floor @ self.floors + duals.cut.sum()
                      + counts @ np.maximum(best, 0.0))
 
     def solve_integer(self, time_limit_s: float) -> MipResult:
-        """The best integer choice of columns; the program is lost by it."""
+        """The best integer choice of columns; the relaxation can't be solved again after it."""
         return self._program.solve_integer(np.arange(self.others, self.others + len(self.entries)), time_limit_s)
 
     def share(self, values: FloatArray) -> list[tuple[int, Column, float]]:
-        """The columns in use at a point: unit, column and share."""
+        """The columns of positive value at a point: vehicle group, column and value."""
         used = values[self.others:]
         return [(*self.entries[k], float(used[k])) for k in np.flatnonzero(used > 1e-7)]
 
     def violation(self, values: FloatArray) -> float:
-        """By how much a point violates the requirements."""
+        """Total violation of the requirements at a point, in units of their rows."""
         return float(values[:self.penalties].sum())
 
 
-def without(unit: Unit, poi: int) -> Unit:
-    """The unit, no longer allowed to visit a POI."""
-    return replace(unit, forbidden=unit.forbidden | {poi})
+def without(group: VehicleGroup, poi: int) -> VehicleGroup:
+    """The group, no longer allowed to visit a POI."""
+    return replace(group, forbidden=group.forbidden | {poi})

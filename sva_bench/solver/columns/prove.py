@@ -1,4 +1,4 @@
-"""A plan proved by branch-and-price."""
+"""The proof of a plan by branch-and-price."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 
 from sva_bench.solver.columns.branch_and_price import BranchAndPrice
 from sva_bench.solver.columns.column_generation import ColumnGeneration
-from sva_bench.solver.knowledge import adopt, drive
+from sva_bench.solver.knowledge import adopt, route_over
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.routes.heuristic import VisitOrders
 
@@ -20,23 +20,23 @@ def prove_by_columns(problem: Problem) -> None:
     began = problem.clock.used_s()
 
     def cutoff() -> float:
-        """Bounds up to here hold nothing better: too close, or below the next value that a plan can have."""
+        """A node with a bound up to this has no better plan: within the gap, or below the next possible value."""
         return problem.progress.value + problem.progress.slack(_WITHIN * problem.gap)
 
     def offer(orders: VisitOrders) -> None:
         adopt(problem.progress, problem.goal, problem.known, orders)
 
     generation = ColumnGeneration(instance=problem.instance, goal=problem.goal, scopes=problem.scopes,
-                                  survival=problem.goal.chances(), cutoff=cutoff, out=problem.clock.out,
+                                  survival=problem.goal.chances(), cutoff=cutoff, is_over=problem.clock.is_over,
                                   left_s=problem.clock.left_s)
     for m, order in (*enumerate(problem.progress.orders), *problem.routes):
-        generation.add_route(m, drive(problem.known.roads[m], order))
+        generation.add_route(m, route_over(problem.known.legs_by_vehicle[m], order))
     search_tree = BranchAndPrice(generation=generation, offer=offer, left_s=problem.clock.left_s,
-                                 tell=problem.progress.tighten)
+                                 report_bound=problem.progress.tighten)
     try:
         if search_tree.run():
             problem.progress.tighten(cutoff())
-        elif problem.clock.out():
+        elif problem.clock.is_over():
             problem.progress.status = "time_limit"
     finally:
         problem.progress.nodes, problem.progress.rounds = search_tree.nodes, generation.priced

@@ -1,6 +1,6 @@
-"""Branch and cut: cuts at the root, branch and bound, again with every cut that its solution breaks.
+"""Branch and cut: cuts at the root, then branch and bound, repeated with the cuts that its solution violates.
 
-HiGHS takes no constraints while it branches, so each integer solution that isn't connected costs another run.
+HiGHS takes no lazy constraints, so each integer solution that isn't connected costs another run.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sva_bench.solver.knowledge import Cut, adopt, without_idle_stops
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.program import LinearModel, Rows
 from sva_bench.solver.routes.heuristic import VisitOrders
-from sva_bench.solver.routes.refuelling import quickest
+from sva_bench.solver.routes.refuelling import quickest_route
 from sva_bench.solver.units import LARGEST
 
 _log = logging.getLogger(__name__)
@@ -30,11 +30,11 @@ ROOT_ROUNDS = 60
 _STALL = 1e-4  # relative gain of the bound below which a round counts as idle
 _IDLE_ROUNDS = 4
 _FIXING = 1e-6  # relative; columns are dropped only if they are worse by more
-_INTEGERS = 1e4  # largest integer that is worth having in an objective
+_INTEGERS = 1e4  # largest integer coefficient of an objective; beyond it HiGHS's rounding of bounds gains nothing
 
 
 class FlowModel(Protocol):
-    """A linear model of routes whose connectivity is cut in."""
+    """A linear model of routes, without the connectivity cuts."""
 
     model: LinearModel
 
@@ -45,14 +45,14 @@ class FlowModel(Protocol):
         """How often a vehicle drives each leg in a point of the model, shape (n, n)."""
 
     def order(self, values: FloatArray, vehicle: int) -> tuple[int, ...]:
-        """POIs of a vehicle's route in an integer point, as far as it is connected with the base."""
+        """POIs of a vehicle's route in an integer point, of the component that holds the base."""
 
     def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point of the model; ``None`` where it uses a leg that the model leaves out."""
 
 
 def prove_by_cuts(flow: FlowModel, problem: Problem) -> None:
-    """Prove the plan of ``problem.progress``, or a better one, within the gap.
+    """Prove the plan of ``problem.progress``, or a better one, within the gap, by branch and cut.
 
     Args:
         flow: A model of the problem.
@@ -74,9 +74,9 @@ def prove_by_cuts(flow: FlowModel, problem: Problem) -> None:
 def _root(
     flow: FlowModel, problem: Problem, model: LinearModel, size: float,
 ) -> tuple[list[Cut], LinearModel]:
-    """Tighten the relaxation by cuts; those that are tight in the end, and the model without what can't be better.
+    """Tighten the relaxation by cuts: those that are tight in the end, and the model with columns fixed at 0.
 
-    Lowers the bound of ``problem.progress``.
+    Lowers the bound of ``problem.progress``. Columns are fixed by their reduced costs.
     """
     progress, clock = problem.progress, problem.clock
     cuts = list(problem.known.cuts)
@@ -86,7 +86,7 @@ def _root(
     activity: FloatArray = np.zeros(0)
     upper = model.upper.copy()
     for _ in range(ROOT_ROUNDS):
-        if clock.out() or progress.closed(problem.gap):
+        if clock.is_over() or progress.closed(problem.gap):
             break
         relaxed = relaxation.solve(clock.left_s())
         progress.rounds += 1
@@ -97,7 +97,7 @@ def _root(
             break
         activity = relaxed.activity
         progress.tighten(relaxed.objective * size)
-        # A column whose reduced cost eats up the gap is in no better plan. Only ours are integer.
+        # Reduced-cost fixing: such a column is in no better plan. Only integer columns are fixed.
         least = progress.value - _FIXING * max(abs(progress.value), LARGEST)
         worse = (relaxed.objective + relaxed.reduced) * size < least
         upper[model.integer & worse] = 0.0
@@ -118,10 +118,10 @@ def _root(
 
 
 def _branch(flow: FlowModel, problem: Problem, model: LinearModel, size: float, cuts: list[Cut]) -> None:
-    """Branch and bound, again with every cut that its solution breaks."""
+    """Branch and bound, repeated with the cuts that its solution violates."""
     progress, clock, gap = problem.progress, problem.clock, problem.gap
     while not progress.closed(gap):
-        if clock.out():
+        if clock.is_over():
             progress.status = "time_limit"
             return
         progress.cuts = len(cuts)
@@ -131,34 +131,34 @@ def _branch(flow: FlowModel, problem: Problem, model: LinearModel, size: float, 
         progress.rounds += 1
         progress.nodes += outcome.nodes
         progress.tighten(progress.value if outcome.status == "infeasible" else outcome.bound * size)
-        broken = _integers(flow, problem, outcome)
+        violated = _integers(flow, problem, outcome)
         if outcome.status in ("time_limit", "interrupted"):
             progress.status = outcome.status
             return
-        if not broken:
+        if not violated:
             return
-        new = [replace(cut, vehicle=m) for cut in broken for m in range(len(problem.instance.vehicles))]
+        new = [replace(cut, vehicle=m) for cut in violated for m in range(len(problem.instance.vehicles))]
         cuts = list(dict.fromkeys([*cuts, *new]))
         problem.known.cuts.update(dict.fromkeys(new))
-        _log.debug("branch: bound %.6g, value %.6g, %d cuts broken", progress.bound, progress.value, len(broken))
+        _log.debug("branch: bound %.6g, value %.6g, %d cuts violated", progress.bound, progress.value, len(violated))
 
 
 def _integers(flow: FlowModel, problem: Problem, outcome: MipResult) -> list[Cut]:
-    """Take up an integer solution, as far as it is connected with the base; the cuts that it breaks."""
+    """Adopt an integer solution's routes, of the base's component; the cuts that it violates."""
     if outcome.values is None:
         return []
     instance, goal, known = problem.instance, problem.goal, problem.known
     pois = frozenset(instance.pois)
-    broken: list[Cut] = []
+    violated: list[Cut] = []
     orders = []
-    for m, road in enumerate(known.roads):
-        broken += violated_by_integers(flow.visits(outcome.values, m), m, instance.base, pois)
+    for m, own_legs in enumerate(known.legs_by_vehicle):
+        violated += violated_by_integers(flow.visits(outcome.values, m), m, instance.base, pois)
         order = flow.order(outcome.values, m)
-        if quickest(road, order) is None:
-            raise RuntimeError(f"the solver's route of {instance.vehicles[m].name} breaks its fuel or limit")
-        orders.append(without_idle_stops(road, order, goal.rewarded()[m]))
+        if quickest_route(own_legs, order) is None:
+            raise RuntimeError(f"the solver's route of {instance.vehicles[m].name} exceeds its fuel or limit")
+        orders.append(without_idle_stops(own_legs, order, goal.rewarded()[m]))
     adopt(problem.progress, goal, known, tuple(orders))
-    return broken
+    return violated
 
 
 def _separate(flow: FlowModel, instance: Instance, values: FloatArray) -> list[Cut]:

@@ -46,7 +46,7 @@ def violated_by_integers(visits: FloatArray, vehicle: int, base: int, pois: froz
     """Cuts for the components of an integer solution that aren't connected with the base.
 
     Args:
-        visits: ``y`` of the vehicle, shape (n, n).
+        visits: How often the vehicle drives each leg, ``y``, shape (n, n).
         vehicle: Number of the vehicle.
         base: The base.
         pois: The POIs.
@@ -58,10 +58,10 @@ def violated_by_integers(visits: FloatArray, vehicle: int, base: int, pois: froz
 
 
 def violated_by_fractions(visits: FloatArray, vehicle: int, base: int, pois: frozenset[int]) -> list[Cut]:
-    """Cuts that a fractional solution breaks: a least cut between the base and each POI that is visited in part.
+    """Cuts that a fractional solution violates: a minimum cut between the base and each POI that is visited in part.
 
     Args:
-        visits: ``y`` of the vehicle, shape (n, n).
+        visits: How often the vehicle drives each leg, ``y``, shape (n, n).
         vehicle: Number of the vehicle.
         base: The base.
         pois: The POIs.

@@ -1,12 +1,12 @@
-"""The L-shaped method: the first stage with a variable for what the second one costs, cut by the second one's duals.
+"""The L-shaped method: the first stage with a variable for the cost of the second, under optimality cuts.
 
 A cut ``eta >= sum_ij c_ij y_ij`` holds for any feasible duals ``pi, pi2`` of an outcome's recourse program, with
-``-c_ij = (1 - alpha_m) f_ij pi_i + pi2_ij``. ``single`` adds them up over the outcomes, as the paper does, ``multi``
-keeps one variable an outcome, and ``pareto`` takes, in place of a solver's duals, those that no others dominate:
-``pi_i = -max_j e_j / f_ij`` where the vehicle is lost, 0 where it is there.
+``-c_ij = (1 - alpha_m) f_ij pi_i + pi2_ij``. ``single`` adds them up over the outcomes, as in the paper, ``multi``
+keeps one variable for each outcome, and ``pareto`` takes, in place of the solver's duals, nondominated ones:
+``pi_i = -max_j e_j / f_ij`` where the vehicle is unavailable, 0 where it is available.
 
 Source:
-    Section 4 of the paper; Van Slyke, Wets (1969); Magnanti, Wong (1981) on cuts that are not dominated.
+    Section 4 of the paper; Van Slyke, Wets (1969); Magnanti, Wong (1981) on Pareto-optimal cuts.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sva_bench.choices import Cuts
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.cuts import violated_by_integers
 from sva_bench.solver.flow.expected import DirectedModel
-from sva_bench.solver.flow.recourse import legs_out_of_pois, together
+from sva_bench.solver.flow.recourse import legs_out_of_pois, stacked
 from sva_bench.solver.goal import Goal
 from sva_bench.solver.highs import Relaxation, maximise
 from sva_bench.solver.knowledge import Knowledge, adopt, without_idle_stops
@@ -35,11 +35,10 @@ from sva_bench.solver.units import LARGEST
 
 _log = logging.getLogger(__name__)
 
+_TOLERANCE = 1e-9  # relative violation below which a cut is not added
 
-_TOLERANCE = 1e-9  # relative; a cut that is broken by less adds nothing
 
-
-def prove_by_duals(problem: Problem) -> None:
+def prove_by_lshaped(problem: Problem) -> None:
     """Prove the plan of ``problem.progress``, or a better one, within the gap, by the L-shaped method."""
     instance, goal, known, progress = problem.instance, problem.goal, problem.known, problem.progress
     clock, gap = problem.clock, problem.gap
@@ -48,23 +47,23 @@ def prove_by_duals(problem: Problem) -> None:
     subtours = list(known.cuts)
     iteration = 0
     while not progress.closed(gap):
-        if clock.out():
+        if clock.is_over():
             progress.status = "time_limit"
             return
         iteration += 1
-        outcome = maximise(master.model, together(master.rows(subtours), master.optimality_rows()), gap=gap / 2,
+        outcome = maximise(master.model, stacked(master.rows(subtours), master.optimality_rows()), gap=gap / 2,
                            absolute_gap=progress.slack(gap / 2), time_limit_s=clock.left_s(),
                            start=master.point(progress.orders))
         progress.rounds += 1
         progress.nodes += outcome.nodes
         progress.tighten(progress.value if outcome.status == "infeasible" else outcome.bound)
         if outcome.values is not None:
-            orders, broken = [], []
-            for m, road_goal in enumerate(goal.rewarded()):
-                broken += violated_by_integers(master.visits(outcome.values, m), m, instance.base, pois)
-                orders.append(without_idle_stops(known.roads[m], master.order(outcome.values, m), road_goal))
+            orders, violated = [], []
+            for m, rewarded in enumerate(goal.rewarded()):
+                violated += violated_by_integers(master.visits(outcome.values, m), m, instance.base, pois)
+                orders.append(without_idle_stops(known.legs_by_vehicle[m], master.order(outcome.values, m), rewarded))
             adopt(progress, goal, known, tuple(orders))
-            new = [replace(cut, vehicle=m) for cut in broken for m in range(len(instance.vehicles))]
+            new = [replace(cut, vehicle=m) for cut in violated for m in range(len(instance.vehicles))]
             subtours = list(dict.fromkeys([*subtours, *new]))
             added = master.cut(outcome.values)
             progress.cuts, progress.optimality_cuts = len(subtours), len(master.optimality)
@@ -73,7 +72,7 @@ def prove_by_duals(problem: Problem) -> None:
         if outcome.status in ("time_limit", "interrupted"):
             progress.status = outcome.status
             return
-        if outcome.values is None or not (broken or added):
+        if outcome.values is None or not (violated or added):
             return
 
 
@@ -83,7 +82,7 @@ class _Master(DirectedModel):
     def __init__(
         self, instance: Instance, scopes: Sequence[Scope], goal: Goal, known: Knowledge, recourse: Outcomes, kind: Cuts,
     ) -> None:
-        super().__init__(instance, scopes, replace(goal, weights=recourse.incentives), known.roads)
+        super().__init__(instance, scopes, replace(goal, weights=recourse.incentives), known.legs_by_vehicle)
         self._recourse, self._kind = recourse, kind
         self._first = self.model
         outcomes = len(recourse.probability)
@@ -102,7 +101,7 @@ class _Master(DirectedModel):
         self._duals = [] if kind == "pareto" else [Relaxation(self._second()) for _ in range(outcomes)]
 
     def _second(self) -> LinearModel:
-        """The recourse program of any outcome for no plan yet: rows (14), then (11a) and (15a) a leg."""
+        """The recourse program, its bounds not yet set: rows (14), then a row of (11a) or (15a) for each leg."""
         build, count = RowBuilder(), len(self.legs.vehicle)
         for costs, used in self._groups:
             build.add(used, costs, 0.0, 0.0)
@@ -120,7 +119,7 @@ class _Master(DirectedModel):
         return build.rows()
 
     def point(self, orders: VisitOrders) -> FloatArray | None:
-        """A plan as a point, with the least cost of the second stage that the cuts allow."""
+        """A plan as a point, ``eta`` at the least value that the optimality cuts allow."""
         first = super().point(orders)
         if first is None:
             return None
@@ -130,19 +129,19 @@ class _Master(DirectedModel):
         return np.concatenate([first, eta])
 
     def cut(self, values: FloatArray) -> int:
-        """Add the optimality cuts that a first stage breaks; how many."""
+        """Add the optimality cuts that a first-stage solution violates; how many."""
         driven = np.rint(values[:len(self.legs.vehicle)])
         eta = values[len(self._first.objective):]
         found = [self._coefficients(outcome, driven) for outcome in range(len(self._recourse.probability))]
         if self._kind == "single":
             found = [np.einsum("o,ok->k", self._recourse.probability, np.array(found))]
-        broken = [(number, lost) for number, lost in enumerate(found)
+        violated = [(number, lost) for number, lost in enumerate(found)
                   if float(lost @ driven) > eta[number] + _TOLERANCE * max(LARGEST, abs(float(eta[number])))]
-        self.optimality += broken
-        return len(broken)
+        self.optimality += violated
+        return len(violated)
 
     def _coefficients(self, outcome: int, driven: FloatArray) -> FloatArray:
-        """What each leg loses in an outcome, by the duals of its recourse program."""
+        """Coefficients of an outcome's optimality cut, from the duals of its recourse program, shape (legs,)."""
         lost = self._lost[outcome]
         if self._kind == "pareto":
             dual = np.zeros(len(lost))
@@ -166,6 +165,6 @@ class _Master(DirectedModel):
         return self._by_origin(-(lost * dual + rest), -lost * rest)
 
     def _by_origin(self, onward: FloatArray, refuelled: FloatArray) -> FloatArray:
-        """One figure for legs out of POIs, another for legs out of refuels."""
+        """One coefficient for legs out of POIs, another for legs out of the base and stations, shape (legs,)."""
         found: FloatArray = np.where(self._onward, onward, refuelled)
         return found

@@ -1,8 +1,8 @@
-"""The second stage as the paper has it: what is lost when vehicles fail, as columns of its own in every outcome.
+"""The second stage as in the paper: what is lost when vehicles fail, as columns of its own in every outcome.
 
-In an outcome, a POI's leg ``v[i,j]`` is lost as far as ``sum_j f_ij v_ij = (1 - alpha_m) sum_j f_ij y_ij`` says, with
-``0 <= v <= y``: constraints (14), (15a) and (11a) with the fuel flow put in. Costs must be positive, else a leg that
-costs nothing could be kept by a vehicle that failed.
+In an outcome the recourse ``v[i,j]`` of legs out of POI i obeys ``sum_j f_ij v_ij = (1 - alpha_m) sum_j f_ij y_ij`` and
+``0 <= v <= y``: constraints (14), (15a) and (11a) with the fuel flow substituted. Fuel costs must be positive: a leg of
+cost 0 would keep its reward when its vehicle fails.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
 from sva_bench.solver.program import LinearModel, RowBuilder, Rows
 from sva_bench.solver.routes.heuristic import VisitOrders
-from sva_bench.solver.routes.refuelling import Road
+from sva_bench.solver.routes.refuelling import VehicleLegs
 
 LEAST_AVAILABILITY = 1e-4
-"""Of the vehicle that is there most often: below it what is lost is as good as all that is earned."""
+"""Least availability of the most available vehicle: below it the second stage cancels nearly all of the first."""
 
 
 def refuse_free_legs(instance: Instance) -> None:
-    """Refuse an instance in which a leg costs nothing.
+    """Refuse an instance with a leg of cost 0.
 
     Raises:
-        BadInput: If one does.
+        BadInput: If it has one.
     """
     for vehicle in instance.vehicles:
         free = np.argwhere((vehicle.fuel_s <= 0) & ~np.eye(len(instance.sites), dtype=np.bool_))
@@ -42,15 +42,16 @@ def refuse_free_legs(instance: Instance) -> None:
 
 
 def refuse_seldom_available(instance: Instance, availability: float) -> None:
-    """Refuse an instance whose vehicles are hardly ever there: nearly all that a plan earns is then lost again, and
-    the difference of the two, in which HiGHS rounds, is all that it is worth.
+    """Refuse an instance whose vehicles are hardly ever available.
+
+    The value of a plan is then the small difference of two large sums, and HiGHS's tolerances exceed it.
 
     Args:
         instance: The instance.
-        availability: The greatest one of its vehicles.
+        availability: The greatest availability of its vehicles.
 
     Raises:
-        BadInput: If it is above 0, but too small.
+        BadInput: If it is above 0, but less than ``LEAST_AVAILABILITY``.
     """
     if 0 < availability < LEAST_AVAILABILITY:
         raise BadInput(f"instance {instance.name}: no vehicle's availability is above {availability:g}, and the "
@@ -61,10 +62,10 @@ class EquivalentModel(DirectedModel):
     """The deterministic equivalent: both stages in one program, the second one integer or relaxed."""
 
     def __init__(
-        self, instance: Instance, scopes: Sequence[Scope], goal: Goal, roads: Sequence[Road], recourse: Outcomes, *,
-        relaxed: bool,
+        self, instance: Instance, scopes: Sequence[Scope], goal: Goal, legs_by_vehicle: Sequence[VehicleLegs],
+        recourse: Outcomes, *, relaxed: bool,
     ) -> None:
-        super().__init__(instance, scopes, replace(goal, weights=recourse.incentives), roads)
+        super().__init__(instance, scopes, replace(goal, weights=recourse.incentives), legs_by_vehicle)
         legs, first = self.legs, self.model
         self._lost = 1.0 - recourse.available[:, legs.vehicle]  # shape (outcomes, legs)
         count, start = len(legs.vehicle), len(first.objective)
@@ -86,12 +87,12 @@ class EquivalentModel(DirectedModel):
             objective=np.concatenate([first.objective, second]),
             upper=np.concatenate([first.upper, np.tile(first.upper[:count], outcomes)]),
             integer=np.concatenate([first.integer, np.full(outcomes * count, not relaxed)]),
-            rows=together(first.rows, build.rows()))
+            rows=stacked(first.rows, build.rows()))
 
     def out_of_poi(self, instance: Instance) -> BoolArray:
         """Which legs leave a POI, shape (legs,)."""
-        out: BoolArray = np.isin(self.legs.origin, instance.pois)
-        return out
+        leaving: BoolArray = np.isin(self.legs.origin, instance.pois)
+        return leaving
 
     def point(self, orders: VisitOrders) -> FloatArray | None:
         """A plan as a point, with its only feasible recourse ``v = (1 - alpha) y``."""
@@ -105,7 +106,7 @@ class EquivalentModel(DirectedModel):
 def legs_out_of_pois(
     model: DirectedModel, instance: Instance, scopes: Sequence[Scope],
 ) -> list[tuple[FloatArray, IntArray]]:
-    """Costs and numbers of the legs out of each POI, vehicle by vehicle."""
+    """Fuel [s] and column numbers of the legs out of each POI, for each vehicle and POI that has any."""
     legs, found = model.legs, []
     for m, scope in enumerate(scopes):
         for i in instance.pois:
@@ -115,7 +116,8 @@ def legs_out_of_pois(
     return found
 
 
-def together(one: Rows, other: Rows) -> Rows:
+def stacked(one: Rows, other: Rows) -> Rows:
+    """The rows of both, those of the first on top."""
     return Rows(
         lower=np.concatenate([one.lower, other.lower]), upper=np.concatenate([one.upper, other.upper]),
         start=np.concatenate([one.start, one.start[-1] + other.start[1:]]),

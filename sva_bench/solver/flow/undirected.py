@@ -1,9 +1,9 @@
-"""The collapsed model with a column for each edge: costs the same both ways, and one filling lasts for the mission.
+"""The collapsed model with a column for each edge: symmetric costs, and no refuelling during the mission.
 
 Columns per vehicle: ``u``, whether it leaves the base; ``s_j``, whether it visits POI j; ``x_e``, how often it drives
 edge e. Rows: ``x(edges at the base) = 2 u``, ``x(edges at j) = 2 s_j``, ``sum_e t_e x_e <= limit u``, and each POI once
-over all vehicles. Half as many columns as the directed model, and a much tighter one: nothing tells one sense of a
-route from the other. A cut ``x(edges out of S) >= 2 s_i`` is written over the edges within S, where those are fewer.
+over all vehicles. Half as many columns as the directed model, and a tighter relaxation: both directions of a route are
+one point. A cut ``x(edges out of S) >= 2 s_i`` is written over the edges within S, where those are fewer.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from sva_bench.solver.routes.heuristic import VisitOrders
 
 
 class UndirectedModel:
-    """The edge model of one goal, as ``branch_and_cut`` wants it."""
+    """The edge model of one goal: a ``FlowModel`` of ``branch_and_cut``."""
 
     def __init__(self, instance: Instance, scopes: Sequence[Scope], goal: Goal) -> None:
         self._instance, self._scopes = instance, scopes
@@ -38,22 +38,22 @@ class UndirectedModel:
         for m, scope in enumerate(scopes):
             time = scope.fuel_s + half
             ends = np.argwhere(np.triu(scope.legs))
-            there = [j for j in pois if scope.legs[j].any()]
+            reachable = [j for j in pois if scope.legs[j].any()]
             first = len(objective)
             self._leaves.append(first)
-            self._visit[m, there] = first + 1 + np.arange(len(there))
-            edges = first + 1 + len(there) + np.arange(len(ends))
+            self._visit[m, reachable] = first + 1 + np.arange(len(reachable))
+            edges = first + 1 + len(reachable) + np.arange(len(ends))
             self._edge[m, ends[:, 0], ends[:, 1]] = self._edge[m, ends[:, 1], ends[:, 0]] = edges
             costs = time[ends[:, 0], ends[:, 1]]
-            objective += [0.0, *goal.weights[m, there], *(-goal.driving * costs)]
-            upper += [1.0] * (1 + len(there)) + np.where((ends == base).any(axis=1), 2.0, 1.0).tolist()
-            for site in (base, *there):
+            objective += [0.0, *goal.weights[m, reachable], *(-goal.driving * costs)]
+            upper += [1.0] * (1 + len(reachable)) + np.where((ends == base).any(axis=1), 2.0, 1.0).tolist()
+            for site in (base, *reachable):
                 of_site = self._edge[m, site][self._edge[m, site] >= 0]
                 total = first if site == base else int(self._visit[m, site])
                 build.add([*of_site, total], [1.0] * len(of_site) + [-2.0], 0.0, 0.0)
             size = max(scope.limit_s, 1.0)
             build.add([*edges, first], [*(costs / size), -(scope.limit_s + SLACK_S) / size], -np.inf, 0.0)
-            for j in there:
+            for j in reachable:
                 build.add([int(self._visit[m, j]), first], [1.0, -1.0], -np.inf, 0.0)
         for j in pois:
             of_poi = self._visit[:, j][self._visit[:, j] >= 0]
@@ -66,7 +66,7 @@ class UndirectedModel:
                                  integer=np.ones(len(objective), dtype=np.bool_), rows=build.rows())
 
     def rows(self, cuts: Sequence[Cut]) -> Rows:
-        """The cuts as rows."""
+        """The connectivity cuts as rows over the model's columns."""
         build = RowBuilder()
         for cut in cuts:
             inside = np.array([j for j in cut.inside if self._visit[cut.vehicle, j] >= 0], dtype=np.int64)
@@ -86,12 +86,12 @@ class UndirectedModel:
         return build.rows()
 
     def visits(self, values: FloatArray, vehicle: int) -> FloatArray:
-        """Half of each edge in either sense, shape (n, n)."""
+        """How often a vehicle drives each edge, half of it in either direction, shape (n, n)."""
         edge = self._edge[vehicle]
         return np.where(edge >= 0, values[edge], 0.0) / 2
 
     def order(self, values: FloatArray, vehicle: int) -> tuple[int, ...]:
-        """POIs of a vehicle's route, from the base on."""
+        """POIs of a vehicle's route, in order of visit."""
         left = np.rint(2 * self.visits(values, vehicle))
         here = self._instance.base
         order: list[int] = []
@@ -108,7 +108,7 @@ class UndirectedModel:
             here = there
 
     def point(self, orders: VisitOrders) -> FloatArray | None:
-        """A plan as a point."""
+        """A plan as a point of the model; ``None`` where it uses an edge that the model leaves out."""
         point = np.zeros(len(self.model.objective))
         for m, order in enumerate(orders):
             if not order:
@@ -124,7 +124,7 @@ class UndirectedModel:
 
 
 def serves(instance: Instance, scopes: Sequence[Scope]) -> bool:
-    """Whether all vehicles drive legs that cost the same both ways, without ever refuelling."""
+    """Whether costs are symmetric for all vehicles and none can refuel: what the edge model requires."""
     stations = list(instance.stations)
     return all(
         np.isfinite(scope.limit_s) and not np.isfinite(scope.capacity_s) and not scope.legs[stations].any()
@@ -133,6 +133,6 @@ def serves(instance: Instance, scopes: Sequence[Scope]) -> bool:
 
 
 def _positive(columns: IntArray) -> IntArray:
-    """The columns among entries of which -1, or the 0 of a triangle, stands for none."""
+    """The column numbers among entries; -1, and the 0 of a triangle's other half, stand for no column."""
     found: IntArray = columns[columns > 0]
     return found

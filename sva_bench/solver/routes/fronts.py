@@ -1,6 +1,6 @@
-"""Routes in compiled code: the quickest refuelling of POIs in a given order, and where another POI fits best.
+"""Routes in compiled code: the quickest refuelling of POIs in a given order, and the best insertion of another POI.
 
-A *front* at a stop holds the (time, fuel) pairs that no other pair beats: forwards the time since the start and the
+A Pareto front at a stop holds the nondominated (time, fuel) pairs: forwards the time since the start and the
 fuel burnt since the last refuel, backwards the time to the end and the fuel needed until the next refuel. The two are
 mirror images, so one step function serves both.
 """
@@ -19,27 +19,27 @@ from sva_bench.solver.polling import poll, stop_flag
 from sva_bench.solver.preprocess import SLACK_S, shortest_paths
 
 FRONT = 12
-"""Most pairs of a front. Real ones have two to four; a longer one loses its slowest pairs, and a search some routes."""
+"""Most pairs of a front. Typical ones have two to four; a longer one loses its slowest pairs, and the search routes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Tables:
-    """The legs of all kinds of vehicles, as compiled code reads them. Vehicles of one kind differ in rewards only.
+class LegTables:
+    """The legs of all vehicle classes as arrays, for compiled code. Vehicles of a class differ in rewards only.
 
     Attributes:
-        kind: Kind of each vehicle, shape (M,).
+        vehicle_class: Class of each vehicle, shape (M,).
         base: The base.
-        fuel_s: Fuel of a leg [s], shape (kinds, n, n).
-        time_s: Driving time of a leg and the stop at its end [s], shape (kinds, n, n).
-        quickest_s: Least time from a site to another, directly or over stations [s], shape (kinds, n, n).
-        first: Where the chains of stations between two sites begin in ``hops``, shape (kinds, n, n).
-        last: Where they end, shape (kinds, n, n).
+        fuel_s: Fuel of a leg [s], shape (classes, n, n).
+        time_s: Driving time of a leg and the stop at its end [s], shape (classes, n, n).
+        quickest_s: Least time from a site to another, directly or by stations [s], shape (classes, n, n).
+        first: Where the chains of stations between two sites begin in ``hops``, shape (classes, n, n).
+        last: Where they end, shape (classes, n, n).
         hops: Chains of stations: fuel to the first station, time in all, fuel from the last one [s], shape (hops, 3).
-        capacity_s: Fuel capacity [s], shape (kinds,).
-        limit_s: Mission limit [s], shape (kinds,).
+        capacity_s: Fuel capacity, half the feasibility tolerance included [s], shape (classes,).
+        limit_s: Mission limit, half the feasibility tolerance included [s], shape (classes,).
     """
 
-    kind: IntArray
+    vehicle_class: IntArray
     base: int
     fuel_s: FloatArray
     time_s: FloatArray
@@ -51,22 +51,22 @@ class Tables:
     limit_s: FloatArray
 
 
-def tables_of(instance: Instance) -> Tables:
-    """The tables of an instance's vehicles."""
-    kinds: list[Vehicle] = []
-    kind = []
+def leg_tables(instance: Instance) -> LegTables:
+    """The leg tables of an instance's vehicles, one for each vehicle class."""
+    classes: list[Vehicle] = []
+    vehicle_class = []
     for vehicle in instance.vehicles:
-        same = [k for k, other in enumerate(kinds) if other.fuel_capacity_s == vehicle.fuel_capacity_s
+        same = [k for k, other in enumerate(classes) if other.fuel_capacity_s == vehicle.fuel_capacity_s
                 and other.mission_limit_s == vehicle.mission_limit_s and np.array_equal(other.fuel_s, vehicle.fuel_s)]
-        kind.append(same[0] if same else len(kinds))
+        vehicle_class.append(same[0] if same else len(classes))
         if not same:
-            kinds.append(vehicle)
+            classes.append(vehicle)
     n, stations = len(instance.sites), np.array(instance.stations, dtype=np.int64)
-    shape = (len(kinds), n, n)
+    shape = (len(classes), n, n)
     first, last, hops, offset = np.zeros(shape, np.int64), np.zeros(shape, np.int64), [np.zeros((0, 3))], 0
     fuel, time, quickest = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    capacity = np.array([v.fuel_capacity_s for v in kinds]) + SLACK_S
-    for k, vehicle in enumerate(kinds):
+    capacity = np.array([v.fuel_capacity_s for v in classes]) + SLACK_S
+    for k, vehicle in enumerate(classes):
         fuel[k] = vehicle.fuel_s
         time[k] = fuel[k] + instance.stop_s[None, :]
         quickest[k] = np.where(fuel[k] <= capacity[k], time[k], np.inf)
@@ -79,23 +79,24 @@ def tables_of(instance: Instance) -> Tables:
             last[k] += offset
             offset += len(found)
             hops.append(found)
-    return Tables(
-        kind=np.array(kind, dtype=np.int64), base=instance.base, fuel_s=fuel, time_s=time, quickest_s=quickest,
+    return LegTables(
+        vehicle_class=np.array(vehicle_class, dtype=np.int64), base=instance.base, fuel_s=fuel, time_s=time,
+        quickest_s=quickest,
         first=first, last=last, hops=np.concatenate(hops), capacity_s=capacity,
-        limit_s=np.array([v.mission_limit_s for v in kinds]) + SLACK_S)
+        limit_s=np.array([v.mission_limit_s for v in classes]) + SLACK_S)
 
 
 @njit(cache=True)
 def _station_chains(fuel, time, chain, stations, capacity, quickest, stop):
-    """The chains of stations that no other dominates in all three respects, by increasing time; lowers ``quickest``."""
+    """The chains of stations that are nondominated in fuel, time and fuel, by increasing time; lowers ``quickest``."""
     n, count = len(fuel), len(stations)
     first, last = np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
     found = np.empty((1024, 3))
     size = 0
-    some = np.empty((count * count, 3))
+    candidates = np.empty((count * count, 3))
     for a in range(n):
         for b in range(n):
-            if poll(stop):  # with a thousand stations each of so many pairs has a million chains
+            if poll(stop):  # with a thousand stations each pair of sites has a million chains
                 return found[:0].copy(), np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
             first[a, b] = size
             number = 0
@@ -106,23 +107,23 @@ def _station_chains(fuel, time, chain, stations, capacity, quickest, stop):
                         continue
                     if not np.isfinite(chain[k, l]):
                         continue
-                    some[number, 0] = fuel[a, r]
-                    some[number, 1] = time[a, r] + chain[k, l] + time[s, b]
-                    some[number, 2] = fuel[s, b]
+                    candidates[number, 0] = fuel[a, r]
+                    candidates[number, 1] = time[a, r] + chain[k, l] + time[s, b]
+                    candidates[number, 2] = fuel[s, b]
                     number += 1
-            for x in np.argsort(some[:number, 1]):
-                beaten = False
+            for x in np.argsort(candidates[:number, 1]):
+                dominated = False
                 for y in range(first[a, b], size):
-                    if found[y, 0] <= some[x, 0] and found[y, 2] <= some[x, 2]:
-                        beaten = True
+                    if found[y, 0] <= candidates[x, 0] and found[y, 2] <= candidates[x, 2]:
+                        dominated = True
                         break
-                if beaten:
+                if dominated:
                     continue
                 if size == len(found):
                     larger = np.empty((2 * size, 3))
                     larger[:size] = found
                     found = larger
-                found[size] = some[x]
+                found[size] = candidates[x]
                 size += 1
             last[a, b] = size
             if last[a, b] > first[a, b]:
@@ -132,16 +133,16 @@ def _station_chains(fuel, time, chain, stations, capacity, quickest, stop):
 
 @njit(cache=True)
 def step(times, fuels, count, leg_time, leg_fuel, hops, begin, end, near, far, capacity, limit, to_times, to_fuels):
-    """The front after one more leg, driven directly or over stations; its length.
+    """The front after one more leg, driven directly or by stations; its length.
 
-    ``near`` and ``far`` say which columns of ``hops`` hold the fuel at this end and at the other one: 0 and 2
+    ``near`` and ``far`` are the columns of ``hops`` with the fuel at this end and at the other one: 0 and 2
     forwards, 2 and 0 backwards. Fronts are sorted by increasing time and decreasing fuel.
     """
     size = 0
     direct = 0
     hop = begin
     while True:
-        # Next direct candidate, and next chain of stations; the earlier one first.
+        # Next direct candidate, and next chain of stations, in order of time.
         while direct < count and fuels[direct] + leg_fuel > capacity:
             direct += 1
         time_direct = times[direct] + leg_time if direct < count else np.inf
@@ -167,7 +168,7 @@ def step(times, fuels, count, leg_time, leg_fuel, hops, begin, end, near, far, c
             if direct >= count and hop >= end:
                 return size
             continue
-        # Insert into the front; chains come by increasing time of their own, not of their sum.
+        # Insert into the front: chains are sorted by their own time, not by the sum.
         place = size
         while place > 0 and to_times[place - 1] > time:
             place -= 1

@@ -1,4 +1,4 @@
-"""The best plan that can be put together of given routes: a set-packing program."""
+"""The best combination of given routes: a set-packing program."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.solver.highs import Relaxation, maximise
 from sva_bench.solver.program import LinearModel, Rows
-from sva_bench.solver.routes.fronts import Tables
+from sva_bench.solver.routes.fronts import LegTables
 
 Route = tuple[int, tuple[int, ...]]
-"""Kind of vehicle, or vehicle, that drives it, and its POIs in order."""
+"""Vehicle class or vehicle that drives it, and its POIs in order."""
 
 MOST_COLUMNS = 600
 MOST_GOOD = 200
@@ -21,24 +21,30 @@ _EPSILON = 1e-9
 
 
 def best_packing(
-    tables: Tables, weights: FloatArray, survival: FloatArray, routes: Sequence[Route],
+    tables: LegTables, weights: FloatArray, survival: FloatArray, routes: Sequence[Route],
     incumbent: tuple[tuple[int, ...], ...],
 ) -> tuple[tuple[tuple[int, ...], ...], tuple[Route, ...]]:
-    """The best plan of these routes, each offered to every vehicle that can drive it, or the incumbent.
+    """The best plan of these routes, or the incumbent, and the routes of greatest reduced cost.
 
-    With it the routes that count for the relaxation, each with its vehicle.
+    Each route is a column for every vehicle of its class; branch and bound is limited, so the plan isn't proved.
 
     Args:
-        tables: The vehicles' legs.
+        tables: The legs of all vehicle classes.
         weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
-        survival: Chance of a vehicle to get to its next POI, shape (M,).
-        routes: The routes.
-        incumbent: A plan, which is among the candidates.
+        survival: Probability of a vehicle to get to its next POI, shape (M,).
+        routes: The routes, each with its vehicle class.
+        incumbent: A feasible plan, whose routes are columns too.
+
+    Returns:
+        POIs of each vehicle in order; and at most ``MOST_GOOD`` routes, each with its vehicle.
+
+    Raises:
+        KeyboardInterrupt: If Ctrl-C ended the solve.
     """
     vehicles, n = weights.shape
     offers: dict[tuple[int, frozenset[int]], tuple[float, tuple[int, ...]]] = {}
-    for m, order in (*enumerate(incumbent), *((m, order) for kind, order in routes
-                                              for m in range(vehicles) if tables.kind[m] == kind)):
+    for m, order in (*enumerate(incumbent), *((m, order) for vehicle_class, order in routes
+                                              for m in range(vehicles) if tables.vehicle_class[m] == vehicle_class)):
         worth = 0.0
         for k, j in enumerate(order, start=1):
             worth += weights[m, j] * survival[m]**k
@@ -78,7 +84,7 @@ def best_packing(
 def _program(
     columns: Sequence[tuple[int, frozenset[int], float, tuple[int, ...]]], objective: FloatArray, vehicles: int, n: int,
 ) -> LinearModel:
-    """Each POI and each vehicle at most once."""
+    """The set-packing program: each POI and each vehicle at most once."""
     rows: list[list[int]] = [[] for _ in range(n + vehicles)]
     for number, (m, visited, _, _) in enumerate(columns):
         rows[n + m].append(number)

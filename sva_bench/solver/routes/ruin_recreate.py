@@ -1,4 +1,4 @@
-"""Ruin and recreate in compiled code: remove some POIs, insert others where they fit best, straighten the routes.
+"""Ruin and recreate in compiled code: remove some POIs, insert others greedily, improve each route's order.
 
 Source:
     Schrimpf et al. (2000), "Record breaking optimization results using the ruin and recreate principle".
@@ -12,17 +12,17 @@ from numba import njit
 from sva_bench.solver.polling import poll
 from sva_bench.solver.routes.fronts import FRONT, fronts, route_time, time_with
 
-_SHORT = 8  # POIs up to which slower orders are tried, for they may save a refuel
+_SHORT = 8  # POIs up to which moves that lengthen the route without refuels are tried: they may save a refuel
 _RUIN = 0.6  # greatest share of the visits removed
-_BAN = 0.7  # share of the rounds in which POIs are barred from a random vehicle
-_SWAP = 0.1  # share of the rounds that begin by swapping the routes of two vehicles
+_BAN = 0.7  # share of the iterations in which POIs are barred from a random vehicle
+_SWAP = 0.1  # share of the iterations that begin by swapping the routes of two vehicles
 _NOISE = 0.3
 _EPSILON = 1e-9
 
 
 @njit(cache=True)
-def worth(order, length, weights, survival):
-    """Value of a route: each POI's weight, times the chance to get that far."""
+def route_value(order, length, weights, survival):
+    """Value of a route: each POI's weight times the probability to get that far."""
     total, chance = 0.0, 1.0
     for k in range(length):
         chance *= survival
@@ -31,31 +31,31 @@ def worth(order, length, weights, survival):
 
 
 @njit(cache=True)
-def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, first, last, hops, capacity, limit, near,
-           weights, survival, detour, current, current_length, best, best_length, pool, pool_length, pool_kind,
+def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quickest, first, last, hops, capacity, limit,
+           near, weights, survival, detour, current, current_length, best, best_length, pool, pool_length, pool_class,
            pool_size, pool_table, keys, ordered, stop):
-    """So many rounds; works on ``current``, ``best`` and ``pool`` in place; the size of the pool.
+    """The size of the pool after some iterations, which change ``current``, ``best`` and ``pool`` in place.
 
     Long because compiled: a dozen scratch arrays are made once, and each part would need nearly all of them.
 
     Args:
         rng: Random numbers.
-        count: Rounds.
-        done: Rounds before these.
-        cycle: Rounds between two returns to the best plan; within a cycle worse plans are taken less and less.
-        heat: Loss that is taken at the start of a cycle, relative to the best value.
-        kind: Kind of each vehicle, shape (M,).
-        base: The base; it and the arrays up to ``limit`` are those of ``Tables``.
+        count: Iterations.
+        done: Iterations before these.
+        cycle: Iterations between two restarts; within a cycle the loss that is accepted falls to 0.
+        heat: Loss that is accepted at the start of a cycle, relative to the best value.
+        vehicle_class: Class of each vehicle, shape (M,).
+        base: The base; it and the arrays up to ``limit`` are those of ``LegTables``.
         near: For each POI the others by their distance, shape (n, n).
         weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
-        survival: Chance to get to the next POI, shape (M,); 1 where the order of visits is indifferent.
+        survival: Probability to get to the next POI, shape (M,); 1 where the order of visits is indifferent.
         detour: Added to each detour, so that the ratio stays finite [s].
         current: POIs of each vehicle, in order, shape (M, n); ``current_length``: how many, shape (M,).
         best: The best plan, in the same form.
-        pool: Routes met, shape (most, n), with length, kind and a hash table of twice their number or more.
+        pool: Routes found, shape (most, n), with length, class and a hash table of twice their number or more.
         keys: Random keys of the sites for hashing, shape (n,).
         ordered: Whether routes with the same POIs in another order are different ones.
-        stop: Not 0 once it should end.
+        stop: The flag of ``polling``: not 0 once Ctrl-C was pressed.
     """
     vehicles, n = weights.shape
     orders, lengths = current.copy(), current_length.copy()
@@ -70,8 +70,8 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
     sums = np.zeros((2, n + 2))
     current_value = best_value = 0.0
     for m in range(vehicles):
-        current_value += worth(current[m], current_length[m], weights[m], survival[m])
-        best_value += worth(best[m], best_length[m], weights[m], survival[m])
+        current_value += route_value(current[m], current_length[m], weights[m], survival[m])
+        best_value += route_value(best[m], best_length[m], weights[m], survival[m])
     for number in range(done, done + count):
         if poll(stop):
             break
@@ -80,7 +80,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
             _swap(rng, orders, lengths, weights, spare)
         _ruin(rng, orders, lengths, near, removed)
         for m in range(vehicles):
-            k = kind[m]
+            k = vehicle_class[m]
             if np.isinf(route_time(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops,
                                    capacity[k], limit[k], scratch)):
                 lengths[m] = 0  # without the triangle inequality a POI may have been a shortcut
@@ -95,13 +95,13 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
                 if rng.random() < ban:
                     allowed[int(rng.random() * vehicles), j] = False
         for again in range(2):
-            _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel, time, quickest, first, last,
-                      hops, capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score,
-                      place, least, reward, total, scratch)
+            _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, base, fuel, time, quickest,
+                      first, last, hops, capacity, limit, weights, survival, detour, ahead, ahead_size, behind,
+                      behind_size, score, place, least, reward, total, scratch)
             if again == 0:
                 for m in range(vehicles):
-                    k = kind[m]
-                    straighten(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
+                    k = vehicle_class[m]
+                    improve_order(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
                                limit[k], weights[m], survival[m], scratch, spare, sums, stop)
                     for j in range(n):
                         allowed[m, j] = weights[m, j] > 0
@@ -109,9 +109,9 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
                 power = 1.0
         value = 0.0
         for m in range(vehicles):
-            value += worth(orders[m], lengths[m], weights[m], survival[m])
-            pool_size = _keep(orders[m], lengths[m], kind[m], pool, pool_length, pool_kind, pool_size, pool_table,
-                              keys, ordered)
+            value += route_value(orders[m], lengths[m], weights[m], survival[m])
+            pool_size = _keep(orders[m], lengths[m], vehicle_class[m], pool, pool_length, pool_class, pool_size,
+                              pool_table, keys, ordered)
         if value > best_value + _EPSILON:
             best[:], best_length[:] = orders, lengths
             best_value = value
@@ -119,7 +119,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
         if value >= current_value - heat * left * best_value:
             current[:], current_length[:] = orders, lengths
             current_value = value
-        if number % cycle == cycle - 1:  # restart by turns from nothing and from the best
+        if number % cycle == cycle - 1:  # restart, alternately from the empty plan and from the best
             current[:], current_length[:] = best, best_length
             current_value = best_value
             if number // cycle % 2 == 0:
@@ -130,7 +130,7 @@ def rounds(rng, count, done, cycle, heat, kind, base, fuel, time, quickest, firs
 
 @njit(cache=True)
 def _swap(rng, orders, lengths, weights, spare):
-    """Let two vehicles drive each other's routes, as far as they earn there and can."""
+    """Swap the routes of two random vehicles, without the POIs at which the other earns nothing."""
     a = int(rng.random() * len(lengths))
     b = (a + 1 + int(rng.random() * (len(lengths) - 1))) % len(lengths)
     length = lengths[a]
@@ -149,7 +149,7 @@ def _swap(rng, orders, lengths, weights, spare):
 
 @njit(cache=True)
 def _ruin(rng, orders, lengths, near, removed):
-    """Remove a segment of the routes, the POIs around one, or any."""
+    """Remove a segment of consecutive visits, the POIs around a random one, or random POIs."""
     visits = 0
     for m in range(len(lengths)):
         visits += lengths[m]
@@ -158,7 +158,7 @@ def _ruin(rng, orders, lengths, near, removed):
     count = 1 + int(rng.random() * max(1, int(_RUIN * visits)))
     operator = int(rng.random() * 3)
     removed[:] = False
-    if operator == 0:  # any: each with the chance that leaves so many on average
+    if operator == 0:  # each with the probability that removes ``count`` on average
         for m in range(len(lengths)):
             for k in range(lengths[m]):
                 removed[orders[m, k]] = rng.random() * visits < count
@@ -187,13 +187,12 @@ def _ruin(rng, orders, lengths, near, removed):
 
 
 @njit(cache=True)
-def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel, time, quickest, first, last, hops,
-              capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score, place, least,
-              reward, total, scratch):
-    """Insert POIs, those of most reward for the least detour first, until none fits.
+def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, base, fuel, time, quickest, first, last,
+              hops, capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score, place,
+              least, reward, total, scratch):
+    """Insert POIs greedily by reward per detour, until none fits.
 
-    Long because compiled: what is known of a detour is kept from one insertion to the next, in arrays that each part
-    would need.
+    Long because compiled: detours are kept from one insertion to the next, in arrays that each part would need.
     """
     vehicles, n = weights.shape
     visited[:] = False
@@ -210,7 +209,7 @@ def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel
         for m in range(vehicles):
             if stale >= 0 and m != stale:
                 continue
-            k = kind[m]
+            k = vehicle_class[m]
             free = capacity[k] >= limit[k]
             if free:
                 total[m] = route_time(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops,
@@ -218,7 +217,7 @@ def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel
             else:
                 total[m] = fronts(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
                                   limit[k], ahead[m], ahead_size[m], behind[m], behind_size[m])
-            # Where fuel can't bind, a detour stays what it was wherever the route hasn't changed.
+            # Where fuel can't bind, a detour is unchanged at every position but that of the last insertion.
             known = free and stale >= 0 and survival[m] == 1.0
             for j in range(n):
                 if visited[j] or not allowed[m, j]:
@@ -232,7 +231,7 @@ def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel
                     least[m, j] = np.inf
                 suffix, chance = 0.0, 1.0
                 if survival[m] < 1.0:
-                    suffix = worth(orders[m], lengths[m], weights[m], survival[m])
+                    suffix = route_value(orders[m], lengths[m], weights[m], survival[m])
                 for position in range(begin, end + 1):
                     a = base if position == 0 else orders[m, position - 1]
                     b = base if position == lengths[m] else orders[m, position]
@@ -241,7 +240,7 @@ def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel
                     elif ahead[m, position, 0, 0] + quickest[k, a, j] + quickest[k, j, b] \
                             + behind[m, position + 1, 0, 0] >= \
                             (limit[k] if survival[m] < 1.0 else min(limit[k], total[m] + least[m, j])):
-                        later = np.inf  # seen without refuels: too late, or later than elsewhere
+                        later = np.inf  # a lower bound without refuels is too late, or later than another position
                     else:
                         later = time_with(j, a, b, fuel[k], time[k], first[k], last[k], hops, capacity[k],
                                           limit[k], ahead[m, position], ahead_size[m, position],
@@ -277,15 +276,15 @@ def _recreate(orders, lengths, visited, allowed, power, factor, kind, base, fuel
 
 
 @njit(cache=True)
-def straighten(order, length, base, fuel, time, first, last, hops, capacity, limit, weights, survival, scratch, spare,
-               sums, stop):
-    """Reverse parts of a route and move up to three POIs of it, in place, as long as that gains value or time.
+def improve_order(order, length, base, fuel, time, first, last, hops, capacity, limit, weights, survival, scratch,
+                  spare, sums, stop):
+    """Improve a route in place by 2-opt (reversals) and Or-opt (moves of up to three POIs) to a local optimum.
 
-    On a long route only such changes are tried as are quicker without refuels. Ends early, with a route that is as
+    On a long route only moves are tried that save time without refuels. Ends early, with a route that is as
     good as before or better, once ``stop`` is not 0.
     """
     now = route_time(order, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
-    earned = worth(order, length, weights, survival) if survival < 1.0 else 0.0
+    earned = route_value(order, length, weights, survival) if survival < 1.0 else 0.0
     refuels = last[base, base] > first[base, base]
     ahead, back = sums[0], sums[1]
     _sums(order, length, base, time, ahead, back)
@@ -304,7 +303,7 @@ def straighten(order, length, base, fuel, time, first, last, hops, capacity, lim
                 for k in range(i, j + 1):
                     spare[k] = order[i + j - k]
                 later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
-                gain = worth(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
+                gain = route_value(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
                 if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
                     order[:length] = spare[:length]
                     _sums(order, length, base, time, ahead, back)
@@ -330,7 +329,7 @@ def straighten(order, length, base, fuel, time, first, last, hops, capacity, lim
                         _move(order, length, i, size, position, backwards, spare)
                         later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit,
                                            scratch)
-                        gain = worth(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
+                        gain = route_value(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
                         if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
                             order[:length] = spare[:length]
                             _sums(order, length, base, time, ahead, back)
@@ -340,7 +339,7 @@ def straighten(order, length, base, fuel, time, first, last, hops, capacity, lim
 
 @njit(cache=True)
 def _sums(order, length, base, time, ahead, back):
-    """Driving time up to each stop, and of the same stretch backwards."""
+    """Cumulative driving time up to each stop, and of the same stops in reverse."""
     ahead[0] = back[0] = 0.0
     for k in range(length + 1):
         a = base if k == 0 else order[k - 1]
@@ -364,24 +363,24 @@ def _move(order, length, start, size, position, backwards, to):
 
 
 @njit(cache=True)
-def _keep(order, length, kind, pool, pool_length, pool_kind, size, table, keys, ordered):
+def _keep(order, length, vehicle_class, pool, pool_length, pool_class, size, table, keys, ordered):
     """Put a route into the pool unless it is there or the pool is full; the size of the pool."""
     if length == 0 or size == len(pool):
         return size
-    code = np.uint64(kind + 1) * np.uint64(0x9E3779B97F4A7C15)
+    code = np.uint64(vehicle_class + 1) * np.uint64(0x9E3779B97F4A7C15)
     for k in range(length):
         code += keys[order[k]] * np.uint64(k + 1) if ordered else keys[order[k]]
     code ^= code >> np.uint64(29)
     slot = np.int64(code % np.uint64(len(table)))
     while table[slot] >= 0:
         other = table[slot]
-        if pool_length[other] == length and pool_kind[other] == kind and \
+        if pool_length[other] == length and pool_class[other] == vehicle_class and \
                 _same(pool[other], order, length, ordered):
             return size
         slot = (slot + 1) % len(table)
     table[slot] = size
     pool[size, :length] = order[:length]
-    pool_length[size], pool_kind[size] = length, kind
+    pool_length[size], pool_class[size] = length, vehicle_class
     return size + 1
 
 

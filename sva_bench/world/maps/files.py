@@ -1,4 +1,4 @@
-"""Files that a world names: where they may lie, and what they held when they were read."""
+"""Files that a world names: their allowed locations, and their content as read."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pathlib import Path, PurePosixPath
 from sva_bench.errors import BadFile
 from sva_bench.files.documents import read_bytes
 
-MAX_BYTES = 100_000_000  # 16 million numbers in ASCII, with room to spare
-WIDEST_M, FARTHEST_M = 2000.0, 1e5  # of a world, and from its origin; as for shapes
+MAX_BYTES = 100_000_000  # more than 16 million numbers in ASCII
+WIDEST_M, FARTHEST_M = 2000.0, 1e5  # greatest width of a world, and distance from its origin, as for shapes
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MapFile:
-    """A file that a world names, directly or by another one.
+    """A file that a world names, directly or through another file.
 
     Attributes:
         name: Relative to the world's folder, with slashes.
-        content: Its bytes as they were read.
+        content: Its bytes as read.
     """
 
     name: str
@@ -27,10 +27,10 @@ class MapFile:
 
 
 def locate(root: Path, name: str) -> Path:
-    """A file by its name relative to a folder, which it may not leave: not by ``..`` and not by a link either.
+    """The path of a file named relative to a folder, which must not be left by ``..`` or by a link.
 
     Raises:
-        BadFile: If it is elsewhere, or no file.
+        BadFile: If it is outside the folder, or no file.
     """
     shown = name if name.isprintable() and len(name) <= 200 else repr(name[:200])
     if not name or "\0" in name:
@@ -52,8 +52,14 @@ def locate(root: Path, name: str) -> Path:
 
 
 def normal(name: str) -> str:
+    """A relative name in normal form, with slashes."""
     return str(PurePosixPath(os.path.normpath(name)))
 
 
 def content_of(path: Path) -> bytes:
+    """The content of a map's file.
+
+    Raises:
+        BadFile: If it cannot be read, or is larger than ``MAX_BYTES``.
+    """
     return read_bytes(path, MAX_BYTES)

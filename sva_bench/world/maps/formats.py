@@ -1,4 +1,4 @@
-"""The formats of maps that a world may name, a line each: what the world file, its schema and from-map know of them."""
+"""The registry of map formats, one line each, for the world file, its schema and from-map."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from sva_bench.world.maps.section import MapSection
 
 @dataclass(frozen=True, kw_only=True)
 class MapFormat:
-    """A format of maps.
+    """A map format.
 
     Attributes:
-        key: What a world file has below ``map:``.
-        section: What stands below that key, and reads the map.
-        maps: What such maps are called, several of them.
-        suffixes: Endings of the files that from-map takes for such a map.
-        asked_for: How a message asks for such a file.
-        lacks: Options of other formats that it has no use for, and why.
+        key: Its key below ``map:`` in a world file.
+        section: The section below that key, which reads the map.
+        maps: What such maps are called, in the plural.
+        suffixes: Suffixes of files that from-map reads as such a map.
+        asked_for: How messages ask for such a file.
+        lacks: Options of other formats that it doesn't support, and why.
     """
 
     key: str
@@ -49,10 +49,10 @@ FORMATS: Mapping[str, MapFormat] = {form.key: form for form in _ALL}
 
 
 def format_of(path: Path) -> MapFormat:
-    """The format of a map's file, by its ending.
+    """The format of a map's file, by its suffix.
 
     Raises:
-        BadInput: If no format's files end so.
+        BadInput: If no format has this suffix.
     """
     for form in FORMATS.values():
         if path.suffix.lower() in form.suffixes:

@@ -13,14 +13,14 @@ from PIL import Image
 from sva_bench.arrays import BoolArray
 from sva_bench.world.maps.plain_images import plain_levels, plain_size
 
-MAX_CELLS = 16_000_000  # 4000 x 4000: four times the largest map that the benchmarks speak of
-_FORMATS = ("PPM", "PNG", "BMP")  # PIL calls the PGM family by its last member
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # before numbers written out by an editor
+MAX_CELLS = 16_000_000  # 4000 x 4000: four times the largest map of the benchmarks
+_FORMATS = ("PPM", "PNG", "BMP")  # PIL's name of the PGM family is PPM
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # written by some editors before plain (ASCII) images
 _DEEP = ("I", "I;16", "I;16B", "I;16L", "I;16N")  # 16 bits a pixel
 
 
 class BadImage(ValueError):
-    """What is wrong with a picture, in words."""
+    """An image that cannot be read; the message says why."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,7 +39,7 @@ class GreyImage:
 def grey_image(content: bytes) -> GreyImage:
     """Decode a PGM, PNG or BMP picture; colours become their luminance (ITU-R 601), 16 bits become 8.
 
-    The size is read first, and nothing is decoded that would not fit.
+    The size is checked before anything is decoded.
 
     Raises:
         BadImage: If it is none of these, is broken, or has more than ``MAX_CELLS`` pixels.
@@ -50,7 +50,7 @@ def grey_image(content: bytes) -> GreyImage:
             _refuse_size(*size)
             return _plain_grey(content)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # PIL warns of great pictures; ours is the stricter limit
+            warnings.simplefilter("ignore")  # PIL warns of large images; our limit is stricter
             with Image.open(io.BytesIO(content), formats=_FORMATS) as image:
                 columns, rows = image.size
                 _refuse_size(columns, rows)
@@ -75,7 +75,7 @@ def _refuse_size(columns: int, rows: int) -> None:
 
 
 def _plain_grey(content: bytes) -> GreyImage:
-    """Numbers written out: PIL takes 3 GB for 4000 x 4000 of them."""
+    """Plain (ASCII) images, for which PIL takes 3 GB at 4000 x 4000 pixels."""
     level = plain_levels(content)
     level *= 255  # in place: 128 MB at the most cells that are read
     deep = np.round(level, out=level).astype(np.uint8)

@@ -1,6 +1,6 @@
-"""Maps that users have already, as occupancy grids: ROS map_server and Nav2 maps, and MovingAI's octile maps.
+"""ROS map_server and Nav2 maps as occupancy grids.
 
-Of a ROS map each pixel becomes an occupancy of 0 to 100, or -1 for unknown, exactly as current Nav2 does it
+Each pixel becomes an occupancy of 0 to 100, or -1 for unknown, exactly as in current Nav2
 (``nav2_map_server``, loadMapFromFile): a pixel *at* a threshold counts as occupied, or free; one that is not fully
 opaque is unknown, but in raw mode. The map_server of ROS 1 leaves pixels at a threshold unknown, and averages alpha in.
 """
@@ -31,10 +31,10 @@ from sva_bench.world.maps.section import MapSection
 _log = logging.getLogger(__name__)
 
 
-_USUAL_UNKNOWN, _MANY = 205, 1e-3  # the level that map_saver writes for unknown; share of cells that is no accident
+_USUAL_UNKNOWN, _MANY = 205, 1e-3  # the level that map_saver writes for unknown; least share of cells for a warning
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
 _MODES: tuple[MapMode, ...] = get_args(MapMode)
-_YES, _NO = ("true", "yes", "on", "1"), ("false", "no", "off", "0")  # YAML 1.1 has all of them, and ROS reads it
+_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")  # YAML 1.1 has all of them, and ROS reads it
 
 
 class RosMap(MapSection):
@@ -57,8 +57,8 @@ def read_ros_map(
     Args:
         root: The folder that no file may leave.
         name: The map's YAML file, relative to it.
-        unknown: What cells count as that are neither occupied nor free.
-        anywhere: Let the image lie outside the folder. The files that are returned fit together all the same: the YAML
+        unknown: Whether cells that are neither occupied nor free count as occupied or free.
+        anywhere: Whether the image may be outside the folder. The returned files are consistent in any case: the YAML
             file names the image beside it.
 
     Returns:
@@ -97,9 +97,9 @@ def read_ros_map(
     if max(rows, columns) * cell_m > WIDEST_M:
         raise document.error(("resolution",), f"{columns} x {rows} cells of {cell_m} m; a world may be at most "
                              f"{WIDEST_M:g} m wide")
-    if odd := [key for key in document.data if key not in _KEYS]:
-        _log.warning("%s: not used: %s", path, ", ".join(map(repr, odd)))
-    _say_what_is_odd(document, image, value, free)
+    if unknown_key := [key for key in document.data if key not in _KEYS]:
+        _log.warning("%s: not used: %s", path, ", ".join(map(repr, unknown_key)))
+    _warn_of_odd_values(document, image, value, free)
     _refuse_no_free_cell(document, solid, int((value < 100 * occupied).sum()), unknown)
     cells = Cells(occupied=solid[::-1], cell_m=cell_m, origin=np.array(origin),
                   unknown=(solid & (value < 100 * occupied))[::-1])
@@ -107,8 +107,8 @@ def read_ros_map(
     return cells, (MapFile(name=normal(name), content=own), MapFile(name=image_name, content=content))
 
 
-def _say_what_is_odd(document: Document, image: GreyImage, value: NDArray[np.int8], free_thresh: float) -> None:
-    """Notices of what a map hardly means."""
+def _warn_of_odd_values(document: Document, image: GreyImage, value: NDArray[np.int8], free_thresh: float) -> None:
+    """Warn of values that are probably mistakes: yaw in degrees, and unknown cells that count as free."""
     path, yaw = document.path, _as_number(document.data["origin"][2]) or 0.0
     if abs(yaw) > 2 * math.pi:
         _log.warning("%s: the origin's yaw is %g, more than a turn: it is in radians; %g degrees are %.6g", path, yaw,
@@ -131,7 +131,7 @@ def _refuse_no_free_cell(document: Document, solid: BoolArray, not_occupied: int
 
 
 def naming_image(document: Document, name: str) -> bytes:
-    """The text of a map's YAML file with another image: its line is replaced, or all of it written anew."""
+    """The text of a map's YAML file with another image: the line is replaced, or the file rewritten."""
     lines = document.text.split("\n")
     at = (document.line(("image",)) or 1) - 1
     ending = re.fullmatch(r"image\s*:\s*[^\s'\"#|>&*{\[][^#]*?(\s*#.*)?|image\s*:\s*(?:'[^']*'|\"[^\"]*\")(\s*#.*)?",
@@ -145,7 +145,7 @@ def naming_image(document: Document, name: str) -> bytes:
 def occupancy(
     image: GreyImage, *, negate: bool, occupied_thresh: float, free_thresh: float, mode: MapMode
 ) -> NDArray[np.int8]:
-    """Occupancy of each pixel, 0 to 100 or -1, as current Nav2 reads it; in its single precision."""
+    """Occupancy of each pixel, 0 to 100 or -1 for unknown, as in current Nav2, in single precision."""
     if mode == "raw":
         return np.where(image.level <= 100, image.level, -1).astype(np.int8)
     shade = image.level.astype(np.float32) / np.float32(255)
@@ -166,9 +166,9 @@ def occupancy(
 def solid_cells(
     value: NDArray[np.int8], *, occupied_thresh: float, free_thresh: float, unknown: Unknown
 ) -> BoolArray:
-    """Which cells a robot must keep off: the occupied, and by default what isn't known to be free.
+    """Which cells are obstacles: the occupied ones, and by default all that aren't known to be free.
 
-    Occupancies between 0 and 100, of scale and raw mode, are held against the thresholds again: in between a cell is
+    Occupancies between 0 and 100, of scale and raw mode, are compared with the thresholds again: in between a cell is
     neither occupied nor free, as it would be in trinary mode.
     """
     if unknown == "free":
@@ -186,7 +186,7 @@ def _image_of(document: Document) -> str:
 
 
 def _elsewhere(document: Document, root: Path, path: Path) -> Path | None:
-    """Where the image is, if not in the folder."""
+    """The path of the image, if it is outside the folder; else ``None``."""
     image = Path(path.parent, _image_of(document))
     try:
         if image.resolve().is_relative_to(root.resolve()):
@@ -209,16 +209,16 @@ def _image_name(document: Document, yaml_name: str, elsewhere: Path | None) -> s
 
 def _value(document: Document, key: str) -> object:
     if document.data.get(key) is None:
-        for odd in document.data:
-            if odd not in _KEYS and get_close_matches(str(odd)[:200], [key], cutoff=0.7):
-                raise document.error((odd,), f"unknown key {odd!r}; did you mean {key!r}?")
+        for unknown_key in document.data:
+            if unknown_key not in _KEYS and get_close_matches(str(unknown_key)[:200], [key], cutoff=0.7):
+                raise document.error((unknown_key,), f"unknown key {unknown_key!r}; did you mean {key!r}?")
         raise document.error((key,), f"the key {key!r} is missing; add it, as map_server writes it")
     value: object = document.data[key]
     return value
 
 
 def _as_number(value: object) -> float | None:
-    """Numbers, and texts of numbers: what reads YAML for ROS takes the quotes away."""
+    """A finite number, or text of one, which ROS's YAML readers accept; else ``None``."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
     try:
@@ -250,9 +250,9 @@ def _flag(document: Document, key: str) -> bool:
     value = _value(document, key)
     number = _as_number(value)
     text = str(value).lower() if number is None else str(int(number)) if number in (0, 1) else ""
-    if text not in _YES + _NO:
+    if text not in _TRUE + _FALSE:
         raise document.error((key,), f"expected 0 or 1, found {_short(value)}")
-    return text in _YES
+    return text in _TRUE
 
 
 def _mode(document: Document) -> MapMode:

@@ -1,4 +1,4 @@
-"""What stands below a map's key in a world file, whatever its format."""
+"""The section below a map's key in a world file, common to all formats."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FileName = Annotated[str, Field(min_length=1, max_length=1000)]
 
 
 class MapSection(Section):
-    """The file of a map, and how it is to be read; each format has its own."""
+    """The file of a map, and settings of its reading; each format has a subclass."""
 
     file: FileName
 
@@ -24,7 +24,7 @@ class MapSection(Section):
 
         Args:
             root: The folder that no file may leave; ``file`` is relative to it.
-            anywhere: Let files that the map names lie outside the folder.
+            anywhere: Whether files that the map names may be outside the folder.
 
         Returns:
             The grid; and the files that were read, the one that the world names first.
@@ -35,5 +35,5 @@ class MapSection(Section):
         raise NotImplementedError
 
     def written(self) -> dict[str, str | float]:
-        """The section as a new world file has it: without what is so by default and goes without saying."""
+        """The section as written into a new world file, without redundant defaults."""
         return self.model_dump()

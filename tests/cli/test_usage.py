@@ -15,7 +15,7 @@ from sva_bench.__main__ import run_command_line
 from sva_bench.cli import options
 from sva_bench.cli.app import app
 from sva_bench.files.seal import refuse_others, sealed
-from tests.test_cli import TINY
+from tests.cli.test_commands import TINY
 from tests.worlds_for_tests import SMALL
 
 ROS_MAP = "image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"

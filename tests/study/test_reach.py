@@ -17,7 +17,7 @@ from sva_bench.study.options import Options
 from sva_bench.study.planning import check_plans
 from sva_bench.study.publish import Run
 from sva_bench.study.run import run
-from tests.test_cli import sva_bench, world_file
+from tests.cli.test_commands import sva_bench, world_file
 from tests.worlds_for_tests import SMALL, world_of
 
 QUICK = Options(trials=20, rollouts=2, fidelity="kinematic")
@@ -37,7 +37,7 @@ def told(done: Run, capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
         capsys.readouterr().out, (done.folder / "report.html").read_text()))
 
 
-def test_where_nothing_is_reached_table_page_and_summary_say_what_check_says(
+def test_where_no_poi_is_reachable_table_page_summary_and_check_agree(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     done = run_of(tmp_path, DRY)
     assert done.summary.reach == Reach(
@@ -71,7 +71,7 @@ def test_pois_that_no_robot_reaches_are_named(tmp_path: Path, capsys: pytest.Cap
         assert f"No robot reaches {' and '.join(missed)}." in text
 
 
-def test_where_everything_is_reached_nothing_is_said(tmp_path: Path) -> None:
+def test_where_all_pois_are_reachable_there_is_no_warning(tmp_path: Path) -> None:
     done = run_of(tmp_path, SMALL)
     assert done.summary.reach == Reach(nothing=False, robots=(), pois=(), missed={})
     assert beyond_reach(done.summary.reach) == []
@@ -111,7 +111,7 @@ def executed(folder: Path, plans: dict[str, dict[str, list[str]]]) -> Run:
     return execute_plans(world, read, QUICK, folder / "runs", None, lambda *_: None, costs)
 
 
-def test_a_plan_that_breaks_its_limits_is_told_before_its_figure(
+def test_an_infeasible_plan_is_marked_before_its_figure(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     done = executed(tmp_path, {"dry": {"uv1": ["base", "p1", "p2", "p3", "p4", "base"]}, "good": {"uv1": [
         "base", "p1", "base"], "uv2": ["base", "p4", "base"]}})

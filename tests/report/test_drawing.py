@@ -138,7 +138,7 @@ def test_roadmap_paths_and_routes_are_where_they_are_planned(small: World) -> No
         assert not changed[frame.pixel(1.2, 3.0)]
 
 
-def test_robots_are_told_apart_without_colour() -> None:
+def test_robots_are_distinguishable_without_colour() -> None:
     styles = [(str(style), width) for _, style, width in _ROUTES]
     assert len(set(styles)) == len(styles)
 
@@ -173,7 +173,7 @@ def test_a_label_does_not_end_beside_the_marker_of_another() -> None:
     assert own < other
 
 
-def test_a_label_that_had_to_go_away_is_joined_to_its_marker_by_a_line(small: World) -> None:
+def test_a_distant_label_is_joined_to_its_marker_by_a_line(small: World) -> None:
     # A path around the only site, where a label beside it would begin: farther off there is room.
     angles = np.linspace(0, 2 * np.pi, 60)
     around = np.array([1.5, 1.5]) + 0.15 * np.column_stack([np.cos(angles), np.sin(angles)])

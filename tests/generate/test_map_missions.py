@@ -13,7 +13,7 @@ from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.load import load_world
-from tests.test_cli import sva_bench
+from tests.cli.test_commands import sva_bench
 from tests.world.maps_for_tests import SHARED, shared_map, write_ros_map
 
 ROOMS = """\
@@ -35,7 +35,7 @@ def from_map(*arguments: object) -> int:
     return run_command_line(["world", "from-map", *map(str, arguments)])
 
 
-def test_a_map_becomes_a_world_that_stands_by_itself(tmp_path: Path) -> None:
+def test_a_map_becomes_a_self_contained_world(tmp_path: Path) -> None:
     source, target = tmp_path / "source", tmp_path / "target"
     source.mkdir()
     target.mkdir()
@@ -100,7 +100,7 @@ def test_the_base_may_be_chosen(tmp_path: Path) -> None:
     (("a.map", "--unknown", "free", "-o", "w.yaml"), "--unknown belongs to ROS maps"),
     (("map.yaml", "--pois", "5", "--robots", "3", "-o", "w.yaml"), "3 robots and 5 POIs leave nothing to decide"),
 ])
-def test_what_does_not_fit_is_said_clearly_and_leaves_no_file(
+def test_a_mission_that_does_not_fit_is_an_error_and_leaves_no_file(
     arguments: tuple[str, ...], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -16,7 +16,7 @@ from PIL import Image
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder, check_output
-from tests.test_cli import TINY, sva_bench
+from tests.cli.test_commands import TINY, sva_bench
 from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL
 
@@ -42,7 +42,7 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     ("sva-bench instance random --pois 3 -o made.json 2>&-", ""),
     ("sva-bench instance random --pois 3 -o made.json >&- 2>&- <&-", ""),
 ])
-def test_a_reader_who_has_gone_ends_nothing_and_is_told_nothing(line: str, said: str, tmp_path: Path) -> None:
+def test_a_closed_pipe_neither_ends_the_command_nor_gives_a_message(line: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY.replace('"fuel_capacity_s": 10', '"fuel_capacity_s": 11'))
     (tmp_path / "plan.json").write_text('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}')
     done = shell(line, tmp_path)
@@ -53,7 +53,7 @@ def test_a_reader_who_has_gone_ends_nothing_and_is_told_nothing(line: str, said:
         assert json.loads((tmp_path / "made.json").read_text())["format"] == "sva-bench/instance@1"
 
 
-def test_a_run_whose_table_nobody_reads_says_where_it_is_all_the_same(tmp_path: Path) -> None:
+def test_a_run_into_a_closed_pipe_still_prints_its_folder(tmp_path: Path) -> None:
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     done = shell("sva-bench run small.yaml --trials 5 --fidelity kinematic --workers 1 | true", tmp_path)
     assert done.returncode == 0, done.stderr
@@ -62,7 +62,7 @@ def test_a_run_whose_table_nobody_reads_says_where_it_is_all_the_same(tmp_path: 
 
 @pytest.mark.parametrize("line", ["sva-bench --help", "sva-bench world schema",
                                   "sva-bench certify tiny.json plan.json"])
-def test_results_that_a_full_disk_loses_are_told_with_two(line: str, tmp_path: Path) -> None:
+def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY.replace('"fuel_capacity_s": 10', '"fuel_capacity_s": 11'))
     (tmp_path / "plan.json").write_text('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}')
     done = shell(f"{line} > /dev/full", tmp_path)
@@ -155,7 +155,7 @@ def test_a_place_that_is_fine_is_left_as_it_was(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
-def test_a_run_that_is_told_to_end_clears_away_what_it_began(number: signal.Signals, code: int, tmp_path: Path) -> None:
+def test_a_terminated_run_removes_its_drafts(number: signal.Signals, code: int, tmp_path: Path) -> None:
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     process = subprocess.Popen(
         [sys.executable, "-m", "sva_bench", "run", "small.yaml", "--trials", "500", "--rollouts", "500"], cwd=tmp_path,
@@ -181,7 +181,7 @@ def test_ctrl_c_is_heard_while_libraries_are_loaded(tmp_path: Path) -> None:
     (tmp_path / "typer.py").write_text("import time\nopen('loading', 'w').close()\ntime.sleep(60)\n")
     with subprocess.Popen([sys.executable, "-c", "from sva_bench.__main__ import main; main()"], cwd=tmp_path,
                           stderr=subprocess.PIPE, text=True,
-                          env=os.environ | {"PYTHONPATH": f"{tmp_path}:{Path(__file__).parents[1]}"}) as process:
+                          env=os.environ | {"PYTHONPATH": f"{tmp_path}:{Path(__file__).parents[2]}"}) as process:
         until = time.monotonic() + 60
         while not (tmp_path / "loading").exists() and time.monotonic() < until:
             time.sleep(0.01)

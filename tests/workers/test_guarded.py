@@ -75,7 +75,7 @@ def answer_to(engine: LocalProcesses, deed: str) -> Answer:
     pytest.param("memory", "2048 MB", False, marks=pytest.mark.long),
     pytest.param("fault", "ZeroDivisionError: by zero", False, marks=pytest.mark.long),
     ("mend", "move the site", True)])
-def test_what_befalls_a_job_is_told_and_the_next_one_runs(
+def test_the_failure_of_a_job_is_reported_and_the_next_one_runs(
     deed: str, told: str, mendable: bool, engine: LocalProcesses
 ) -> None:
     failed = answer_to(engine, deed)
@@ -90,12 +90,12 @@ import sys, time
 from sva_bench.workers.answers import Caps
 from sva_bench.workers.local import LocalProcesses
 from sva_bench.workers.pool import local_workers
-from tests.batch.test_engines import Deed
+from tests.workers.test_guarded import Deed
 
 if __name__ == "__main__":
     engine = LocalProcesses(1, Caps(time_s=600.0, memory_mb=0))
     engine.submit("hang", Deed(deed="hang"))
-    while not engine._at:
+    while not engine._job_of:
         engine.answers(0.5)
     with local_workers(2, "sva_bench.execution.execute") as executor:
         pids = {executor.submit(Deed(deed="work").run).result() for _ in range(8)}

@@ -27,8 +27,8 @@ from sva_bench.paper.runtimes import (
 from sva_bench.paper.solves import METHODS, Row, Study, read_rows, run
 from sva_bench.solver.two_stage import plan_stochastic
 
-PAPER = Path(__file__).parents[1] / "../shared/paper.tex"
-DOCS = Path(__file__).parents[1] / "docs"
+PAPER = Path(__file__).parents[2] / "../shared/paper.tex"
+DOCS = Path(__file__).parents[2] / "docs"
 # A mission limit of 0.6 fuel capacities leaves POIs behind, so that there is something to prove and to cut.
 TINY = Study(pois=(6,), seeds=(1,), fuel_multiples=(2.25,), availabilities=(0.75,), tau=0.6)
 
@@ -108,7 +108,7 @@ def test_what_is_no_file_of_rows_is_refused_with_its_place(folder: Path, tmp_pat
         assert path.read_text(encoding="utf-8") == wrong
 
 
-def test_the_decompositions_tables_stand_beside_the_papers() -> None:
+def test_the_decompositions_tables_are_shown_beside_the_papers() -> None:
     # Two solves of 40 POIs: gaps 0 and 10 %, 2 and 5 optimality cuts, 10 and 20 subtour cuts, 1 and 4 s.
     rows = [row(40, "lshaped", optimality=2, subtour=10), row(40, "auto"),
             row(40, "lshaped", fuel=3.0, bound=110.0, process_s=4.0, optimality=5, subtour=20)]
@@ -132,14 +132,14 @@ def test_methods_that_contradict_each_other_are_called_out() -> None:
     assert "THAN ANOTHER METHOD'S BOUND" in checks([row(10, "dep"), row(10, "auto", value=90.0, bound=95.0)])[1]
 
 
-def test_a_report_says_that_the_machine_was_busy() -> None:
+def test_a_report_warns_that_the_machine_was_busy() -> None:
     late = row(10, "dep", bound=110.0, process_s=10.0)
     assert "busy" not in markdown([late], QUICK)
     # 4 s of processor time in 10 s
     assert "had 40 % of a core" in markdown([replace(late, process_s=4.0)], QUICK)
 
 
-def test_a_report_of_half_a_run_says_so(tmp_path: Path) -> None:
+def test_a_report_of_an_incomplete_run_gives_its_extent(tmp_path: Path) -> None:
     text = write_report([row(10, "dep")], QUICK, tmp_path)
     assert "1 of 80 solves" in text
     assert "**10 s for each solve**" in text
@@ -149,7 +149,7 @@ def test_a_report_of_half_a_run_says_so(tmp_path: Path) -> None:
     assert "Nothing is solved" in markdown([], QUICK)
 
 
-def test_the_shipped_report_says_what_its_rows_say() -> None:
+def test_the_shipped_report_agrees_with_its_rows() -> None:
     rows = read_rows(DOCS / "paper-runtimes.csv")
     study = replace(QUICK, time_limit_s=rows[0].time_limit_s)
     assert {one.case for one in rows} == set(study.cases())

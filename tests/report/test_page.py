@@ -104,7 +104,7 @@ def test_a_page_loads_nothing_and_every_reference_in_it_is_met(finished: Run) ->
     assert "@import" not in text
 
 
-def test_page_terminal_and_summary_say_the_same(finished: Run) -> None:
+def test_page_terminal_and_summary_have_the_same_figures(finished: Run) -> None:
     text = html.unescape((finished.folder / "report.html").read_text()).replace("\u00a0", " ")
     assert answer(finished.summary) in text
     for scenario in results_of(finished).scenarios:
@@ -188,12 +188,12 @@ def spoil(folder: Path, what: str) -> None:
     ("foreign", r"outcomes\.parquet: incentive: these aren't the trials of summary\.json: half, stochastic"),
     ("missing", r"the run folder is incomplete: legs\.parquet is missing; run its command again"),
     ("older", r"summary\.json:\d+: scenarios\[0\]\.vss\.executed: the key 'executed' is missing; add it"),
-    ("vss", r"vss\.executed\.mean: expected what the stochastic plan collects beyond the other"),
+    ("vss", r"vss\.executed\.mean: expected the difference between the plans"),
     ("interval", r"executed: ci95: the mean, .* lies outside"),
     ("availability", r"availability: not that of the world in manifest\.json"),
     ("seed", r"seed: not of the world in manifest\.json: expected 0, found 7"),
 ])
-def test_a_spoilt_run_folder_is_told_and_its_report_left_as_it_was(folder: Path, what: str, said: str) -> None:
+def test_an_invalid_run_folder_is_an_error_and_its_report_is_unchanged(folder: Path, what: str, said: str) -> None:
     spoil(folder, what)
     before = sorted((path.name, path.stat().st_size) for path in folder.iterdir())
     with pytest.raises(BadFile, match=said):
@@ -208,7 +208,7 @@ def test_what_is_no_run_folder_is_refused(tmp_path: Path) -> None:
         report_again(tmp_path)
 
 
-def test_tables_say_their_units_and_open_as_csv(folder: Path) -> None:
+def test_tables_have_units_and_can_be_written_as_csv(folder: Path) -> None:
     schema = pq.read_schema(folder / "outcomes.parquet")
     units = {field.name: (field.metadata or {}).get(b"unit") for field in schema}
     assert units["end_time_s"] == b"s"
@@ -264,7 +264,7 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
         f"{name} (x={x})": 2 for name in ("half", "safe") for x in (1, 2)}
 
 
-def test_two_equal_plans_are_called_the_same_and_not_a_matter_of_luck(finished: Run) -> None:
+def test_two_equal_plans_are_called_the_same_not_indistinguishable(finished: Run) -> None:
     half, safe = sorted(results_of(finished).scenarios, key=lambda s: s.name)
     assert (half.vss.same_plan, safe.vss.same_plan) == (False, True)
     assert safe.vss.verdict == vss_verdict(safe.vss) == "the same plan"
@@ -284,7 +284,7 @@ def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished
     assert "all maps agree" in over_few_maps([over_maps(2, None)])
 
 
-def test_a_percentage_over_fewer_maps_says_over_how_many() -> None:
+def test_a_percentage_over_fewer_maps_gives_their_number() -> None:
     assert percentage(Percentage(mean=9.5, ci95=None, maps=1)) == "9.5 (1 map)"
     assert percentage(Percentage(mean=9.5, ci95=(1.0, 18.0), maps=2)) == "9.5 [1.0, 18.0] (2 maps)"
     assert percentage(Percentage(mean=None, ci95=None, maps=0)) == ""

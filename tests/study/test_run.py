@@ -30,7 +30,7 @@ def summary_of(world: World) -> Summary:
     return measure(world, QUICK, None, lambda *_: None).summary
 
 
-def test_figures_of_a_mission_agree_with_what_the_model_says(world: World) -> None:
+def test_executed_figures_agree_with_the_model(world: World) -> None:
     summary = summary_of(world)
     for scenario in summary.scenarios:
         assert scenario.vss.modelled == pytest.approx(14.0 if scenario.name == "half" else 0.0)
@@ -46,7 +46,7 @@ def test_figures_of_a_mission_agree_with_what_the_model_says(world: World) -> No
             assert plan.executed_controlled.mean == pytest.approx(plan.expected)
 
 
-def test_planning_for_failures_along_the_route_is_worth_something_under_them_alone(world: World) -> None:
+def test_planning_for_failures_along_the_route_pays_only_under_them(world: World) -> None:
     along = summary_of(replace(world, execute_failure="per_leg")).scenarios[0]
     exact = summary_of(replace(world, plan_failure="per_leg", execute_failure="per_leg")).scenarios[0]
     assert along.value_of_process is not None
@@ -89,7 +89,7 @@ def test_nothing_can_be_known_beforehand_of_failures_along_the_route(world: Worl
         measure(replace(world, execute_failure="per_leg"), replace(QUICK, informed=True), None, lambda *_: None)
 
 
-def test_a_run_goes_on_until_it_is_as_precise_as_asked_for(world: World) -> None:
+def test_a_run_continues_until_the_required_precision(world: World) -> None:
     begun = replace(QUICK, trials=50)
     loose, tight, never = (measure(
         world, replace(begun, precision=Precision(pct=pct, max_trials=most)), None, lambda *_: None).summary

@@ -15,7 +15,7 @@ from sva_bench.cli.loading import by_name
 from sva_bench.errors import BadInput
 from sva_bench.storage.run_folder import stem_of
 from sva_bench.storage.stored_run import read_content
-from tests.test_cli import TINY
+from tests.cli.test_commands import TINY
 from tests.worlds_for_tests import SMALL, world_of
 
 # In the first scenario nobody fails, in the second everybody does.
@@ -82,7 +82,7 @@ def test_no_two_plans_of_a_run_share_a_file_name() -> None:
     (["a\nb.json"], "can't be shown"), (["a\x1b[2J.json"], "can't be shown"), (["\udcff.json"], "can't be shown"),
     (["n" * 121 + ".json"], "longer than 120 bytes"),
 ])
-def test_plans_that_could_not_be_told_apart_or_shown_are_refused(paths: list[str], said: str) -> None:
+def test_plans_with_equal_or_unprintable_names_are_refused(paths: list[str], said: str) -> None:
     with pytest.raises(BadInput) as caught:
         by_name([Path(path) for path in paths])
     assert said in str(caught.value)
@@ -104,7 +104,7 @@ def test_variants_of_a_world_have_names_that_differ(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("second", "said"), [
     ("b.yaml", "b.yaml: its world is named 'small', as that of a.yaml"),
     ("a.yaml", "a.yaml: this world is given twice")])
-def test_worlds_of_one_name_are_told_with_their_files(
+def test_the_error_of_worlds_with_equal_names_lists_their_files(
     second: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -48,13 +48,13 @@ def asked_of_a_worker(function: Callable[..., Any], argument: Any) -> None:
         executor.submit(function, argument).result()
 
 
-def test_a_worker_that_is_killed_is_told_of_with_what_to_change() -> None:
+def test_a_killed_worker_is_an_error_with_a_remedy() -> None:
     with pytest.raises(WorkerLost, match=r"SIGKILL.*--workers 1") as lost:
         asked_of_a_worker(signal.raise_signal, signal.SIGKILL)
     assert lost.value.exit_code == ExitCode.UNFINISHED_TRIALS
 
 
-def test_a_worker_without_memory_is_told_of_with_what_to_change() -> None:
+def test_a_worker_out_of_memory_is_an_error_with_a_remedy() -> None:
     with pytest.raises(WorkerLost, match=r"memory ran out.*--workers 1"):
         asked_of_a_worker(bytearray, 1 << 60)
 
@@ -79,9 +79,9 @@ def test_no_process_of_ours_outlives_a_program_that_had_workers() -> None:
 
 ORPHAN = """
 import ctypes, os, time
-from sva_bench.workers.pool import die_with
+from sva_bench.workers.pool import kill_with_parent
 ctypes.CDLL = lambda *_, **__: object()  # a C library without prctl, as that of macOS
-die_with(int(os.environ["PARENT"]))
+kill_with_parent(int(os.environ["PARENT"]))
 print("there", flush=True)
 time.sleep(60)
 """
@@ -114,6 +114,6 @@ def test_more_workers_than_a_machine_can_use_are_refused_by_number() -> None:
         count_of(99_999_999)
 
 
-def test_where_the_system_tells_no_cores_of_a_process_all_of_them_count(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_cpu_affinity_all_cores_count(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(os, "sched_getaffinity")
     assert count_of(None) == os.cpu_count()

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear, keeps_clearance, open_heading
+from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear, keeps_clearance, longest_view_heading
 from sva_bench.geometry.distances import clearance, segment_distance
 from sva_bench.geometry.obstacles import Obstacles
 from tests.oracles.distances import points_clearance, segment_clearance
@@ -94,7 +94,7 @@ crowds = st.builds(
 
 
 @given(crowds, places, places)
-def test_distances_agree_with_another_way_to_compute_them(crowd: Obstacles, a: tuple[float, float],
+def test_distances_agree_with_an_independent_computation(crowd: Obstacles, a: tuple[float, float],
                                                           b: tuple[float, float]) -> None:
     expected = segment_clearance(crowd, np.array(a), np.array(b))
     # 1e-9 m: where a segment touches a side, rounding decides on which side of it.
@@ -128,15 +128,15 @@ def test_the_open_heading_looks_down_the_longest_free_line() -> None:
     # longer where it reaches: 9 / cos 5 = 9.03 m, but meets the side wall after 1 / sin 5 = 11.5 m. At 10 degrees it
     # meets it after 5.76 m. So 5 degrees (and -5 = 355) win; the smaller angle is taken.
     room = obstacles(bounds=[0, 0, 10, 2])
-    assert open_heading(room, 1, 1) == pytest.approx(math.radians(5))
+    assert longest_view_heading(room, 1, 1) == pytest.approx(math.radians(5))
     # A post on that side blocks 5 degrees, not 355.
     post = obstacles(bounds=[0, 0, 10, 2], cylinders=[[6, 1.45, 0.1]])
-    assert open_heading(post, 1, 1) == pytest.approx(math.radians(355))
+    assert longest_view_heading(post, 1, 1) == pytest.approx(math.radians(355))
 
 
 def test_ties_of_open_headings_go_to_the_smallest_angle() -> None:
     # In the middle of a square all four corners are as far.
-    assert open_heading(obstacles(bounds=[-1, -1, 1, 1]), 0, 0) == pytest.approx(math.radians(45))
+    assert longest_view_heading(obstacles(bounds=[-1, -1, 1, 1]), 0, 0) == pytest.approx(math.radians(45))
 
 
 def test_obstacles_are_read_only_copies_of_the_right_shape() -> None:
@@ -153,7 +153,7 @@ def test_obstacles_are_read_only_copies_of_the_right_shape() -> None:
 
 
 @given(st.integers(0, 10_000), st.floats(0.05, 1.5))
-def test_buckets_know_what_a_look_at_every_obstacle_tells(seed: int, needed: float) -> None:
+def test_buckets_agree_with_a_check_of_every_obstacle(seed: int, needed: float) -> None:
     o = random_obstacles(seed)
     rng = np.random.default_rng(seed)
     ends = rng.uniform(-1, 15, (40, 4))

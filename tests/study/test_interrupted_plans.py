@@ -27,7 +27,7 @@ def interrupted(solve: Callable[..., Any]) -> Callable[..., Any]:
 
 @pytest.mark.parametrize(("module", "solve", "options"), [
     (planning, "plan_nominal", Options()), (planning, "plan_stochastic", Options()),
-    (planning, "plan_stochastic", Options(assumptions=True)), (two_stage, "_greatest", Options(evpi=True)),
+    (planning, "plan_stochastic", Options(assumptions=True)), (two_stage, "_solve_expected", Options(evpi=True)),
 ])
 def test_a_run_has_no_use_for_a_plan_that_was_interrupted(
     module: Any, solve: str, options: Options, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -46,7 +46,7 @@ def filled(folder: Path, word: str) -> Path:
     return folder
 
 
-def test_a_file_is_replaced_when_it_is_whole_and_not_before(tmp_path: Path) -> None:
+def test_a_file_is_replaced_only_when_it_is_complete(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
     path.write_text("old")
     with pytest.raises(RuntimeError):
@@ -65,7 +65,7 @@ def test_a_file_of_the_longest_name_is_written_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("exchange", [True, False])
-def test_a_folder_takes_the_place_of_another_whole(
+def test_a_folder_is_replaced_atomically(
     exchange: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not exchange:
@@ -112,7 +112,7 @@ def test_a_folder_that_cannot_take_its_place_leaves_the_older_one(
     (".{name}.{dead}.old", False, "left"),  # killed between them
     (".{name}.{own}.tmp", True, "new"),  # ids are used again, and in containers they are always the same
 ])
-def test_what_a_killed_run_left_is_cleared_away_or_put_back(
+def test_drafts_of_killed_runs_are_removed_and_moved_folders_restored(
     left: str, is_there: bool, found: str | None, tmp_path: Path
 ) -> None:
     filled(tmp_path / left.format(name=NAME, dead=dead_pid(), own=os.getpid()), "left")
@@ -157,7 +157,7 @@ def test_a_writer_that_is_killed_leaves_what_the_next_one_removes(tmp_path: Path
     assert (path.read_text(), names_in(tmp_path)) == ("new", ["plan.json"])
 
 
-def test_ctrl_c_while_a_draft_is_cleared_away_waits_until_it_is(
+def test_ctrl_c_during_the_removal_of_a_draft_waits_for_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     remove = atomic._remove
@@ -172,7 +172,7 @@ def test_ctrl_c_while_a_draft_is_cleared_away_waits_until_it_is(
     assert names_in(tmp_path / "out") == []
 
 
-def test_a_folder_that_cannot_be_read_has_nothing_to_be_cleared_away(tmp_path: Path) -> None:
+def test_in_an_unreadable_folder_no_drafts_are_removed(tmp_path: Path) -> None:
     remove_left_behind(tmp_path / "nowhere", lambda _: True)
 
 
@@ -193,7 +193,7 @@ def test_a_batch_folder_without_room_names_the_file_and_keeps_the_older_one(
 
 
 @pytest.mark.parametrize(("file", "said"), [(None, "a temporary file in /"), ("/tmp/x.urdf", "/tmp/x.urdf")])
-def test_a_full_disk_that_nobody_foresaw_is_bad_input_that_names_the_place(
+def test_a_full_disk_is_bad_input_that_names_the_path(
     file: str | None, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def full(*_: object, **__: object) -> None:

@@ -13,7 +13,7 @@ from sva_bench.generate import examples
 from sva_bench.generate.examples import example_names, example_plans, example_world
 from sva_bench.world.load import load_world
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def test_every_shipped_world_is_an_example_and_every_plan_is_one_worlds() -> None:

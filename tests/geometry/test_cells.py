@@ -19,7 +19,7 @@ from sva_bench.execution.engines.bullet import obstacles_urdf
 from sva_bench.geometry.buckets import clearances, keeps_clearance
 from sva_bench.geometry.cells import (
     Cells,
-    TooRagged,
+    TooManyBoxes,
     bounds_of,
     boxes_of,
     connected_region,
@@ -69,7 +69,7 @@ def test_runs_of_rows_become_few_boxes() -> None:
 
 @settings(deadline=None)  # the first call compiles
 @given(grids)
-def test_the_cover_is_exact_and_no_cell_is_covered_twice(occupied: BoolArray) -> None:
+def test_the_cover_is_exact_and_disjoint(occupied: BoolArray) -> None:
     times = np.zeros(occupied.shape, dtype=int)
     for x0, y0, x1, y1 in cover(occupied).astype(int):
         times[y0:y1, x0:x1] += 1
@@ -77,7 +77,7 @@ def test_the_cover_is_exact_and_no_cell_is_covered_twice(occupied: BoolArray) ->
 
 
 def test_a_checkerboard_is_refused_before_it_fills_the_memory() -> None:
-    with pytest.raises(TooRagged):
+    with pytest.raises(TooManyBoxes):
         cover(np.indices((2000, 2000)).sum(axis=0) % 2 == 0)
 
 

@@ -295,7 +295,7 @@ def test_ctrl_c_ends_a_run_with_130_and_leaves_nothing_half_written(after_s: flo
 @pytest.mark.parametrize(("arguments", "says"), [
     (("run", "w.yaml", "--planner", "rrtstar"), "'--planner': 'rrtstar' is not one of 'prmstar'"),
     (("world", "random", "--pois", "0"), "'--pois': expected at least 4, found 0"),
-    (("world", "random", "--pois", "many"), "'--pois': expected a whole number, found many"),
+    (("world", "random", "--pois", "many"), "'--pois': expected an integer, found many"),
     (("world", "random", "--density", "2"), "'--density': expected at most 1.0, found 2"),
     (("world", "random", "--density", "0,5"),
      "'--density': expected a number, found '0,5': write a decimal point, 0.5"),

@@ -16,7 +16,7 @@ from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 from sva_bench.choices import PathPlanner
 from sva_bench.errors import BadFile, BadInput
-from tests.test_cli import sva_bench
+from tests.cli.test_commands import sva_bench
 from tests.worlds_for_tests import SMALL
 
 SWEEP = """\
@@ -67,7 +67,7 @@ def test_planners_are_known_ones() -> None:
 
 
 @pytest.mark.parametrize("words", [["0,0"], ["0", "0"], ["3-5", "4"], ["1", "0-2,7"], [" 2", "2"]])
-def test_a_seed_that_is_given_twice_is_refused(words: list[str]) -> None:
+def test_a_duplicate_seed_is_refused(words: list[str]) -> None:
     with pytest.raises(BadInput, match=r"--seed .*: the seed \d is given twice; give each once"):
         seeds_of(words)
 
@@ -82,7 +82,7 @@ def test_a_seed_beyond_what_tables_hold_is_refused_with_the_bound(word: str) -> 
 @pytest.mark.parametrize(("line", "option"), [
     ("--seed 0 --seed 0", "--seed "), ("--planner prmstar --planner prmstar", "--planner prmstar"),
     ("--scenario half --scenario half", "--scenario half"), ("--set noise.wheel_gain_sd=0,0", "--set noise")])
-def test_what_a_batch_is_given_twice_is_refused_by_option(
+def test_duplicates_are_errors_of_their_option(
     line: str, option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run_command_line(["batch", str(world(tmp_path)), *line.split(), "--dry-run"]) == 2
@@ -90,10 +90,10 @@ def test_what_a_batch_is_given_twice_is_refused_by_option(
 
 
 @pytest.mark.parametrize("key", ["seeds: [1, 0-2]", "planners: [fmt, fmt]", "scenarios: [half, half]"])
-def test_what_a_sweep_file_names_twice_is_refused_by_line(key: str, tmp_path: Path) -> None:
+def test_duplicates_in_a_sweep_file_are_errors_of_their_line(key: str, tmp_path: Path) -> None:
     path = tmp_path / "sweep.yaml"
     path.write_text(f"format: sva-bench/sweep@1\nworlds: [{world(tmp_path).name}]\n{key}\n", encoding="utf-8")
-    with pytest.raises(BadFile, match=rf"sweep\.yaml:3: {key.split(':')[0]}.* twice"):
+    with pytest.raises(BadFile, match=rf"sweep\.yaml:3: {key.split(':')[0]}.* (twice|is a duplicate)"):
         grid_of(sweep_of([path], Sweep()))
 
 
@@ -136,7 +136,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("key", "value", "told"), WRONG)
-def test_a_value_that_is_wrong_is_said_of_the_option(key: str, value: object, told: str, tmp_path: Path) -> None:
+def test_an_invalid_value_is_an_error_of_its_option(key: str, value: object, told: str, tmp_path: Path) -> None:
     path = world(tmp_path)
     with pytest.raises(BadInput) as caught:
         grid_of(Sweep(worlds=(path,), vary={"robots.uv1.availability": [0.5], key: [value]}))
@@ -147,7 +147,7 @@ def test_a_value_that_is_wrong_is_said_of_the_option(key: str, value: object, to
 
 
 @pytest.mark.parametrize(("key", "value", "told"), WRONG)
-def test_a_value_that_is_wrong_is_said_of_the_line_of_the_sweep_file(
+def test_an_invalid_value_is_an_error_of_its_line_in_the_sweep_file(
     key: str, value: object, told: str, tmp_path: Path
 ) -> None:
     world(tmp_path)
@@ -173,7 +173,7 @@ def test_a_file_that_is_wrong_by_itself_is_named_all_the_same(tmp_path: Path) ->
         grid_of(Sweep(worlds=(path,), vary={"robots.uv1.availability": [0.5]}))
 
 
-def test_a_scenario_that_is_not_there_is_said_of_the_option_or_of_the_line(tmp_path: Path) -> None:
+def test_an_unknown_scenario_is_an_error_of_its_option_or_line(tmp_path: Path) -> None:
     path = tmp_path / "sweep.yaml"
     path.write_text(SWEEP.replace("[half]", "[half, hlaf]"), encoding="utf-8")
     world(tmp_path)
@@ -195,7 +195,7 @@ def test_seeds_of_a_file_are_written_like_those_of_the_command_line(
 
 
 @pytest.mark.parametrize("written", ["-1", "5-3", "x", "[1, x]", "1.5"])
-def test_what_is_no_seed_is_said_of_the_line(written: str, tmp_path: Path) -> None:
+def test_an_invalid_seed_is_an_error_of_its_line(written: str, tmp_path: Path) -> None:
     world(tmp_path)
     path = tmp_path / "sweep.yaml"
     path.write_text(SWEEP.replace("seeds: 0-2", f"seeds: {written}"), encoding="utf-8")
@@ -216,7 +216,7 @@ def test_batches_offer_the_planners_and_failures_of_runs(tmp_path: Path) -> None
     assert grid_from(*settings_in(tmp_path / "out")).settings() == grid.settings()
 
 
-def test_noise_that_no_trial_has_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_varied_noise_without_effect_gives_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     vary = {"noise.wheel_gain_sd": [0.0, 0.02]}
     grid_of(Sweep(worlds=(world(tmp_path),), vary=vary, fidelity="rollout"))
     assert caplog.messages == []
@@ -224,7 +224,7 @@ def test_noise_that_no_trial_has_is_told(tmp_path: Path, caplog: pytest.LogCaptu
     assert caplog.messages == ["noise is varied to no effect: kinematic trials have none"]
 
 
-def test_a_wrong_sweep_file_is_told_by_line_and_key(tmp_path: Path) -> None:
+def test_an_invalid_sweep_file_is_an_error_with_line_and_key(tmp_path: Path) -> None:
     path = tmp_path / "sweep.yaml"
     path.write_text(SWEEP.replace("trials: 50", "trails: 50"), encoding="utf-8")
     with pytest.raises(BadFile, match=r"sweep\.yaml:4: trails"):
@@ -248,7 +248,7 @@ def test_a_dry_run_counts_what_is_left(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small.world.yaml"]
 
 
-def test_a_key_that_scenarios_overrule_is_told_to_change_nothing(
+def test_a_varied_key_without_effect_gives_a_warning(
         tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = world(tmp_path)
     grid_of(Sweep(worlds=(path,), vary={"noise.wheel_gain_sd": [0.0, 0.02]}))

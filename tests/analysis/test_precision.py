@@ -11,8 +11,8 @@ from sva_bench.analysis.moments import figure_of
 from sva_bench.analysis.precision import Precision, half_width_pct, precision_of
 from sva_bench.analysis.statistics import estimate
 from sva_bench.errors import BadInput
+from tests.cli.test_commands import sva_bench
 from tests.results_for_tests import Interval, summary
-from tests.test_cli import sva_bench
 
 
 def pct_of(ci95: Interval | None, mean: float) -> float | None:

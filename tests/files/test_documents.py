@@ -64,7 +64,7 @@ def test_a_good_file_gives_its_data(tmp_path: Path) -> None:
      "found the text '1': take the quotes away"),
     ("format: test/whole@1\nname: a b\n", 2, "name", "no valid name"),
     ("format: test/whole@1\nname: ../a\n", 2, "name", "no valid name"),
-    ("format: test/whole@1\nname: a\nname: b\n", 3, "name", "stands twice"),
+    ("format: test/whole@1\nname: a\nname: b\n", 3, "name", "is a duplicate"),
     ("format: test/whole@2\nname: a\n", 1, "format", "expected 'test/whole@1', found 'test/whole@2'"),
     ("name: a\n", 1, "", "the key 'format' is missing"),
     ("- format\n", 1, "", "expected a mapping"),
@@ -107,7 +107,7 @@ def test_what_is_no_plain_file_of_text_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["PNG", "JPEG", "GIF", "PPM", "BMP", "TIFF"])
-def test_a_picture_is_called_one_and_told_what_to_name_instead(kind: str, tmp_path: Path) -> None:
+def test_an_image_in_place_of_a_document_is_identified_with_a_hint(kind: str, tmp_path: Path) -> None:
     for suffix in (".yaml", ".json"):
         path = (tmp_path / "picture").with_suffix(suffix)
         Image.new("RGB", (40, 30)).save(path, format=kind)
@@ -145,10 +145,10 @@ def test_an_alias_bomb_is_refused_at_once(tmp_path: Path) -> None:
     # Nine levels of nine would be 400 million words.
     lines = ["a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]"]
     lines += [f"a{k}: &a{k} [" + ", ".join([f"*a{k - 1}"] * 9) + "]" for k in range(1, 9)]
-    begun = time.monotonic()
+    draft_held = time.monotonic()
     with pytest.raises(BadFile, match="aliases are not allowed"):
         read_yaml(yaml(tmp_path, "\n".join(lines)))
-    assert time.monotonic() - begun < 2  # milliseconds in truth; a slow machine is forgiven
+    assert time.monotonic() - draft_held < 2  # milliseconds in truth; a slow machine is forgiven
 
 
 def test_dates_and_words_of_old_yaml_stay_text(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def test_dates_and_words_of_old_yaml_stay_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "line", "says"), [
-    ('{"a": 1,\n "a": 2}', 2, "stands twice"),
+    ('{"a": 1,\n "a": 2}', 2, "is a duplicate"),
     ('{"a": 1,\n "b": NaN}', 2, "NaN is not a number"),
     ('{"a": 1,\n "b": -Infinity}', 2, "-Infinity is not a number"),
     ('{"a": 1,\n "b" 2}', 2, "not valid JSON"),
@@ -183,7 +183,7 @@ def test_json_knows_the_lines_of_its_keys(tmp_path: Path) -> None:
     assert (caught.value.line, caught.value.key) == (3, "parts.q.size_m")
 
 
-def test_a_complaint_survives_the_way_back_from_a_worker() -> None:
+def test_an_error_survives_pickling_from_a_worker() -> None:
     error = BadFile("a.yaml", 3, "sites.base", "wrong")
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error) == "a.yaml:3: sites.base: wrong"
@@ -248,7 +248,7 @@ def test_pretty_yaml_puts_what_holds_no_mapping_on_a_line_and_remarks_above_it()
 @pytest.mark.parametrize(("written", "kind"), [
     ("2024", "a number"), ("1e3", "a number"), ("0x10", "a number"), ("true", "a truth value"), ("null", "nothing"),
 ])
-def test_a_name_that_yaml_takes_for_something_else_is_told_about_quotes(
+def test_a_name_that_yaml_reads_as_another_type_gets_a_hint_at_quotes(
         written: str, kind: str, tmp_path: Path) -> None:
     said = f"expected a word, and {written} without quotes is {kind}; if it is a name, write '{written}'"
     for at, text in (("name", SMALL.replace("name: small", f"name: {written}")),
@@ -262,6 +262,6 @@ def test_a_name_that_yaml_takes_for_something_else_is_told_about_quotes(
     assert world_of(tmp_path, quoted).name == written
 
 
-def test_a_name_that_is_missing_is_not_told_about_quotes(tmp_path: Path) -> None:
+def test_a_missing_name_gets_no_hint_at_quotes(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="name: expected a word, found nothing"):
         world_of(tmp_path, SMALL.replace("name: small", "name:"))

@@ -13,8 +13,8 @@ import pytest
 from sva_bench.analysis.over_maps import Percentage
 from sva_bench.batch.aggregates import aggregate
 from sva_bench.files.records import as_dict
+from tests.cli.test_commands import sva_bench, world_file
 from tests.results_for_tests import unit
-from tests.test_cli import sva_bench, world_file
 from tests.worlds_for_tests import SMALL
 
 QUICK = ("--trials", 60, "--rollouts", 2, "--fidelity", "kinematic")
@@ -103,7 +103,7 @@ def test_vss_over_maps_takes_maps_as_the_sample() -> None:
     assert row.vss_pct == Percentage(mean=None, ci95=None, maps=0)
 
 
-def test_percentages_say_over_how_many_maps_they_are_where_one_collects_nothing() -> None:
+def test_percentages_give_their_number_of_maps_where_one_collects_nothing() -> None:
     (row,) = aggregate([unit("a", 1.0, 9.5), unit("b", 1.0, None)])
     assert (row.maps, as_dict(row.vss_pct)) == (2, {"mean": 9.5, "ci95": None, "maps": 1})
     (row,) = aggregate([unit("a", 1.0, 9.5), unit("b", 1.0, 9.5)])

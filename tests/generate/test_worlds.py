@@ -20,14 +20,14 @@ from sva_bench.generate.worlds import random_world
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.instance import Instance
-from sva_bench.solver.routes.refuelling import quickest
+from sva_bench.solver.routes.refuelling import quickest_route
 from sva_bench.solver.two_stage import knowledge_of, plan_nominal
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.load import world_of
 from sva_bench.world.model import Site, World
-from tests.test_cli import sva_bench
+from tests.cli.test_commands import sva_bench
 
 FAMILIES: tuple[WorldFamily, ...] = get_args(WorldFamily)
 
@@ -62,9 +62,9 @@ def check_that_it_is_a_good_mission(world: World) -> None:
 
 def collected_alone(instance: Instance) -> list[float]:
     """The most that each robot can collect at a single POI."""
-    roads = knowledge_of(instance).roads
-    return [max(vehicle.incentives[poi] if quickest(road, (poi,)) else 0.0 for poi in instance.pois)
-            for vehicle, road in zip(instance.vehicles, roads, strict=True)]
+    legs_by_vehicle = knowledge_of(instance).legs_by_vehicle
+    return [max(vehicle.incentives[poi] if quickest_route(own_legs, (poi,)) else 0.0 for poi in instance.pois)
+            for vehicle, own_legs in zip(instance.vehicles, legs_by_vehicle, strict=True)]
 
 
 def test_a_random_world_is_a_good_mission_with_the_papers_scenarios() -> None:
@@ -77,7 +77,7 @@ def test_a_random_world_is_a_good_mission_with_the_papers_scenarios() -> None:
     assert set(world.robots[1].incentives) == {poi.name for poi in world.pois}
 
 
-def test_the_same_arguments_give_the_same_bytes_and_say_how() -> None:
+def test_equal_arguments_give_equal_bytes_with_the_command_in_a_comment() -> None:
     text = text_of("field", 3)
     assert text == text_of("field", 3)
     lines = text.splitlines()
@@ -109,7 +109,7 @@ def test_limits_let_a_team_collect_much_but_not_all() -> None:
     assert all(1 <= value <= 170 for earned in mission.incentives for value in earned.values())
 
 
-def test_a_filling_lasts_for_the_way_to_the_remotest_poi_and_back_to_a_station() -> None:
+def test_the_fuel_capacity_suffices_for_the_remotest_poi() -> None:
     sites, fuel = line_of_sites(8, stations=0)
     fuel = fuel / 10 + 100 * (fuel > 0)  # about 100 s between any two: half the limit would not do
     mission = propose_mission(sites, fuel, robots=2, seed=0, key=())
@@ -120,7 +120,7 @@ def test_a_filling_lasts_for_the_way_to_the_remotest_poi_and_back_to_a_station()
 @pytest.mark.parametrize(("pois", "robots"), [(8, 1), (3, 2), (7, 4)])
 def test_too_few_robots_or_pois_leave_nothing_to_decide(pois: int, robots: int) -> None:
     sites, fuel = line_of_sites(pois)
-    with pytest.raises(BadInput, match=f"{robots} robots and {pois} POIs leave nothing to decide"):
+    with pytest.raises(BadInput, match=f"{robots} robots? and {pois} POIs leave nothing to decide"):
         propose_mission(sites, fuel, robots=robots, seed=0, key=())
 
 
