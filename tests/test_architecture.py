@@ -147,7 +147,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 def test_a_check_loads_neither_physics_nor_solvers_nor_statistics() -> None:
     # They take longer to load than a check of most worlds takes.
     heavy = {"pybullet", "highspy", "networkx", "scipy.stats", "scipy.optimize"}
-    code = ("import sys, sva_bench.cli.app, sva_bench.study.costs, sva_bench.cli.loading, sva_bench.analysis.reach\n"
+    code = ("import sys, sva_bench.cli.app, sva_bench.study.costs, sva_bench.study.inputs, sva_bench.analysis.reach\n"
             f"print(sorted({heavy!r} & set(sys.modules)))")
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
