@@ -1,4 +1,4 @@
-"""From a world to the value of the stochastic solution (VSS), stage by stage; ``sb.run(world)`` is all of it at once."""
+"""From a world to the value of the stochastic solution (VSS), stage by stage."""
 
 import sva_bench as sb
 

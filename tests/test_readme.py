@@ -63,9 +63,8 @@ def folder(tmp_path: Path) -> Path:
     for page in PAGES:
         for block in blocks(page, "yaml"):
             if block.startswith("format: sva-bench/world@1"):
-                name = re.search(r"^name: (\S+)$", block, re.MULTILINE)
-                assert name is not None
-                (tmp_path / f"{name[1]}.yaml").write_text(block, encoding="utf-8")
+                (title,) = re.findall(r"^name: (\S+)$", block, re.MULTILINE)
+                (tmp_path / f"{title}.yaml").write_text(block, encoding="utf-8")
             elif block.startswith("format: sva-bench/sweep@1"):
                 (tmp_path / "sweep.yaml").write_text(block, encoding="utf-8")
     return tmp_path
@@ -88,7 +87,8 @@ def test_every_command_in_a_console_block_is_run_or_has_a_reason_not_to_be() -> 
 
 def test_targets_of_make_that_are_named_are_there() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = {target for page in PAGES for target in re.findall(r"(?:^\$ |`)make ([a-z-]+)", page.read_text(), re.MULTILINE)}
+    named = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    targets = set(re.findall(r"(?:^\$ |`)make ([a-z-]+)", named, re.MULTILINE))
     assert {"run", "test", "lint"} <= targets
     for target in targets:
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
