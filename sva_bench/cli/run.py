@@ -155,17 +155,15 @@ def execute(
 
 
 def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False) -> None:
-    if csv:
+    with loading():
+        from sva_bench.cli.tables import print_summary
+        from sva_bench.files.records import as_dict
         from sva_bench.storage.stored_run import write_csv
 
+    if csv:
         write_csv(folder)
     if as_json:
-        from sva_bench.files.records import as_dict
-
         print_json(as_dict(summary))
     else:
-        with loading():
-            from sva_bench.cli.tables import print_summary
-
         print_summary(summary)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
