@@ -144,10 +144,23 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     assert not left, {module: sorted(needs & left.keys()) for module, needs in left.items()}
 
 
+@pytest.mark.parametrize("module", [module for module in MODULES if room_of(module) == "cli"])
+def test_a_command_loads_what_takes_long_in_the_one_way_there_is(module: str) -> None:
+    # Ctrl-C in the middle of a native library's initialisation would abort the process.
+    tree = ast.parse((PACKAGE / module).read_text(encoding="utf-8"))
+    held = {id(node) for block in ast.walk(tree) if isinstance(block, ast.With)
+            and ast.unparse(block.items[0].context_expr) == "loading()" for node in block.body}
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef):
+            for node in ast.walk(function):
+                if isinstance(node, ast.Import | ast.ImportFrom):
+                    assert id(node) in held, f"sva_bench/{module}:{node.lineno}: import it in a block of loading()"
+
+
 def test_a_check_loads_neither_physics_nor_solvers_nor_statistics() -> None:
     # They take longer to load than a check of most worlds takes.
     heavy = {"pybullet", "highspy", "networkx", "scipy.stats", "scipy.optimize"}
-    code = ("import sys, sva_bench.cli.app, sva_bench.study.costs, sva_bench.cli.loading, sva_bench.analysis.reach\n"
+    code = ("import sys, sva_bench.cli.app, sva_bench.study.costs, sva_bench.study.inputs, sva_bench.analysis.reach\n"
             f"print(sorted({heavy!r} & set(sys.modules)))")
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -19,9 +19,13 @@ from sva_bench.analysis.results import (
     ScenarioSummary,
     not_null,
 )
+from sva_bench.analysis.shown import headline, lines_of, table_of
 from sva_bench.choices import FailureProcess, Fidelity
+from sva_bench.errors import nearest
 from sva_bench.files.fields import Name, NonNegativeInt, Seed
 from sva_bench.files.records import Record
+
+ScenarioT = TypeVar("ScenarioT", bound=ScenarioPlans)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +110,21 @@ class Summary(Head):
     precision: Annotated[ReachedPrecision | None, BeforeValidator(not_null)] = None
     reach: Reach
 
+    def scenario(self, name: str) -> ScenarioSummary:
+        """The scenario of that name.
+
+        Raises:
+            KeyError: If there is none.
+        """
+        return _of_name(self.scenarios, name)
+
+    def __repr__(self) -> str:
+        return "\n".join([_headline(self), *lines_of(self.scenarios)])
+
+    def _repr_html_(self) -> str:
+        """A notebook's table."""
+        return table_of(_headline(self), self.scenarios)
+
     @model_validator(mode="after")
     def _is_consistent(self) -> Summary:
         _refuse_other_plans(self.scenarios)
@@ -118,6 +137,21 @@ class ComparisonSummary(Head):
 
     scenarios: Annotated[tuple[ComparedScenario, ...], Field(min_length=1, max_length=10_000)]
     reach: Reach
+
+    def scenario(self, name: str) -> ComparedScenario:
+        """The scenario of that name.
+
+        Raises:
+            KeyError: If there is none.
+        """
+        return _of_name(self.scenarios, name)
+
+    def __repr__(self) -> str:
+        return "\n".join([_headline(self), *lines_of(self.scenarios)])
+
+    def _repr_html_(self) -> str:
+        """A notebook's table."""
+        return table_of(_headline(self), self.scenarios)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> ComparisonSummary:
@@ -133,6 +167,17 @@ def summary_form(data: object) -> type[Summary] | type[ComparisonSummary]:
     scenarios = data.get("scenarios") if isinstance(data, dict) else None
     first = scenarios[0] if isinstance(scenarios, list) and scenarios else None
     return ComparisonSummary if isinstance(first, dict) and "comparisons" in first else Summary
+
+
+def _headline(head: Head) -> str:
+    return headline(head.world, head.seed, head.trials, head.rollouts, head.fidelity)
+
+
+def _of_name(scenarios: Sequence[ScenarioT], name: str) -> ScenarioT:
+    for scenario in scenarios:
+        if scenario.name == name:
+            return scenario
+    raise KeyError(f"no scenario {name!r}; {nearest(name, [scenario.name for scenario in scenarios])}")
 
 
 def _refuse_other_plans(scenarios: Sequence[ScenarioPlans]) -> None:

@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 
 from sva_bench.choices import Fidelity, PathPlanner
-from sva_bench.cli.libraries import load_libraries
+from sva_bench.cli.loading import loading
 from sva_bench.cli.options import (
     AsJson,
     ExecuteFailure,
@@ -28,7 +28,8 @@ from sva_bench.cli.usage import PlainCommand, UnnamedCommand, WorldsFirst
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.files.outputs import check_folder
 from sva_bench.files.printable import counted
-from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.study.bounds import MOST_ROLLOUTS, MOST_TRIALS
+from sva_bench.study.libraries import load_libraries
 
 if TYPE_CHECKING:
     from sva_bench.batch.grid import Grid
@@ -56,9 +57,9 @@ def over(
                                                  "one sweep.yaml.", show_default=False)],
     seed: Annotated[list[str] | None, typer.Option(metavar="N or N-M", help="Seeds of failures and noise, also as a "
                                                    "range; may be repeated.", show_default="0")] = None,
-    trials: Annotated[int | None, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.",
+    trials: Annotated[int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials of each plan in each scenario.",
                                                show_default="1000")] = None,
-    rollouts: Annotated[int | None, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod "
+    rollouts: Annotated[int | None, typer.Option(min=1, max=MOST_ROLLOUTS, help="Noise draws; trial t has number t mod "
                                                  "ROLLOUTS.", show_default="8")] = None,
     fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per leg and "
                                                       "noise draw; or every trial in physics.",
@@ -100,7 +101,7 @@ def over(
     """
     set_up_logging(verbose)
     load_libraries()
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.batch.cache import default_folder
         from sva_bench.batch.grid import batch_name
         from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
@@ -138,7 +139,7 @@ def retry(
     """Take up again what failed or was not done; worlds and settings are those in the folder."""
     set_up_logging(verbose)
     load_libraries()
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.batch.folder import settings_in
         from sva_bench.batch.grid import grid_of
 
@@ -150,7 +151,7 @@ def retry(
 @batch_app.command(cls=PlainCommand)
 def status(folder: Folder, as_json: AsJson = False) -> None:
     """How far is a batch, and what does it come to so far? It may be at work."""
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.batch.aggregates import summary_of
         from sva_bench.batch.folder import at_work, failures_in, settings_in, units_in
         from sva_bench.batch.grid import grid_of
@@ -180,7 +181,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
 
 
 def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool) -> None:
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.batch.cache import Cache, default_folder
         from sva_bench.batch.estimates import estimates
         from sva_bench.cli.watching import print_grid
@@ -204,7 +205,7 @@ def _run(
     grid: Grid, folder: Path, workers: int | None, dask: str | None, unit_time_limit_s: float, memory_mb: int,
     cache: Path | None, as_json: bool, as_csv: bool, *, resume: bool, again: bool = False,
 ) -> None:
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.batch.cache import Cache, default_folder
         from sva_bench.batch.folder import units_in
         from sva_bench.batch.run import run_batch
@@ -225,7 +226,7 @@ def _run(
         if dask is None:
             running = LocalProcesses(count_of(workers), caps)
         else:
-            with holding_back_ctrl_c():
+            with loading():
                 from sva_bench.workers.dask import DaskCluster
 
             running = DaskCluster(dask, caps)

@@ -1,112 +1,14 @@
-"""Worlds and instances as the command line asks for them; what is wrong is said of the file and line."""
+"""The one way in which commands load what takes long."""
 
 from __future__ import annotations
 
-import os
-import unicodedata
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-
-from sva_bench.choices import FailureProcess, PathPlanner
-from sva_bench.cli.terminal import messages
-from sva_bench.errors import BadInput
-from sva_bench.files.documents import YAML_SUFFIXES, read_yaml
-from sva_bench.files.mistaken import what_it_is
-from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.mission.instance import Instance
-from sva_bench.world.load import load_world
-from sva_bench.world.model import World
-from sva_bench.world.variants import adapted
-
-_LONGEST_NAME = 120
-"""Bytes of a plan's name: with a scenario's before it and an ending behind it, it is a file's name, of 255 at most."""
 
 
-def load(
-    path: Path, scenarios: Sequence[str] | None = None, margin: float | None = None,
-    plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
-) -> World:
-    """The world, as the command line changes it."""
-    return adapted(load_world(path), scenarios, margin, plan_failure, execute_failure)
+class loading(holding_back_ctrl_c):
+    """A block of imports in a command: when they are needed, and with Ctrl-C waiting until they are done.
 
-
-@contextmanager
-def about(path: Path) -> Iterator[None]:
-    """What travel says of sites and robots, said of the file and line where they stand."""
-    with holding_back_ctrl_c():
-        from sva_bench.travel.times import UnreachableSite
-
-    try:
-        yield
-    except UnreachableSite as error:
-        document = read_yaml(path)
-        # Where nothing at all is reached, it is the base that stands badly.
-        sites = load_world(path).sites
-        name = "base" if len(error.destinations) == len(sites) - 1 > 1 else error.destinations[0]
-        where = {"base": ("sites", "base"), "station": ("sites", "stations", name), "poi": ("sites", "pois", name)}
-        # Of a site that the file doesn't name but leaves to us, the line of its section is said.
-        kind = next(site.kind for site in sites if site.name == name)
-        raise document.error(where[kind], str(error)) from None
-
-
-def instance_of_world(
-    path: Path, scenario: str | None, planner: PathPlanner, margin: float | None,
-    progress: Callable[[str, int, int], None],
-) -> Instance:
-    """The instance of a world's scenario; of the availabilities under ``robots:`` by default."""
-    world = load(path, [scenario] if scenario else None, margin)
-    with holding_back_ctrl_c():  # after the world: its errors are said at once
-        from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs
-
-    with about(path):
-        costs = plan_costs(world, planner, progress)
-    for cost in costs.values():
-        messages.print(f"{cost.times.model.name}: {counted(cost.pairs, 'travel time')}, {cost.changed_pct:.1f} % "
-                       f"repaired, by up to {cost.max_excess_pct:.1f} %", highlight=False)
-    return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))
-
-
-def refuse_no_map(path: Path) -> None:
-    """Refuse a file of ours where a map is asked for.
-
-    Raises:
-        BadFile: If it is one, and which command takes it.
+    ``--help`` would wait for what modules import at their tops. What is wrong with an input is said before libraries
+    are loaded that only work on it takes, so a command may have several such blocks; one that takes all of them calls
+    ``load_libraries`` first, for Ctrl-C is heard between two parts of it.
     """
-    if path.suffix.lower() not in YAML_SUFFIXES:
-        return
-    document = read_yaml(path)
-    if isinstance(document.data, dict) and "format" in document.data and (known := what_it_is(document.data)):
-        raise document.error((), f"expected a map, and {known}")
-
-
-def by_name(paths: Sequence[Path]) -> dict[str, Path]:
-    """Plan files by the names that they go by, in tables and as names of files: their stems.
-
-    Raises:
-        BadInput: If one can't be shown, is too long to be part of a file's name, or is that of another, as file
-            systems that don't know capitals or ways of writing accents would say.
-    """
-    found: dict[str, Path] = {}
-    known: dict[str, Path] = {}
-    for path in paths:
-        name = path.stem
-        if not name.isprintable():
-            raise BadInput(f"{os.fsencode(path)!r}: a plan goes by the name of its file, and this one can't be shown; "
-                           "rename it")
-        if len(name.encode()) > _LONGEST_NAME:
-            raise BadInput(f"{path}: a plan goes by the name of its file, and this one is longer than {_LONGEST_NAME} "
-                           "bytes; rename it")
-        plain = unicodedata.normalize("NFKC", name).casefold()
-        if plain in known and _same_file(path, known[plain]):
-            raise BadInput(f"{path}: this plan is given twice; name it once")
-        if plain in known:
-            raise BadInput(f"{path}: there is another plan named {name!r}, {known[plain]}; the names of the files must "
-                           "differ, and in more than capitals")
-        found[name] = known[plain] = path
-    return found
-
-
-def _same_file(path: Path, other: Path) -> bool:
-    return path == other or (path.exists() and other.exists() and path.samefile(other))

@@ -15,6 +15,7 @@ from sva_bench.choices import (
 )
 from sva_bench.errors import BadInput
 from sva_bench.files.streams import CLOSED, output_is_closed
+from sva_bench.study.bounds import MOST_ROLLOUTS, MOST_SEED, MOST_TRIALS
 from sva_bench.workers.pool import count_of
 
 # Spelt out, not imported: the modules that own them take a second to load, and --help should not.
@@ -46,10 +47,10 @@ MarginOption = Annotated[float | None, typer.Option(
 TimeLimit = Annotated[float | None, typer.Option(
     metavar="S", min=0, callback=finite, help="Stop each solve after so many seconds and take its best plan.",
     show_default="none")]
-MOST_SEED = 2**63 - 1
 Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of failures and noise; plans don't depend on it.")]
-Trials = Annotated[int, typer.Option(min=1, max=10_000_000, help="Trials of each plan in each scenario.")]
-Rollouts = Annotated[int, typer.Option(min=1, max=100_000, help="Noise draws; trial t has number t mod ROLLOUTS.")]
+Trials = Annotated[int, typer.Option(min=1, max=MOST_TRIALS, help="Trials of each plan in each scenario.")]
+Rollouts = Annotated[int, typer.Option(min=1, max=MOST_ROLLOUTS,
+                                       help="Noise draws; trial t has number t mod ROLLOUTS.")]
 FidelityOption = Annotated[Fidelity, typer.Option(
     help="The kinematic twin alone; physics once per leg and noise draw; or every trial in physics.")]
 ScenarioNames = Annotated[list[str] | None, typer.Option("--scenario", help="Only this scenario; may be repeated.",

@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
+from sva_bench.cli.loading import loading
 from sva_bench.cli.options import FidelityOption, Rollouts, Seed, Trials, Verbose, WorkerCount, finite
 from sva_bench.cli.terminal import messages, progress_bars, set_up_logging
 from sva_bench.cli.usage import PlainCommand
 from sva_bench.files.outputs import check_folder, check_output, write_result
-from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.study.libraries import PRELOAD
 from sva_bench.workers.pool import local_workers
 
 paper_app = typer.Typer(no_args_is_help=True, subcommand_metavar="PART [ARGS]...",
@@ -28,7 +29,7 @@ def rewards(output: Page = None, verbose: Verbose = False) -> None:
     """Rewards of three vehicles as the third gets less reliable (Figure 4)."""
     set_up_logging(verbose)
     check_output(output)
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.paper import rewards as paper
 
     with progress_bars() as progress:
@@ -41,7 +42,7 @@ def simulation(
     worlds: Annotated[list[Path] | None, typer.Argument(metavar="[WORLD...]", help="The maps.",
                                                         show_default="four of the shipped ones")] = None,
     trials: Trials = 1000,
-    rollouts: Rollouts = 8,
+    rollouts: Rollouts = 32,
     fidelity: FidelityOption = "rollout",
     seed: Seed = 0,
     output: Page = None,
@@ -51,15 +52,15 @@ def simulation(
     """Plans executed in simulation (Figures 7 and 8)."""
     set_up_logging(verbose)
     check_output(output)
-    with holding_back_ctrl_c():
-        from sva_bench.cli.loading import load
+    with loading():
         from sva_bench.execution.execute import Settings
         from sva_bench.generate.examples import example_world
         from sva_bench.paper import simulation as paper
+        from sva_bench.study.inputs import load
 
     loaded = [load(path) for path in worlds or [example_world(name) for name in _SHIPPED]]
     settings = Settings(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity)
-    with progress_bars() as progress, local_workers(workers, "sva_bench.execution.execute") as executor:
+    with progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         page = paper.simulation_page(paper.simulation(loaded, settings, executor, progress), settings)
     write_result(output, page)
 
@@ -79,7 +80,7 @@ def runtimes(
 ) -> None:
     """Runtimes, cuts and gaps of the solves (section 5.1: Tables 2 and 3, Figure 3)."""
     set_up_logging(verbose)
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.paper.runtimes import NAME, QUICK, reproduce
         from sva_bench.paper.solves import FULL
 

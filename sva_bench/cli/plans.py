@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sva_bench.choices import METHODS, Cuts, Method, Objective, RiskKind
+from sva_bench.choices import METHODS, Cuts, Method, Objective, PathPlanner, RiskKind
+from sva_bench.cli.loading import loading
 from sva_bench.cli.options import AsJson, Gap, MarginOption, PlannerOption, TimeLimit, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.files.outputs import check_output, write_result
-from sva_bench.interrupts import deferring_ctrl_c, holding_back_ctrl_c
+from sva_bench.files.printable import counted
+from sva_bench.interrupts import deferring_ctrl_c
+from sva_bench.study.asked import AskedPlan
+
+if TYPE_CHECKING:
+    from sva_bench.mission.instance import Instance
+    from sva_bench.workers.progress import OnProgress
 
 log = logging.getLogger(__name__)
 
@@ -31,14 +37,13 @@ def times(
     verbose: Verbose = False,
 ) -> None:
     """Plan travel times and repair them into fuel costs: an instance for any solver."""
-    with holding_back_ctrl_c():
-        from sva_bench.cli.loading import instance_of_world
+    with loading():
         from sva_bench.mission.instance_file import instance_text
 
     set_up_logging(verbose)
     check_output(output, world)
     with progress_bars() as progress:
-        instance = instance_of_world(world, scenario, planner, margin, progress)
+        instance = _instance_of_world(world, scenario, planner, margin, progress)
     write_result(output, instance_text(instance))
 
 
@@ -68,8 +73,7 @@ def plan(
     verbose: Verbose = False,
 ) -> None:
     """Make one plan, proved optimal unless a limit stops it."""
-    with holding_back_ctrl_c():
-        from sva_bench.cli.loading import instance_of_world
+    with loading():
         from sva_bench.files.documents import YAML_SUFFIXES
         from sva_bench.files.pretty import pretty_json
         from sva_bench.mission.instance_file import read_instance
@@ -77,41 +81,21 @@ def plan(
 
     set_up_logging(verbose)
     check_output(output, source)
-    if risk is not None and (objective != "stochastic" or method != "auto"):
-        raise BadInput("--risk goes with the stochastic objective and the method auto alone")
-    if (risk == "excess") != (target is not None):
-        raise BadInput("--risk excess and --target go together")
-    if beta is not None and risk != "cvar":
-        raise BadInput("--beta belongs to --risk cvar")
-    if weight is not None and risk is None:
-        raise BadInput("--weight is the share of a measure of risk: choose one with --risk cvar or --risk excess")
-    if cuts is not None and method != "lshaped":
-        raise BadInput("--cuts are those of --method lshaped")
+    asked = AskedPlan(objective=objective, method=method, cuts=cuts, risk=risk, beta=beta, weight=weight, target=target)
     with progress_bars() as progress:
         if source.suffix.lower() in YAML_SUFFIXES:
-            instance = instance_of_world(source, scenario, "prmstar", None, progress)
+            instance = _instance_of_world(source, scenario, "prmstar", None, progress)
         elif scenario is not None:
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
         else:
             instance = read_instance(source)
-        with holding_back_ctrl_c():  # after reading: what is wrong is said at once
-            from sva_bench.mission.failures import MODEL
-            from sva_bench.solver.risk import RiskMeasure
-            from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
+        with loading():  # after reading: what is wrong is said at once
+            from sva_bench.solver.two_stage import SolveLimits
+            from sva_bench.study.one_plan import make_plan
 
         progress("solving", 0, 1)
-        limits, cuts_used = SolveLimits(time_limit_s=time_limit, gap=gap), cuts or "single"
         with deferring_ctrl_c():  # the solver hears it; from there on the plan is written
-            if risk is not None:
-                told = {"weight": weight, "beta": beta, "target": target}
-                made = plan_averse(instance, RiskMeasure(
-                    kind=risk, **{name: value for name, value in told.items() if value is not None}), limits)
-            elif objective == "stochastic":
-                made = plan_stochastic(instance, limits, method=method, cuts=cuts_used)
-            else:
-                stochastic = plan_stochastic(replace(instance, failure=MODEL), limits, method=method,
-                                             cuts=cuts_used)
-                made = plan_deterministic(instance, stochastic, limits, method=method, cuts=cuts_used).plan
+            made = make_plan(instance, asked, SolveLimits(time_limit_s=time_limit, gap=gap))
             write_result(output, pretty_json(plan_as_dict(made)))
         progress("solving", 1, 1)
     assert made.value is not None
@@ -135,7 +119,7 @@ def certify(
 
     Exits with 3 if it is infeasible.
     """
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.mission.certify import certify as check
         from sva_bench.mission.instance_file import read_instance
         from sva_bench.mission.plan_file import read_plan
@@ -155,3 +139,22 @@ def certify(
             console.print(f"  {reason}", highlight=False, markup=False)
     if not certificate.feasible:
         raise typer.Exit(ExitCode.INFEASIBLE_PLAN)
+
+
+def _instance_of_world(
+    path: Path, scenario: str | None, planner: PathPlanner, margin: float | None, progress: OnProgress,
+) -> Instance:
+    """The instance of a world's scenario; of the availabilities under ``robots:`` by default."""
+    with loading():
+        from sva_bench.study.inputs import about, load
+
+    world = load(path, [scenario] if scenario else None, margin)
+    with loading():  # after the world: its errors are said at once
+        from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs
+
+    with about(path):
+        costs = plan_costs(world, planner, progress)
+    for cost in costs.values():
+        messages.print(f"{cost.times.model.name}: {counted(cost.pairs, 'travel time')}, {cost.changed_pct:.1f} % "
+                       f"repaired, by up to {cost.max_excess_pct:.1f} %", highlight=False)
+    return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))

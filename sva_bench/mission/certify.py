@@ -9,6 +9,7 @@ import itertools
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sva_bench.files.notebook import notebook_table
 from sva_bench.mission.failures import Reliability, RouteProfile, process_of
 from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 from sva_bench.mission.plan import Plan, Route
@@ -36,6 +37,21 @@ class Certificate:
     fuel_s: dict[str, float]
     duration_s: dict[str, float]
     reasons: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        said = "" if not self.reasons else f": {self.reasons[0]}" + (
+            "" if len(self.reasons) == 1 else f" (and {len(self.reasons) - 1} more)")
+        return f"Certificate({self._verdict()}{said})"
+
+    def _repr_html_(self) -> str:
+        """A notebook's table: a row for each vehicle, and for each reason."""
+        vehicles = [(name, f"{fuel:.1f}", f"{self.duration_s[name]:.1f}") for name, fuel in self.fuel_s.items()]
+        return notebook_table(self._verdict(), ("vehicle", "fuel [s]", "mission [s]"),
+                              [*vehicles, *((reason, "", "") for reason in self.reasons)])
+
+    def _verdict(self) -> str:
+        return "infeasible" if self.expected is None else \
+            f"feasible, expected incentive {self.expected:.6g}, {self.nominal:.6g} if all are available"
 
     def as_dict(self) -> dict[str, Any]:
         """The certificate as ``sva-bench certify --json`` prints it."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import FailureProcess
+from sva_bench.files.printable import counted
 from sva_bench.mission.failures import JointState
 
 TOLERANCE_S = 1e-6
@@ -64,6 +65,10 @@ class Instance:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stop_s", frozen(self.stop_s, (len(self.sites),)))
+
+    def __repr__(self) -> str:
+        counts = ((self.vehicles, "vehicle"), (self.pois, "POI"), (self.stations, "station"))
+        return f"Instance({self.name}: {', '.join(counted(len(c), what) for c, what in counts)}; {self.failure})"
 
     @property
     def pois(self) -> tuple[int, ...]:

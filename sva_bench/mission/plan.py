@@ -7,10 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sva_bench.choices import PlanObjective, Status
+from sva_bench.files.notebook import notebook_table
+from sva_bench.files.printable import counted
 
 Route = tuple[str, ...]
 """Site names from base to base; empty for a robot that stays home."""
 
+_MOST_SHOWN = 60  # stops of a route in a table
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
@@ -41,6 +44,26 @@ class Plan:
     runtime_s: float | None = None
     seed: int | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"Plan({self._said()}; {', '.join(f'{name}: {self._stops(name)}' for name in self.routes)})"
+
+    def _repr_html_(self) -> str:
+        """A notebook's table: a row for each robot."""
+        return notebook_table(self._said(), ("robot", "stops", "fuel [s]", "route"), [
+            (name, str(max(len(route) - 2, 0)), f"{self.fuel_s[name]:.1f}" if name in self.fuel_s else "",
+             " → ".join(route) if len(route) <= _MOST_SHOWN else " → ".join((*route[:_MOST_SHOWN], "...")))
+            for name, route in self.routes.items()])
+
+    def _said(self) -> str:
+        """What it is and what was promised, in one line."""
+        figures = [f"{what} {figure:.6g}" for what, figure in (("value", self.value), ("bound", self.bound))
+                   if figure is not None]
+        words = [word for word in (self.objective, self.status, *figures) if word is not None]
+        return ", ".join(words) or "no promises"
+
+    def _stops(self, robot: str) -> str:
+        return counted(len(self.routes[robot]) - 2, "stop") if len(self.routes[robot]) > 2 else "stays home"
 
     def route(self, robot: str) -> Route:
         """The robot's route; empty if the plan has none."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -64,10 +64,11 @@ class Manifest(Record):
 
 
 def manifest_of(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
-                seconds: Mapping[str, float]) -> Manifest:
-    """The manifest of a run of this process."""
+                seconds: Mapping[str, float], command: Sequence[str] | None = None) -> Manifest:
+    """The manifest of a run of this process; ``command``: ``None`` = its command line."""
     return Manifest(
-        version=__version__, seed=seed, options=options, command=("sva-bench", *sys.argv[1:]), started=started,
+        version=__version__, seed=seed, options=options, started=started,
+        command=("sva-bench", *sys.argv[1:]) if command is None else tuple(command),
         seconds={phase: round(taken, 3) for phase, taken in seconds.items()},
         machine=Machine(platform=platform.platform(), python=platform.python_version(),
                         cpus=usable_cores()),

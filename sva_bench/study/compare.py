@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sva_bench.analysis.comparison import comparison_summary
@@ -25,11 +25,21 @@ from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Compared:
+    """Plans from elsewhere executed and measured, nothing written yet."""
+
+    instances: Mapping[str, Instance]
+    executed: list[Executed]
+    summary: ComparisonSummary
+    clock: Stopwatch
+
+
 def execute_plans(
     world: World, plans: Mapping[str, Plan], options: Options, out: Path, executor: Executor | None,
     progress: OnProgress, costs: Mapping[str, FuelCosts],
 ) -> Run:
-    """Execute given plans and compare them, pair by pair.
+    """Execute given plans, compare them pair by pair, and write the run folder.
 
     Args:
         world: The world.
@@ -38,6 +48,15 @@ def execute_plans(
         out, executor, progress: As for ``run``.
         costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
     """
+    done = measure_plans(world, plans, options, executor, progress, costs)
+    return publish_plans(world, plans, options, done, out, progress, costs)
+
+
+def measure_plans(
+    world: World, plans: Mapping[str, Plan], options: Options, executor: Executor | None, progress: OnProgress,
+    costs: Mapping[str, FuelCosts],
+) -> Compared:
+    """Execute plans from anywhere and compare them; the arguments are those of ``execute_plans``."""
     refuse_too_many_rows(world, options.trials, len(plans))
     clock = Stopwatch()
     settings = settings_of(world, options)
@@ -53,9 +72,17 @@ def execute_plans(
         scenarios=tuple(comparison_summary(
             [_judged(world, instances[s.name], plan, runs[s.name, name]) for name, plan in plans.items()], robots,
             noisy=not world.noise.silent) for s in world.scenarios))
-    return publish(world, options, costs, instances, executed, summary, out, clock, progress,
+    return Compared(instances=instances, executed=executed, summary=summary, clock=clock)
+
+
+def publish_plans(
+    world: World, plans: Mapping[str, Plan], options: Options, done: Compared, out: Path, progress: OnProgress,
+    costs: Mapping[str, FuelCosts], command: Sequence[str] | None = None,
+) -> Run:
+    """Write the run folder of plans that were compared; ``command``: as for ``publish``."""
+    return publish(world, options, costs, done.instances, done.executed, done.summary, out, done.clock, progress,
                    identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
-                                       for name, plan in plans.items()}})
+                                       for name, plan in plans.items()}}, command=command)
 
 
 def _judged(world: World, instance: Instance, plan: Plan, run: Executed) -> Judged:

@@ -16,7 +16,7 @@ from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.study.given_plans import instance_name
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
-from sva_bench.travel.times import plan_travel_times
+from sva_bench.travel.times import TravelTimes, plan_travel_times
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import Scenario, World
 
@@ -24,16 +24,20 @@ NOMINAL = "nominal"
 """The scenario of the availabilities under ``robots:``."""
 
 
+def plan_times(world: World, planner: PathPlanner, progress: OnProgress) -> dict[str, TravelTimes]:
+    """Travel times of each robot model in the world, by its name."""
+    models = {robot.model.name: robot.model for robot in world.robots}
+    times = {}
+    for number, (name, model) in enumerate(models.items()):
+        progress("planning paths", number, len(models))
+        times[name] = plan_travel_times(world, model, planner)
+        progress("planning paths", number + 1, len(models))
+    return times
+
 
 def plan_costs(world: World, planner: PathPlanner, progress: OnProgress) -> dict[str, FuelCosts]:
     """Fuel costs of each robot model in the world, by its name."""
-    models = {robot.model.name: robot.model for robot in world.robots}
-    costs = {}
-    for number, (name, model) in enumerate(models.items()):
-        progress("planning paths", number, len(models))
-        costs[name] = fuel_costs(plan_travel_times(world, model, planner), world.margin)
-        progress("planning paths", number + 1, len(models))
-    return costs
+    return {name: fuel_costs(times, world.margin) for name, times in plan_times(world, planner, progress).items()}
 
 
 def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario) -> Instance:

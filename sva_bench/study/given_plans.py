@@ -24,12 +24,12 @@ class InfeasiblePlan(SvaBenchError):
 
     exit_code = ExitCode.INFEASIBLE_PLAN
 
-    def __init__(self, path: Path, reasons: Sequence[str]) -> None:
-        super().__init__(path, reasons)
-        self.path, self.reasons = path, reasons
+    def __init__(self, which: Path | str, reasons: Sequence[str]) -> None:
+        super().__init__(which, reasons)
+        self.which, self.reasons = which, reasons
 
     def __str__(self) -> str:
-        return f"{self.path}: the plan is infeasible:\n  " + "\n  ".join(self.reasons)
+        return f"{self.which}: the plan is infeasible:\n  " + "\n  ".join(self.reasons)
 
 
 def read_plans(world: World, paths: Mapping[str, Path]) -> dict[str, Plan]:
@@ -39,18 +39,29 @@ def read_plans(world: World, paths: Mapping[str, Path]) -> dict[str, Plan]:
         BadFile: If a file is no plan, or names robots or sites that the world doesn't have.
         InfeasiblePlan: If a plan is infeasible for any travel times.
     """
-    instance = _without_times(world)
+    instance = without_times(world)
+    return {name: drivable(world, instance, read_plan(path, instance), path) for name, path in paths.items()}
+
+
+def drivable(world: World, instance: Instance, plan: Plan, which: Path | str) -> Plan:
+    """The plan, if it could be driven in a world, whatever the travel times.
+
+    Args:
+        world: The world.
+        instance: The world's, as ``without_times`` gives it; it knows all robots and sites of the plan.
+        plan: The plan.
+        which: Its file, or what else it is called.
+
+    Raises:
+        InfeasiblePlan: If it couldn't.
+    """
     names = {instance_name(world), *(instance_name(world, scenario.name) for scenario in world.scenarios)}
-    plans = {}
-    for name, path in paths.items():
-        plan = read_plan(path, instance)
-        if plan.instance is not None and plan.instance not in names:
-            _log.warning("%s was made for %s, not for %s", path, plan.instance, world.name)
-        certificate = certify(instance, replace(plan, value=None))
-        if not certificate.feasible:
-            raise InfeasiblePlan(path, certificate.reasons)
-        plans[name] = plan
-    return plans
+    if plan.instance is not None and plan.instance not in names:
+        _log.warning("%s was made for %s, not for %s", which, plan.instance, world.name)
+    certificate = certify(instance, replace(plan, value=None))
+    if not certificate.feasible:
+        raise InfeasiblePlan(which, certificate.reasons)
+    return plan
 
 
 def instance_name(world: World, scenario: str | None = None) -> str:
@@ -58,7 +69,7 @@ def instance_name(world: World, scenario: str | None = None) -> str:
     return world.name if scenario is None else f"{world.name}-{scenario}"
 
 
-def _without_times(world: World) -> Instance:
+def without_times(world: World) -> Instance:
     """The world's instance with all costs 0: a plan infeasible for it is infeasible for any travel times."""
     sites = tuple(site.name for site in world.sites)
     free, nothing = np.zeros((len(sites), len(sites))), np.zeros(len(sites))

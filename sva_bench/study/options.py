@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -47,6 +48,17 @@ class Options:
         return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
                 "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
                 "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
+
+    @classmethod
+    def from_dict(cls, seed: int, told: Mapping[str, Any]) -> Options:
+        """The options that ``as_dict`` has told, as they stand in ``manifest.json``, with the seed beside them."""
+        precision = None
+        if "precision_pct" in told:
+            precision = Precision(pct=told["precision_pct"], max_trials=told["max_trials"])
+        return cls(
+            seed=seed, trials=told["trials"], rollouts=told["rollouts"], fidelity=told["fidelity"],
+            planner=told["planner"], limits=SolveLimits(time_limit_s=told["time_limit_s"], gap=told["gap"]),
+            evpi=told["evpi"], informed=told["informed"], assumptions=told["assumptions"], precision=precision)
 
 
 def settings_of(world: World, options: Options) -> Settings:

@@ -197,14 +197,14 @@ def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, 
 
 
 def check_plans(
-    world: World, costs: Mapping[str, FuelCosts], plans: Mapping[str, Plan], paths: Mapping[str, Path], *,
+    world: World, costs: Mapping[str, FuelCosts], plans: Mapping[str, Plan], paths: Mapping[str, Path | str], *,
     allow_infeasible: bool,
 ) -> None:
     """Refuse given plans that are infeasible with the world's travel times.
 
     Args:
         world, costs: The world, and its fuel costs.
-        plans, paths: The plans and their files, by name.
+        plans, paths: The plans and their files, or what else they are called, by name.
         allow_infeasible: Warn of those that break fuel or limit alone.
 
     Raises:

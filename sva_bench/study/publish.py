@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -50,9 +50,17 @@ class Run:
 def publish(
     world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
     executed: list[Executed], summary: AnySummary, out: Path, clock: Stopwatch, progress: OnProgress,
-    identity: Mapping[str, Any] | None = None,
+    identity: Mapping[str, Any] | None = None, command: Sequence[str] | None = None,
 ) -> Run:
-    """Write the run folder; ``identity`` holds further inputs that the results depend on, such as given plans."""
+    """Write the run folder.
+
+    Args:
+        world, options, costs, instances, executed, summary: What was measured, and how.
+        out: The folder that receives the run folder.
+        clock, progress: How long it took so far; told how far the recording is.
+        identity: What results of plans from elsewhere depend on beside the rest.
+        command: What was called; ``None`` = the command line of this process.
+    """
     resolved = world_as_dict(world)
     name = run_name(world.name, options.seed,
                     {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
@@ -78,7 +86,7 @@ def publish(
         write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
                        settings_of(world, options))
         write_record(folder / "summary.json", summary)
-        manifest = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds)
+        manifest = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds, command)
         write_record(folder / "manifest.json", manifest)
         write_report(folder / "report.html", Content(
             summary=summary, routes={k: v.case.plan.routes for k, v in by_case(executed).items()}, stems=stems,

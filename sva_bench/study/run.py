@@ -46,9 +46,16 @@ def run(world: World, options: Options, out: Path, executor: Executor | None, pr
         BadInput: If there are too many trials, or the folder can't be written.
         UnreachableSite: If a site can't be reached.
     """
-    done = measure(world, options, executor, progress)
+    return publish_run(world, options, measure(world, options, executor, progress), out, progress)
+
+
+def publish_run(
+    world: World, options: Options, done: Measured, out: Path, progress: OnProgress,
+    command: Sequence[str] | None = None,
+) -> Run:
+    """Write the run folder of what was measured; ``command``: as for ``publish``."""
     return publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
-                    done.summary, out, done.clock, progress)
+                   done.summary, out, done.clock, progress, command=command)
 
 
 def measure(world: World, options: Options, executor: Executor | None, progress: OnProgress) -> Measured:

@@ -32,6 +32,10 @@ class FuelCosts:
         object.__setattr__(self, "repaired_ms", frozen_int(self.repaired_ms, (n, n)))
         object.__setattr__(self, "via", frozen_int(self.via, (n, n)))
 
+    def __repr__(self) -> str:
+        return (f"FuelCosts({self.times.model.name}: {len(self.times.sites)} sites, {self.changed_pct:.1f} % repaired, "
+                f"margin {self.margin:g})")
+
     @property
     def cost_s(self) -> FloatArray:
         """Planning cost from site i to site j [s], to the nanosecond, shape (n, n)."""

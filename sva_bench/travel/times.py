@@ -80,6 +80,10 @@ class TravelTimes:
         n = len(self.sites)
         object.__setattr__(self, "time_ms", frozen_int(self.time_ms, (n, n)))
 
+    def __repr__(self) -> str:
+        return (f"TravelTimes({self.model.name}: {len(self.sites)} sites, up to "
+                f"{self.time_ms.max(initial=0) / 1000:.1f} s)")
+
     def path(self, origin: str, destination: str) -> FloatArray:
         """The path from one site to another [m], shape (k, 2)."""
         path = self.paths[self.sites.index(origin)][self.sites.index(destination)]

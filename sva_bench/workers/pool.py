@@ -84,6 +84,7 @@ def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]
         with holding_back_ctrl_c(), _without_main_module():  # workers inherit the former for good
             for _ in range(count):  # they start, import and load compiled code while this process plans
                 executor.submit(import_module, preload)
+            _hear_of_cut_off_answers(executor)
         started = set(multiprocessing.active_children()) - before
         yield executor
     except BaseException as error:
@@ -97,6 +98,15 @@ def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]
         raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _hear_of_cut_off_answers(executor: Any) -> None:
+    """Close this process's own end of the pipe that workers answer by, now that each has its own.
+
+    A worker that is terminated in the middle of an answer leaves it cut off, and whoever reads it would wait for the
+    rest of it as long as anybody could write there.
+    """
+    executor._result_queue._writer.close()
 
 
 def _death_of(workers: set[BaseProcess]) -> str:

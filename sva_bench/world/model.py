@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sva_bench.choices import FailureProcess, SiteKind
+from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState
 from sva_bench.robot.model import RobotModel
@@ -129,6 +130,10 @@ class World:
     margin: float
     noise: Noise
     map_source: MapSource | None = None
+
+    def __repr__(self) -> str:
+        counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))
+        return f"World({self.name}: {', '.join(counted(len(c), what) for c, what in counts)})"
 
     @property
     def stations(self) -> tuple[Site, ...]:

@@ -12,9 +12,9 @@ import typer
 
 from sva_bench import seeds
 from sva_bench.__main__ import run_command_line
-from sva_bench.cli import options
 from sva_bench.cli.app import app
 from sva_bench.files.seal import refuse_others, sealed
+from sva_bench.study import bounds
 from tests.cli.test_commands import TINY
 from tests.worlds_for_tests import SMALL
 
@@ -193,7 +193,7 @@ SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
 def test_every_command_that_draws_takes_a_seed() -> None:
     assert {" ".join(words) for words in SEEDED} == {
         "run", "execute", "reproduce simulation", "batch over", "world random", "world from-map", "instance random"}
-    assert options.MOST_SEED == seeds.MOST_SEED
+    assert bounds.MOST_SEED == seeds.MOST_SEED
 
 
 @pytest.mark.parametrize("words", SEEDED, ids=" ".join)

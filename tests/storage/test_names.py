@@ -11,10 +11,10 @@ import pytest
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.batch.grid import Point
-from sva_bench.cli.loading import by_name
 from sva_bench.errors import BadInput
 from sva_bench.storage.run_folder import stem_of
 from sva_bench.storage.stored_run import read_content
+from sva_bench.study.inputs import by_name
 from tests.cli.test_commands import TINY
 from tests.worlds_for_tests import SMALL, world_of
 

@@ -9,7 +9,7 @@ import pytest
 
 from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached
 from sva_bench.analysis.summaries import ComparisonSummary, Reach
-from sva_bench.cli.terminal import print_summary
+from sva_bench.cli.tables import print_summary
 from sva_bench.study.compare import execute_plans
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.given_plans import read_plans

@@ -59,6 +59,40 @@ def test_a_worker_out_of_memory_is_an_error_with_a_remedy() -> None:
         asked_of_a_worker(bytearray, 1 << 60)
 
 
+def cut_off(told: str) -> None:
+    """In a worker: begin an answer of 1000 bytes, write one of them, and say so."""
+    frame = sys._getframe()
+    while "result_queue" not in frame.f_locals:
+        assert frame.f_back is not None
+        frame = frame.f_back
+    os.write(frame.f_locals["result_queue"]._writer.fileno(), (1000).to_bytes(4, "big") + b"x")
+    Path(told).touch()
+    time.sleep(60)
+
+
+CUT_OFF = """
+import sys, time
+from pathlib import Path
+from sva_bench.workers.pool import local_workers
+from tests.test_workers import cut_off
+
+try:
+    with local_workers(2, "json") as executor:
+        executor.submit(cut_off, sys.argv[1])
+        while not Path(sys.argv[1]).exists():
+            time.sleep(0.05)
+        raise KeyboardInterrupt
+except KeyboardInterrupt:
+    print("caught")
+"""
+
+
+def test_a_worker_that_is_ended_in_the_middle_of_its_answer_is_not_waited_for(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", CUT_OFF, str(tmp_path / "told")], capture_output=True, text=True,
+                          cwd=Path(__file__).parents[1], timeout=60, check=False)
+    assert done.stdout == "caught\n", done.stderr
+
+
 HELPED = """
 from sva_bench.workers.pool import local_workers
 if __name__ == "__main__":

@@ -11,10 +11,10 @@ import pytest
 
 from sva_bench.batch.folder import begin, settings_in, write_maps
 from sva_bench.batch.grid import Grid, Point, grid_of
-from sva_bench.cli.loading import about
 from sva_bench.errors import BadFile
 from sva_bench.files.pretty import pretty_json
 from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.study.inputs import about
 from sva_bench.study.options import Options
 from sva_bench.study.publish import report_again
 from sva_bench.study.run import run

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from sva_bench.choices import InstanceFamily, Unknown, WorldFamily
-from sva_bench.cli.options import MOST_SEED, Force, PlannerOption, Verbose, WorldArgument, finite
+from sva_bench.cli.loading import loading
+from sva_bench.cli.options import Force, PlannerOption, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
 from sva_bench.cli.usage import PlainCommand
 from sva_bench.errors import BadInput
@@ -17,6 +18,7 @@ from sva_bench.files.outputs import check_output, write_beside, write_result
 from sva_bench.files.printable import counted
 from sva_bench.files.seal import refuse_edited, refuse_others, sealed
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.study.bounds import MOST_SEED
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make, copy and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
@@ -29,12 +31,12 @@ def check_world(
     verbose: Verbose = False,
 ) -> None:
     """Check a world: is the file right, does every robot reach every site, and what can't be part of any plan?"""
-    with holding_back_ctrl_c():
-        from sva_bench.cli.loading import about, load
+    with loading():
+        from sva_bench.study.inputs import about, load
 
     set_up_logging(verbose)
     loaded = load(world)
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.analysis.reach import NOTHING, beyond_reach
         from sva_bench.study.costs import plan_costs, reach_of
 
@@ -76,7 +78,7 @@ def make_random_world(
     verbose: Verbose = False,
 ) -> None:
     """Make a random world, with a mission that is neither trivial nor hopeless and the paper's scenarios S1 to S4."""
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.generate.worlds import random_world
 
     set_up_logging(verbose)
@@ -114,9 +116,9 @@ def make_world_from_map(
     verbose: Verbose = False,
 ) -> None:
     """Make a world of a map, with sites on free ground, a mission that suits it and the paper's scenarios S1 to S4."""
-    with holding_back_ctrl_c():
-        from sva_bench.cli.loading import refuse_no_map
+    with loading():
         from sva_bench.generate.worlds import world_from_map
+        from sva_bench.study.inputs import refuse_no_map
         from sva_bench.world.maps.formats import format_of, settings_for
 
     set_up_logging(verbose)
@@ -147,7 +149,7 @@ def copy_example(
     force: Force = False,
 ) -> None:
     """Copy one of the shipped worlds, to run or to change."""
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.generate.examples import example_names, example_plans, example_title, example_world
 
     if listed:
@@ -185,19 +187,19 @@ def draw(
     kind = output.suffix.lower()[1:]
     if kind not in ("png", "svg"):
         raise BadInput(f"{output}: pictures are written as PNG or SVG; let the name end in .png or .svg")
-    with holding_back_ctrl_c():
-        from sva_bench.cli.loading import about, load
+    with loading():
+        from sva_bench.study.inputs import about, load
 
     set_up_logging(verbose)
     check_output(output, world)
     loaded = load(world)
     if loaded.map_source is not None:  # a map may be a picture of that name
         check_output(output, *(world.parent / file.name for file in loaded.map_source.files))
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.study.given_plans import read_plans
 
     read = None if plan is None else read_plans(loaded, {"plan": plan})["plan"]
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.study.pictures import picture_of
 
     with about(world), progress_bars() as progress:
@@ -209,7 +211,7 @@ def draw(
 @world_app.command("schema", cls=PlainCommand)
 def world_schema() -> None:
     """Print the JSON schema of world files, for editors."""
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.world.schema import WorldFile
 
     print_json(WorldFile.model_json_schema())
@@ -233,7 +235,7 @@ def random_instances(
                                                 "output.", show_default=False)] = None,
 ) -> None:
     """Make a random instance of the paper's kind."""
-    with holding_back_ctrl_c():
+    with loading():
         from sva_bench.generate.instances import random_instance
         from sva_bench.mission.instance_file import instance_text
 

@@ -1,0 +1,169 @@
+"""Commands that execute missions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from sva_bench.cli.loading import loading
+from sva_bench.cli.options import (
+    AsCsv,
+    AsJson,
+    ExecuteFailure,
+    FidelityOption,
+    Gap,
+    MarginOption,
+    Out,
+    PlanFailure,
+    PlannerOption,
+    Rollouts,
+    ScenarioNames,
+    Seed,
+    TimeLimit,
+    Trials,
+    Verbose,
+    WorkerCount,
+    WorldArgument,
+)
+from sva_bench.cli.terminal import messages, print_json, progress_bars, set_up_logging
+from sva_bench.errors import BadInput
+from sva_bench.files.outputs import check_folder
+from sva_bench.study.bounds import MOST_TRIALS
+from sva_bench.study.libraries import PRELOAD, load_libraries
+from sva_bench.workers.pool import local_workers
+
+if TYPE_CHECKING:
+    from sva_bench.analysis.summaries import AnySummary
+
+
+def run(
+    world: WorldArgument,
+    seed: Seed = 0,
+    trials: Trials = 1000,
+    rollouts: Rollouts = 32,
+    fidelity: FidelityOption = "rollout",
+    planner: PlannerOption = "prmstar",
+    scenario: ScenarioNames = None,
+    margin: MarginOption = None,
+    plan_failure: PlanFailure = None,
+    execute_failure: ExecuteFailure = None,
+    time_limit: TimeLimit = None,
+    gap: Gap = 1e-6,
+    evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
+                                                      "takes.")] = False,
+    informed: Annotated[bool, typer.Option("--informed", help="Execute as well what somebody would plan who knew "
+                                                              "beforehand who is available.")] = False,
+    assumptions: Annotated[bool, typer.Option("--assumptions", help="Execute plans made for mission under per_leg and "
+                                              "the reverse: what does the wrong assumption cost?")] = False,
+    precision: Annotated[str | None, typer.Option(
+        metavar="PCT%", help="Go on with more trials and noise draws until the interval of the executed VSS is within "
+        "so many per cent of the stochastic plan's mean.", show_default="none")] = None,
+    max_trials: Annotated[int | None, typer.Option(
+        min=1, max=MOST_TRIALS, help="With --precision: trials at which to stop all the same.",
+        show_default="100000")] = None,
+    out: Out = Path("runs"),
+    workers: WorkerCount = None,
+    csv: AsCsv = False,
+    as_json: AsJson = False,
+    verbose: Verbose = False,
+) -> None:
+    """Plan, execute, record and measure a mission: the main job.
+
+    Writes a run folder with travel times, instances, plans, outcomes, recordings and a summary.
+    """
+    with loading():
+        from sva_bench.analysis.precision import precision_of
+        from sva_bench.study.inputs import about, load
+
+    set_up_logging(verbose)
+    if precision is None and max_trials is not None:
+        raise BadInput("--max-trials belongs to --precision; --trials says how many there are without it")
+    asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts)
+    check_folder(out, "--out")
+    loaded = load(world, scenario, margin, plan_failure, execute_failure)
+    load_libraries()  # after the world is read: an error in the file is said at once
+    with loading():
+        from sva_bench.solver.two_stage import SolveLimits
+        from sva_bench.storage.run_folder import tidy
+        from sva_bench.study.options import Options
+        from sva_bench.study.run import run as run_bench
+
+    tidy(out)
+    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
+                      limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
+                      assumptions=assumptions, precision=asked)
+    with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
+        result = run_bench(loaded, options, out, executor, progress)
+    _show(result.summary, result.folder, as_json, csv=csv)
+
+
+def execute(
+    world: WorldArgument,
+    plans: Annotated[list[Path], typer.Argument(metavar="PLAN...", help="Plan files (JSON), by hand or from anywhere.",
+                                                show_default=False)],
+    allow_infeasible: Annotated[bool, typer.Option("--allow-infeasible", help="Drive plans that break fuel capacity "
+                                                   "or mission limit too: seeing them fail is the point. What no robot "
+                                                   "could drive is refused all the same: unknown sites, legs without a "
+                                                   "way, a POI visited twice, routes that don't begin and end at the "
+                                                   "base.")] = False,
+    seed: Seed = 0,
+    trials: Trials = 1000,
+    rollouts: Rollouts = 32,
+    fidelity: FidelityOption = "rollout",
+    planner: PlannerOption = "prmstar",
+    scenario: ScenarioNames = None,
+    margin: MarginOption = None,
+    execute_failure: ExecuteFailure = None,
+    out: Out = Path("runs"),
+    workers: WorkerCount = None,
+    csv: AsCsv = False,
+    as_json: AsJson = False,
+    verbose: Verbose = False,
+) -> None:
+    """Execute plans from anywhere in a world and compare them, pair by pair.
+
+    Exits with 3 if a plan is infeasible, unless it is allowed.
+    """
+    with loading():
+        from sva_bench.study.given_plans import read_plans
+        from sva_bench.study.inputs import about, by_name, load
+
+    set_up_logging(verbose)
+    check_folder(out, "--out")
+    named = by_name(plans)
+    loaded = load(world, scenario, margin, execute_failure=execute_failure)
+    read = read_plans(loaded, named)
+    load_libraries()
+    with loading():
+        from sva_bench.storage.run_folder import tidy
+        from sva_bench.study.compare import execute_plans
+        from sva_bench.study.costs import plan_costs
+        from sva_bench.study.options import Options
+        from sva_bench.study.planning import check_plans
+
+    tidy(out)
+    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
+    with about(world), progress_bars() as progress:
+        costs = plan_costs(loaded, planner, progress)
+        check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
+        with local_workers(workers, PRELOAD) as executor:
+            result = execute_plans(loaded, read, options, out, executor, progress, costs)
+    _show(result.summary, result.folder, as_json, csv=csv)
+
+
+def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False) -> None:
+    with loading():
+        from sva_bench.cli.tables import print_summary
+        from sva_bench.files.records import as_dict
+        from sva_bench.storage.stored_run import write_csv
+
+    if csv:
+        write_csv(folder)
+    if as_json:
+        print_json(as_dict(summary))
+    else:
+        print_summary(summary)
+        messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)

@@ -1,0 +1,54 @@
+"""Commands that show what is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from sva_bench.cli.loading import loading
+from sva_bench.cli.options import AsCsv, Verbose
+from sva_bench.cli.terminal import messages, set_up_logging
+from sva_bench.files.outputs import check_output
+
+
+def view(
+    recording: Annotated[Path, typer.Argument(metavar="RUN-or-RRD", help="Run folder, or one recording.",
+                                              show_default=False)],
+    web: Annotated[bool, typer.Option("--web", help="Serve it to a browser, on this machine only.")] = False,
+    screenshot: Annotated[Path | None, typer.Option(metavar="OUT.png", help="Take a picture without a screen.",
+                                                    show_default=False)] = None,
+    at: Annotated[float | None, typer.Option(metavar="S", min=0, help="Mission time of the picture.",
+                                             show_default="the end")] = None,
+) -> None:
+    """Open recordings in the Rerun viewer."""
+    with loading():
+        from sva_bench.recording.viewer import view as open_viewer
+        from sva_bench.storage.stored_run import missing, run_folder_at
+
+    if recording.is_dir() and next((recording / "recordings").glob("*.rrd"), None) is None:
+        raise missing(run_folder_at(recording), recording / "recordings" / "*.rrd")  # or what it is, if it is none
+    if screenshot is not None:
+        check_output(screenshot, way_out="choose another place with --screenshot")
+    open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)],
+    csv: AsCsv = False,
+    verbose: Verbose = False,
+) -> None:
+    """Write the report of a finished run again, from its tables."""
+    with loading():
+        from sva_bench.storage.stored_run import write_csv
+        from sva_bench.study.publish import report_again
+
+    set_up_logging(verbose)
+    if folder.is_dir():  # else it is said what is missing
+        check_output(folder / "report.html", way_out="make the folder writable")
+    page = report_again(folder)
+    if csv:
+        write_csv(folder)
+    messages.print(f"written to [bold]{escape(str(page))}[/bold]", highlight=False)

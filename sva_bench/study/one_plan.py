@@ -1,0 +1,25 @@
+"""One plan of an instance, as it is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sva_bench.mission.failures import MODEL
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.plan import Plan
+from sva_bench.solver.risk import RiskMeasure
+from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
+from sva_bench.study.asked import AskedPlan
+
+
+def make_plan(instance: Instance, asked: AskedPlan, limits: SolveLimits) -> Plan:
+    """The plan that is asked for; on Ctrl-C, where it is heard, the best until then (``interrupted``)."""
+    cuts = asked.cuts or "single"
+    if asked.risk is not None:
+        told = {"weight": asked.weight, "beta": asked.beta, "target": asked.target}
+        return plan_averse(instance, RiskMeasure(
+            kind=asked.risk, **{name: value for name, value in told.items() if value is not None}), limits)
+    if asked.objective == "stochastic":
+        return plan_stochastic(instance, limits, method=asked.method, cuts=cuts)
+    stochastic = plan_stochastic(replace(instance, failure=MODEL), limits, method=asked.method, cuts=cuts)
+    return plan_deterministic(instance, stochastic, limits, method=asked.method, cuts=cuts).plan

@@ -1,0 +1,71 @@
+"""What ``run`` and ``execute`` give."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import pyarrow as pa
+
+from sva_bench.analysis.summaries import ComparisonSummary, Summary
+from sva_bench.execution.execute import Executed, Settings
+from sva_bench.files.records import as_dict
+from sva_bench.mission.plan import Plan
+from sva_bench.storage.outcome_table import outcome_table
+from sva_bench.storage.run_folder import legs_of
+from sva_bench.storage.tables import LEGS
+from sva_bench.world.model import World
+
+SummaryT = TypeVar("SummaryT", Summary, ComparisonSummary)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Result(Generic[SummaryT]):
+    """What was measured.
+
+    Attributes:
+        world: The world.
+        summary: What it comes to: the content of ``summary.json``.
+        folder: The run folder; ``None`` if none was asked for.
+        settings: How plans were executed.
+        executed: Every case, trial by trial, as arrays.
+    """
+
+    world: World
+    summary: SummaryT
+    folder: Path | None
+    settings: Settings
+    executed: tuple[Executed, ...]
+
+    @property
+    def plans(self) -> Mapping[str, Mapping[str, Plan]]:
+        """Plans by scenario and planner, or the name they were given by."""
+        found: dict[str, dict[str, Plan]] = {}
+        for run in self.executed:
+            found.setdefault(run.case.scenario.name, {})[run.case.planner] = run.case.plan
+        return found
+
+    @property
+    def outcomes(self) -> pa.Table:
+        """A row per scenario, plan, trial and robot, as in ``outcomes.parquet``; ``.to_pandas()`` where pandas is."""
+        robots = [robot.name for robot in self.world.robots]
+        return pa.concat_tables([outcome_table(run, robots, self.settings) for run in self.executed])
+
+    @property
+    def legs(self) -> pa.Table:
+        """A row per leg that was driven, with times as planned and as driven [s], as in ``legs.parquet``."""
+        return pa.table(vars(legs_of(self.executed)), schema=LEGS)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The summary as ``summary.json`` holds it."""
+        return as_dict(self.summary)
+
+    def __repr__(self) -> str:
+        where = "" if self.folder is None else f"\nwritten to {self.folder}"
+        return f"{self.summary!r}{where}"
+
+    def _repr_html_(self) -> str:
+        """The summary as a notebook's table."""
+        return self.summary._repr_html_()
