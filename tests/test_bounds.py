@@ -68,7 +68,7 @@ def test_seeds_are_bounded_in_number_and_size(world: Path) -> None:
     with pytest.raises(BadInput, match="more than 100000 seeds in all"):
         seeds_of(["0-99999,200000-299999"])
     world.with_name("s.yaml").write_text(json.dumps(
-        {"format": "sva-bench/sweep@1", "worlds": [world.name], "seeds": [10**18]}))
+        {"format": "sva-bench/sweep@1", "worlds": [world.name], "seeds": [2**63]}))
     with pytest.raises(BadFile, match="seeds"):
         sweep_of([world.with_name("s.yaml")], Sweep())
 

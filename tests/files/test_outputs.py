@@ -159,7 +159,8 @@ def test_a_terminated_run_removes_its_drafts(number: signal.Signals, code: int, 
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     process = subprocess.Popen(
         [sys.executable, "-m", "sva_bench", "run", "small.yaml", "--trials", "500", "--rollouts", "500"], cwd=tmp_path,
-        stderr=subprocess.PIPE, text=True, start_new_session=True)
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL))  # ignored where tests are run with nohup
     assert process.stderr is not None
     assert process.stderr.readline() == "planning paths ...\n"
     os.kill(process.pid, number)
