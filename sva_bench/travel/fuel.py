@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse.csgraph import floyd_warshall
 
 from sva_bench.arrays import FloatArray, IntArray, frozen_int
+from sva_bench.files.printable import counted
 from sva_bench.travel.times import TravelTimes
 
 
@@ -33,7 +34,7 @@ class FuelCosts:
         object.__setattr__(self, "via", frozen_int(self.via, (n, n)))
 
     def __repr__(self) -> str:
-        return (f"FuelCosts({self.times.model.name}: {len(self.times.sites)} sites, {self.changed_pct:.1f} % repaired, "
+        return (f"FuelCosts({self.times.model.name}: {counted(len(self.times.sites), 'site')}, {self.changed_pct:.1f} % repaired, "
                 f"margin {self.margin:g})")
 
     @property

@@ -12,6 +12,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray, IntArray, frozen_int
 from sva_bench.choices import PathPlanner
 from sva_bench.errors import SvaBenchError
+from sva_bench.files.printable import counted
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.passages import widest_passage
 from sva_bench.robot.follower import Stretch, stretches
@@ -81,7 +82,7 @@ class TravelTimes:
         object.__setattr__(self, "time_ms", frozen_int(self.time_ms, (n, n)))
 
     def __repr__(self) -> str:
-        return (f"TravelTimes({self.model.name}: {len(self.sites)} sites, up to "
+        return (f"TravelTimes({self.model.name}: {counted(len(self.sites), 'site')}, up to "
                 f"{self.time_ms.max(initial=0) / 1000:.1f} s)")
 
     def path(self, origin: str, destination: str) -> FloatArray:

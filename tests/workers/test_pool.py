@@ -74,7 +74,7 @@ CUT_OFF = """
 import sys, time
 from pathlib import Path
 from sva_bench.workers.pool import local_workers
-from tests.test_workers import cut_off
+from tests.workers.test_pool import cut_off
 
 try:
     with local_workers(2, "json") as executor:
@@ -89,7 +89,7 @@ except KeyboardInterrupt:
 
 def test_a_worker_that_is_ended_in_the_middle_of_its_answer_is_not_waited_for(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", CUT_OFF, str(tmp_path / "told")], capture_output=True, text=True,
-                          cwd=Path(__file__).parents[1], timeout=60, check=False)
+                          cwd=Path(__file__).parents[2], timeout=60, check=False)
     assert done.stdout == "caught\n", done.stderr
 
 
