@@ -34,8 +34,8 @@ class FuelCosts:
         object.__setattr__(self, "via", frozen_int(self.via, (n, n)))
 
     def __repr__(self) -> str:
-        return (f"FuelCosts({self.times.model.name}: {counted(len(self.times.sites), 'site')}, {self.changed_pct:.1f} % repaired, "
-                f"margin {self.margin:g})")
+        return (f"FuelCosts({self.times.model.name}: {counted(len(self.times.sites), 'site')}, "
+                f"{self.changed_pct:.1f} % repaired, margin {self.margin:g})")
 
     @property
     def cost_s(self) -> FloatArray:
