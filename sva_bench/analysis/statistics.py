@@ -33,7 +33,6 @@ def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
     Source:
         Zou & Donner (2008), "Construction of confidence limits about effect measures" (MOVER); Bonferroni's inequality
         for simultaneous intervals.
-        Several intervals at a time: Bonferroni's inequality, whatever they share.
     """
     drawn, taken = _drawn_interval(figure, comparisons), _taken_interval(figure, comparisons)
     if drawn is None or taken is None:

@@ -13,6 +13,7 @@ from sva_bench.arrays import FloatArray, IntArray, frozen_int
 from sva_bench.choices import PathPlanner
 from sva_bench.errors import SvaBenchError
 from sva_bench.files.printable import counted
+from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.passages import widest_passage
 from sva_bench.robot.follower import Stretch, stretches
@@ -20,7 +21,6 @@ from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import leg_times
 from sva_bench.travel.roadmap import plan_paths
 from sva_bench.world.model import World
-from sva_bench.world.places import CLEARANCE_MARGINS_M as CLEARANCE_MARGINS_M
 
 _log = logging.getLogger(__name__)
 

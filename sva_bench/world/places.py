@@ -20,16 +20,12 @@ from scipy.spatial.distance import cdist
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import Cells, DistanceField, connected_region, distance_field
+from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.seeds import Stream, rng_for
 
 Point = tuple[float, float]
 
-CLEARANCE_MARGINS_M = (0.12, 0.06, 0.03)
-"""Distances to obstacles that paths keep beyond the robot's radius [m]; the first that connects all sites is used.
-
-The follower cuts gentle corners by up to 0.05 m and tracks to 0.01 m: at 0.12 m no robot touches anything.
-"""
 
 APART_M = 0.5
 """Default of the least distance between placed sites [m]."""

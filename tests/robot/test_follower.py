@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import FloatArray
+from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, arc_lengths, control, new_state, stretches, wrap
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.robot.twin import drive
 from sva_bench.travel.roadmap import plan_paths
-from sva_bench.travel.times import CLEARANCE_MARGINS_M
 from tests.oracles.distances import points_to_segment
 from tests.oracles.worlds import free_places, random_obstacles
 

@@ -9,9 +9,10 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from sva_bench.errors import ExitCode
+from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.robot.twin import drive
-from sva_bench.travel.times import CLEARANCE_MARGINS_M, UnreachableSite, plan_travel_times
+from sva_bench.travel.times import UnreachableSite, plan_travel_times
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World
 from tests.oracles.distances import path_clearance
