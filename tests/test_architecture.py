@@ -167,13 +167,13 @@ def test_a_check_loads_neither_physics_nor_solvers_nor_statistics() -> None:
 
 
 LONGEST = 60
-REASONED = tuple(room for room in ROOMS if room not in ("execution", "cli"))
 
 
-@pytest.mark.parametrize("module", [module for module in MODULES if room_of(module) in REASONED])
+@pytest.mark.parametrize("module", MODULES)
 def test_a_long_function_gives_its_reason(module: str) -> None:
     for node in ast.walk(ast.parse((PACKAGE / module).read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef) and (node.end_lineno or 0) - node.lineno >= LONGEST:
+        # What follows the signature, which of a command is the list of its options.
+        if isinstance(node, ast.FunctionDef) and (node.end_lineno or 0) - node.body[0].lineno >= LONGEST:
             assert "compiled" in (ast.get_docstring(node) or ""), (
                 f"sva_bench/{module}:{node.lineno}: {node.name} has more than {LONGEST} lines: name its middle, or "
                 "give the reason in its docstring")
