@@ -147,7 +147,7 @@ def occupancy(
 ) -> NDArray[np.int8]:
     """Occupancy of each pixel, 0 to 100 or -1 for unknown, as in current Nav2, in single precision."""
     if mode == "raw":
-        return np.where(image.level <= 100, image.level, -1).astype(np.int8)
+        return np.where(image.level <= 100, image.level.astype(np.int16), -1).astype(np.int8)
     shade = image.level.astype(np.float32) / np.float32(255)
     dark = shade if negate else np.float32(1) - shade
     low, high = np.float32(free_thresh), np.float32(occupied_thresh)
