@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -28,7 +29,7 @@ from sva_bench.recording.rerun import end_s
 from sva_bench.study.given_plans import InfeasiblePlan
 from sva_bench.study.public.arguments import by_argument
 from sva_bench.travel.times import UnreachableSite
-from tests.worlds_for_tests import SMALL
+from tests.worlds_for_tests import SMALL, world_of
 
 FUNCTIONS = ("load_world", "travel_times", "fuel_costs", "make_instance", "plan", "certify", "execute", "run", "record")
 QUICK: dict[str, Any] = {"trials": 40, "rollouts": 2, "fidelity": "kinematic", "workers": 1}
@@ -404,3 +405,21 @@ def _children_of(session: int) -> list[str]:
         if int(words[3]) == session and words[0] != "Z":
             found.append(stat.parent.name)
     return found
+
+
+def test_costs_of_sites_of_the_same_names_elsewhere_are_refused(tmp_path: Path) -> None:
+    world = world_of(tmp_path)
+    site = world.sites[-1]
+    moved = replace(world, sites=(*world.sites[:-1], replace(site, x_m=site.x_m + 0.1)))
+    with pytest.raises(BadInput, match="make them for this world"):
+        sb.make_instance(moved, costs=sb.fuel_costs(world))
+    with pytest.raises(BadInput, match="make them for this world"):
+        sb.fuel_costs(moved, times=sb.travel_times(world))
+
+
+def test_a_scenario_or_vehicle_that_is_not_there_is_named_with_the_nearest(tmp_path: Path) -> None:
+    world = world_of(tmp_path)
+    with pytest.raises(BadInput, match="no scenario 'hlaf'; did you mean 'half'"):
+        world.scenario("hlaf")
+    with pytest.raises(BadInput, match="no vehicle 'uv9'"):
+        sb.make_instance(world).vehicle("uv9")

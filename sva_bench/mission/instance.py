@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import FailureProcess
+from sva_bench.errors import BadInput, nearest
 from sva_bench.files.printable import counted
 from sva_bench.mission.failures import JointState
 
@@ -76,8 +77,15 @@ class Instance:
         return tuple(i for i in range(len(self.sites)) if i != self.base and i not in self.stations)
 
     def vehicle(self, name: str) -> Vehicle:
-        """The vehicle of that name."""
-        return next(v for v in self.vehicles if v.name == name)
+        """The vehicle of that name.
+
+        Raises:
+            BadInput: If there is none.
+        """
+        for vehicle in self.vehicles:
+            if vehicle.name == name:
+                return vehicle
+        raise BadInput(f"{self.name} has no vehicle {name!r}; {nearest(name, [v.name for v in self.vehicles])}")
 
     def with_availability(self, availability: dict[str, float]) -> Instance:
         """The same instance with other, independent availabilities."""

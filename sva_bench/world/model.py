@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sva_bench.choices import FailureProcess, SiteKind
+from sva_bench.errors import BadInput, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState
@@ -146,5 +147,12 @@ class World:
         return tuple(site for site in self.sites if site.kind == "poi")
 
     def scenario(self, name: str) -> Scenario:
-        """The scenario of that name."""
-        return next(s for s in self.scenarios if s.name == name)
+        """The scenario of that name.
+
+        Raises:
+            BadInput: If there is none.
+        """
+        for scenario in self.scenarios:
+            if scenario.name == name:
+                return scenario
+        raise BadInput(f"{self.name} has no scenario {name!r}; {nearest(name, [s.name for s in self.scenarios])}")

@@ -9,7 +9,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
+
+import numpy as np
 
 from sva_bench.errors import BadInput, SvaBenchError, nearest
 from sva_bench.interrupts import as_ctrl_c
@@ -17,6 +19,9 @@ from sva_bench.study.inputs import load
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 from sva_bench.world.variants import adapted
+
+if TYPE_CHECKING:
+    from sva_bench.travel.times import TravelTimes  # takes OMPL to load, and a world is read without it
 
 T = TypeVar("T")
 
@@ -170,6 +175,20 @@ def by_model(name: str, value: object, form: type[T], world: World, what: str) -
         if model not in value:
             raise BadInput(f"{name}: nothing for the robot model {model} of {world.name}; make them for this world")
     return {model: is_a(f"{name}[{model!r}]", value[model], form, what) for model in models}
+
+
+def refuse_other_world(name: str, times: TravelTimes, world: World) -> None:
+    """Refuse travel times between other sites than the world's, or between sites of the same names elsewhere.
+
+    Raises:
+        BadInput: If they are.
+    """
+    places = np.array([(site.x_m, site.y_m) for site in world.sites])
+    ends = [(0, path[0]) for path in times.paths[0][1:2] if path is not None]
+    ends += [(k, path[-1]) for k, path in enumerate(times.paths[0]) if path is not None]
+    if times.sites != tuple(site.name for site in world.sites) or any(
+            not np.allclose(places[k], end, atol=1e-6) for k, end in ends):
+        raise BadInput(f"{name}: not of the sites of {world.name}; make them for this world")
 
 
 def world_given(

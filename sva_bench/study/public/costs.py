@@ -21,6 +21,7 @@ from sva_bench.study.public.arguments import (
     is_a,
     path_of,
     progress_of,
+    refuse_other_world,
     world_given,
 )
 from sva_bench.travel.fuel import FuelCosts
@@ -87,6 +88,8 @@ def fuel_costs(
         with nullcontext() if path is None else about(path):
             return plan_costs(read, planner, progress_of(progress))
     given = by_model("times", times, TravelTimes, read, "travel times")
+    for model, time in given.items():
+        refuse_other_world(f"times[{model!r}]", time, read)
     return {model: repaired(time, read.margin) for model, time in given.items()}
 
 
@@ -124,10 +127,8 @@ def make_instance(
         if margin is not None:
             raise BadInput("margin: the given costs have theirs already; leave out one of the two")
         known = by_model("costs", costs, FuelCosts, read, "fuel costs")
-        sites = tuple(site.name for site in read.sites)
         for model, cost in known.items():
-            if cost.times.sites != sites:
-                raise BadInput(f"costs[{model!r}]: not of the sites of {read.name}; make them for this world")
+            refuse_other_world(f"costs[{model!r}]", cost.times, read)
     instance = instance_of(read, known, read.scenarios[0] if scenario else nominal_scenario(read))
     if target is not None:
         write_result(target, instance_text(instance))
