@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +20,7 @@ class MapSection(Section):
 
     file: FileName
 
+    @abstractmethod
     def read(self, root: Path, *, anywhere: bool = False) -> tuple[Cells, tuple[MapFile, ...]]:
         """Read the map.
 
@@ -32,7 +34,6 @@ class MapSection(Section):
         Raises:
             BadFile: With file, line, key and what to change.
         """
-        raise NotImplementedError
 
     def written(self) -> dict[str, str | float]:
         """The section as written into a new world file, without redundant defaults."""
