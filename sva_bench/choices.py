@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 # Inputs
 SiteKind = Literal["base", "station", "poi"]
-FailureProcess = Literal["mission", "per_leg"]
+FailureProcess = Literal["mission", "per_leg", "hazard"]
 MapMode = Literal["trinary", "scale", "raw"]
 Unknown = Literal["occupied", "free"]
 """What cells of a map count as that are neither occupied nor free."""

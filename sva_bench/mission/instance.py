@@ -8,7 +8,7 @@ from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput, nearest
 from sva_bench.files.printable import counted
-from sva_bench.mission.failures import JointState
+from sva_bench.mission.failures import JointState, Reliability
 
 TOLERANCE_S = 1e-6
 """Feasibility tolerance of fuel and time [s]."""
@@ -22,9 +22,12 @@ class Vehicle:
         name: Its name.
         fuel_capacity_s: Fuel capacity [s of driving]; ``inf`` = no limit.
         mission_limit_s: Longest mission, driving and stops [s]; ``inf`` = no limit.
-        availability: Probability that it is available, or that it survives each leg (``per_leg``).
+        availability: Probability that it is available, that it survives each leg (``per_leg``), or that it survives
+            driving for as long as its mission limit (``hazard``, without ``mtbf_s``).
         incentives: Incentive of its visit to each site, shape (n,); 0 at base and stations.
         fuel_s: Fuel of the leg from site i to site j [s of driving], shape (n, n), zero diagonal; ``inf`` = no leg.
+        mtbf_s: Mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and mission limit.
+        loss_cost: Cost if it leaves the base and doesn't come home [incentive].
     """
 
     name: str
@@ -33,11 +36,19 @@ class Vehicle:
     availability: float
     incentives: FloatArray
     fuel_s: FloatArray
+    mtbf_s: float | None = None
+    loss_cost: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(self.incentives)
         object.__setattr__(self, "incentives", frozen(self.incentives, (n,)))
         object.__setattr__(self, "fuel_s", frozen(self.fuel_s, (n, n)))
+
+    @property
+    def reliability(self) -> Reliability:
+        """What a failure process has to know of it."""
+        return Reliability(availability=self.availability, mission_limit_s=self.mission_limit_s, mtbf_s=self.mtbf_s,
+                           loss_cost=self.loss_cost)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -15,7 +15,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.choices import Cuts, Method, PlanObjective, Status
 from sva_bench.errors import BadInput
 from sva_bench.mission.certify import certify
-from sva_bench.mission.failures import MODEL, PlanningTerms, Reliability, process_of
+from sva_bench.mission.failures import MODEL, PlanningTerms, process_of
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver.flow.recourse import refuse_free_legs, refuse_seldom_available
@@ -94,8 +94,7 @@ def plan_stochastic(
     if not process.collapses and not serves_discounts(method):
         raise BadInput(f"instance {instance.name}: {method} plans under {MODEL}, the instance fails {process.how}; "
                        f"take the method auto, or set its failure to {MODEL}")
-    terms = process.terms([Reliability(availability=v.availability, mission_limit_s=v.mission_limit_s)
-                           for v in instance.vehicles])
+    terms = process.terms([vehicle.reliability for vehicle in instance.vehicles])
     return _plan(instance, "stochastic", terms, limits, incumbent, known, method, cuts)
 
 

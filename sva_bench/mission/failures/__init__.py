@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from sva_bench.arrays import IntArray
 from sva_bench.choices import FailureProcess
+from sva_bench.mission.failures.hazard import HazardFailure
 from sva_bench.mission.failures.joint import JointState, marginals
 from sva_bench.mission.failures.mission import MissionFailure
 from sva_bench.mission.failures.per_leg import PerLegFailure
@@ -46,6 +47,7 @@ __all__ = [
 _ALL: tuple[Process, ...] = (
     MissionFailure(),
     PerLegFailure(),
+    HazardFailure(),
 )
 PROCESSES: Mapping[FailureProcess, Process] = {process.name: process for process in _ALL}
 """The processes by name, in the order in which results list them."""
