@@ -41,12 +41,14 @@ Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]
 EngineName = Literal["ideal", "bullet"]
-PolicyName = Literal["none"]
-"""What a team does about news."""
+PolicyName = Literal["none", "resolve"]
+"""What a team does about news of a failure."""
 POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
-News = Literal["never"]
-"""When a team learns of a failure."""
+News = Literal["never", "station", "report", "instant"]
+"""When a team learns of a failure, the worst informed first."""
 NEWS: tuple[News, ...] = get_args(News)
+Standing = Literal["alive", "unheard", "dead", "home"]
+"""What a team knows of a robot: ``unheard`` is one that has not reported from any stop yet."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
 Role = Literal["stochastic", "deterministic", "informed", "informed_part", "worst_tie", "given"]
