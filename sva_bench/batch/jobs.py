@@ -14,7 +14,7 @@ from sva_bench.batch.shards import Shard, shard_of
 from sva_bench.choices import PathPlanner
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import DriveTask, RouteKey, drive_tasks
-from sva_bench.execution.execute import execute, settle_trials
+from sva_bench.execution.execute import PlannedLegs, execute, settle_trials
 from sva_bench.execution.noise import UNDISTURBED
 from sva_bench.execution.outcome import Driven
 from sva_bench.files.digest import digest
@@ -159,6 +159,7 @@ class TrialsJob:
         first, trials: The range.
         facts: What is known of the plans before any trial.
         drives: All routes driven, but for ``physics``, which needs ``costs`` to make its own.
+        planned: What each leg of the routes takes as planned.
     """
 
     kind: ClassVar[str] = "trials"
@@ -173,6 +174,7 @@ class TrialsJob:
     trials: int
     facts: Facts
     drives: Mapping[RouteKey, Driven]
+    planned: PlannedLegs
     costs: Mapping[str, FuelCosts]
 
     @property
@@ -191,7 +193,7 @@ class TrialsJob:
         if settings.fidelity == "physics":
             executed = execute(self.world, self.costs, self.cases, settings)
         else:
-            executed = settle_trials(self.world, self.cases, settings, self.drives)
+            executed = settle_trials(self.world, self.cases, settings, self.drives, self.planned)
         return shard_of(self.world, self.variant, executed, settings, self.facts)
 
     def fits(self, result: Shard) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 from sva_bench.analysis.summaries import Facts
 from sva_bench.batch.grid import Grid, Point, options_at
 from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob, TrialsJob
-from sva_bench.execution.execute import drives_ahead
+from sva_bench.execution.execute import drives_ahead, planned_legs
 from sva_bench.study.costs import reach_of
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, two_cases
@@ -38,10 +38,11 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
         ahead = drives_ahead(world, costs, cases, settings)
         driven = yield [DriveJob(tasks=chunk.tasks, what=chunk.what) for chunk in ahead.chunks]
         drives = ahead.routes(driven)
-    facts = facts_at(world, options, costs, planned)
+    facts, legs = facts_at(world, options, costs, planned), planned_legs(world, costs, cases)
     yield [TrialsJob(
         unit=grid.unit_name(point, seed, first), world=world, variant=point.variant, cases=cases, facts=facts,
-        drives=drives, costs=costs if settings.fidelity == "physics" else {}, first=first, trials=count,
+        drives=drives, planned=legs,
+        costs=costs if settings.fidelity == "physics" else {}, first=first, trials=count,
         settings=settings) for first, count in left]
 
 

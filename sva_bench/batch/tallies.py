@@ -24,10 +24,10 @@ class PlanTally:
     """Sums over one plan's trials under one scenario.
 
     Attributes:
-        total: Incentive of the team.
-        by_robot: Incentive of each robot in all trials, shape (robots,).
+        total: Value of the team.
+        by_robot: Value of each robot in all trials, shape (robots,).
         ends: Number of robot missions with each end, shape (5,).
-        charged: Incentive lost to each end in ``EXECUTION_LOSSES`` in all trials, shape (3,).
+        charged: Value lost to each end in ``EXECUTION_LOSSES`` in all trials, shape (3,).
         statistics: The measured statistics, by key.
     """
 
@@ -49,7 +49,7 @@ class Tally:
 def tally_of(stochastic: Executed, deterministic: Executed, *, noisy: bool) -> Tally:
     """Add up the trials of a scenario."""
     def added_up(run: Executed) -> PlanTally:
-        return PlanTally(total=value_figure(run, noisy=noisy), by_robot=run.incentive.sum(axis=0),
+        return PlanTally(total=value_figure(run, noisy=noisy), by_robot=run.value.sum(axis=0),
                          ends=np.bincount(run.end.ravel(), minlength=len(ENDS)), charged=charges(run),
                          statistics=measured(run, noisy=noisy))
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from sva_bench.choices import End, EventKind
-from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome
+from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, RobotFate
 from sva_bench.execution.policies.policy import Policy, RobotState, TeamState
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
@@ -32,6 +32,9 @@ class LegDriven(NamedTuple):
     contacts: int = 0
 
 
+_SURE = RobotFate()
+
+
 class RobotMission:
     """One robot's mission as far as it has been played; it changes by ``depart`` and ``drive`` in turn.
 
@@ -45,8 +48,8 @@ class RobotMission:
         end: How it ended; ``None`` as long as it goes on.
     """
 
-    def __init__(self, orders: Assignment, fails_before: int = NEVER) -> None:
-        self.orders, self._fails_before = orders, fails_before
+    def __init__(self, orders: Assignment, fate: RobotFate = _SURE) -> None:
+        self.orders, self._fate = orders, fate
         self.clock_s = self.fuel_s = self.incentive = 0.0
         self.tank_s = orders.fuel_capacity_s
         self.pois = self.stops = self.contacts = 0
@@ -57,7 +60,7 @@ class RobotMission:
         self.ahead = orders.route[1:]
         if not self.ahead:
             self.end = "home"  # an empty route ends home, whatever its draw
-        elif fails_before == 0:
+        elif fate.before_poi == 0:
             self._ends("failed", self.site)
         else:
             self._tell("departed", self.site)
@@ -69,18 +72,26 @@ class RobotMission:
         """
         if self.end is not None:
             return None
-        if self.orders.is_poi(self.ahead[0]) and self.pois + 1 == self._fails_before:
+        if self.orders.is_poi(self.ahead[0]) and self.pois + 1 == self._fate.before_poi:
             self._ends("failed", self.site, lost=True)
             return None
         return self.ahead[0]
 
     def drive(self, leg: LegDriven) -> None:
-        """Drive the leg to the next stop and serve the stop; fuel burns while driving, and only then."""
+        """Drive the leg to the next stop and serve the stop; fuel burns while driving, and only then.
+
+        A robot whose lifetime ends before it would arrive, run dry or get stuck fails there and then.
+        """
         to = self.ahead[0]
         runs_dry = leg.time_s > self.tank_s + TOLERANCE_S
         burnt = min(leg.time_s, max(self.tank_s, 0.0)) if runs_dry else leg.time_s
-        self.clock_s, self.fuel_s, self.tank_s = self.clock_s + burnt, self.fuel_s + burnt, self.tank_s - burnt
         self.contacts += leg.contacts
+        if self.fuel_s + burnt > self._fate.lifetime_s:
+            left = self._fate.lifetime_s - self.fuel_s
+            self.clock_s, self.fuel_s, self.tank_s = self.clock_s + left, self._fate.lifetime_s, self.tank_s - left
+            self._ends("failed", to, lost=True)
+            return
+        self.clock_s, self.fuel_s, self.tank_s = self.clock_s + burnt, self.fuel_s + burnt, self.tank_s - burnt
         if burnt < leg.time_s:
             self._ends("out_of_fuel", to, lost=True)
         elif leg.stuck:
@@ -129,9 +140,10 @@ class RobotMission:
         if self.end is None:
             raise ValueError(f"the mission of {self.orders.robot} is not over")
         return Outcome(
-            available=self._fails_before == NEVER, incentive=self.incentive, lost=self._lost, pois_reached=self.pois,
-            stops_reached=self.stops, end=self.end, end_time_s=self.clock_s, fuel_used_s=self.fuel_s,
-            contacts=self.contacts, events=tuple(self._events))
+            available=self._fate.before_poi == NEVER and self.end != "failed", incentive=self.incentive,
+            lost=self._lost, value=self.incentive - self.orders.loss_cost if self._lost else self.incentive,
+            pois_reached=self.pois, stops_reached=self.stops, end=self.end, end_time_s=self.clock_s,
+            fuel_used_s=self.fuel_s, contacts=self.contacts, events=tuple(self._events))
 
     def state(self) -> RobotState:
         """What a policy may know of it."""
@@ -140,15 +152,15 @@ class RobotMission:
             burnt_s=self.orders.fuel_capacity_s - self.tank_s, remaining=self.ahead, end=self.end)
 
 
-def settle(orders: Assignment, driven: Driven, fails_before: int = NEVER) -> Outcome:
+def settle(orders: Assignment, driven: Driven, fate: RobotFate = _SURE) -> Outcome:
     """What comes of a driven route: one robot, which keeps its orders.
 
     Args:
         orders: Route and rules.
         driven: Driving time of its legs, at least of those before a failure.
-        fails_before: 0: fails before leaving the base; k: on leaving its last stop for the k-th POI; ``NEVER``.
+        fate: When it fails.
     """
-    mission = RobotMission(orders, fails_before)
+    mission = RobotMission(orders, fate)
     times, contacts, last = driven.leg_s.tolist(), driven.contacts.tolist(), len(driven.leg_s) - 1
     leg = 0
     while mission.depart() is not None:
@@ -158,7 +170,7 @@ def settle(orders: Assignment, driven: Driven, fails_before: int = NEVER) -> Out
 
 
 def play(
-    orders: Sequence[Assignment], fails_before: Sequence[int], legs: Callable[[int, str, str], LegDriven],
+    orders: Sequence[Assignment], fates: Sequence[RobotFate], legs: Callable[[int, str, str], LegDriven],
     policy: Policy,
 ) -> list[Outcome]:
     """Play a team's mission: at each epoch the policy says what is left of each robot's orders.
@@ -168,14 +180,14 @@ def play(
 
     Args:
         orders: Orders that each robot begins with, length (robots,).
-        fails_before: As for ``settle``, length (robots,).
+        fates: When each robot fails, length (robots,).
         legs: What the leg of a robot from one site to another takes, by the robot's position.
         policy: The policy.
 
     Raises:
         ValueError: If the policy leaves a robot with orders that don't end at the base.
     """
-    missions = [RobotMission(own, fails) for own, fails in zip(orders, fails_before, strict=True)]
+    missions = [RobotMission(own, fate) for own, fate in zip(orders, fates, strict=True)]
     numbers = {own.robot: number for number, own in enumerate(orders)}
     epochs = [(0.0, number) for number, mission in enumerate(missions) if mission.end is None]
     while epochs:

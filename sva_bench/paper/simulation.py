@@ -85,7 +85,7 @@ _PROCESSES: tuple[FailureProcess, ...] = ("per_leg", "mission")
 def _simulated(s: Executed, d: Executed, *, noisy: bool) -> Simulated:
     vss, mean = estimate(difference_figure(s, d, noisy=noisy)), float(totals(s).mean())
     return Simulated(stochastic=mean, deterministic=float(totals(d).mean()),
-                     by_robot=tuple(s.incentive.mean(axis=0).tolist()), vss=vss,
+                     by_robot=tuple(s.value.mean(axis=0).tolist()), vss=vss,
                      vss_pct=100 * vss.mean / mean if mean else None,
                      same_plan=s.case.plan.drives_like(d.case.plan))
 

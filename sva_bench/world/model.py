@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sva_bench.choices import FailureProcess, SiteKind
 from sva_bench.errors import BadInput, nearest
@@ -46,6 +46,8 @@ class Robot:
         mission_limit_s: Longest mission [s]; ``inf`` = no limit.
         availability: Default of its availability in scenarios.
         incentives: Incentive of its visit to each POI, by name.
+        mtbf_s: Default of its mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and limit.
+        loss_cost: Cost if it leaves the base and doesn't come home [incentive].
     """
 
     name: str
@@ -54,6 +56,8 @@ class Robot:
     mission_limit_s: float
     availability: float
     incentives: Mapping[str, float]
+    mtbf_s: float | None = None
+    loss_cost: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,11 +68,13 @@ class Scenario:
         name: Its name.
         availability: Availability by robot; the marginals of ``joint`` where there is one.
         joint: Joint distribution of the availabilities; ``None`` = independent.
+        mtbf_s: Mean driving time to failure under ``hazard`` [s], by robot, of those whose availability doesn't say it.
     """
 
     name: str
     availability: Mapping[str, float]
     joint: tuple[JointState, ...] | None = None
+    mtbf_s: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,6 +28,7 @@ from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.execution.margins import Margins
 from sva_bench.files.records import as_dict
+from sva_bench.mission.failures import Reliability, process_of
 from sva_bench.mission.plan import Plan
 from sva_bench.world.model import Scenario
 
@@ -47,7 +48,9 @@ def executed(incentive: list[list[float]], ends: list[list[End]], planned: list[
         pois_reached=zeros, stops_reached=zeros, end=end, end_time_s=np.zeros(earned.shape),
         fuel_used_s=np.zeros(earned.shape), lost=np.isin(end, [ENDS.index("out_of_fuel"), ENDS.index("stuck")]),
         contacts=zeros, planned_incentive=np.array(planned),
-        drawn_incentive=np.where(end == ENDS.index("failed"), 0.0, np.array(planned)),
+        drawn_value=np.where(end == ENDS.index("failed"), 0.0, np.array(planned)), value=earned,
+        drawn_failed=end == ENDS.index("failed"),
+        terms=process_of("mission").terms([Reliability(availability=p) for p in SCENARIO.availability.values()]),
         margins=tuple(route_of(m, f"{planner}-p{m}", worth, rollouts, near=near) for m, worth in enumerate(planned)),
         legs=(), traces=())
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sva_bench.choices import PolicyName
-from sva_bench.execution.outcome import Assignment, Driven, Outcome
+from sva_bench.execution.outcome import Assignment, Driven, Outcome, RobotFate
 from sva_bench.execution.policies.policy import TeamState
 from sva_bench.execution.policies.registry import POLICIES
 from sva_bench.execution.rules import LegDriven, RobotMission, play, settle
@@ -32,7 +32,7 @@ def orders(robot: str = "uv1", route: tuple[str, ...] = ROUTE, *, fuel: float = 
 
 def begun(*legs: float, fuel: float = 20.0, limit: float = 50.0, fails: int = NEVER) -> RobotMission:
     """A mission after some legs."""
-    mission = RobotMission(orders(fuel=fuel, limit=limit), fails)
+    mission = RobotMission(orders(fuel=fuel, limit=limit), RobotFate(fails))
     for time_s in legs:
         assert mission.depart() is not None
         mission.drive(LegDriven(time_s))
@@ -119,8 +119,9 @@ def test_under_none_a_team_fares_as_its_robots_do_alone(
         one: tuple[str, ...], two: tuple[str, ...], fuel: float, other: float, limit: float, fails: int, fails_too: int
 ) -> None:
     team = [orders("uv1", one, fuel=fuel, limit=limit), orders("uv2", two, fuel=other, limit=limit)]
-    found = play(team, [fails, fails_too], legs_of, POLICIES["none"])
-    assert found == [settle(team[0], driven(0, one), fails), settle(team[1], driven(1, two), fails_too)]
+    found = play(team, [RobotFate(fails), RobotFate(fails_too)], legs_of, POLICIES["none"])
+    assert found == [settle(team[0], driven(0, one), RobotFate(fails)),
+                     settle(team[1], driven(1, two), RobotFate(fails_too))]
 
 
 @pytest.mark.parametrize("name", sorted(POLICIES))
@@ -140,8 +141,8 @@ def test_a_policy_gives_orders_that_end_at_the_base_and_the_same_for_the_same_st
         return given
 
     team = [orders("uv1"), orders("uv2", ("base", "p2", "base"))]
-    first: list[Outcome] = play(team, [fails, fails_too], legs_of, watched)
-    assert play(team, [fails, fails_too], legs_of, watched) == first
+    first: list[Outcome] = play(team, [RobotFate(fails), RobotFate(fails_too)], legs_of, watched)
+    assert play(team, [RobotFate(fails), RobotFate(fails_too)], legs_of, watched) == first
     times = [state.time_s for state in seen[: len(seen) // 2]]
     assert times == sorted(times)
 
@@ -151,7 +152,7 @@ def test_a_policy_may_change_what_is_left_at_an_epoch() -> None:
     def homewards(state: TeamState) -> Mapping[str, tuple[str, ...]]:
         return {"uv1": ("base",)} if state.robots[0].site == "p1" else {}
 
-    (outcome,) = play([orders()], [NEVER], legs_of, homewards)
+    (outcome,) = play([orders()], [RobotFate()], legs_of, homewards)
     assert (outcome.end, outcome.end_time_s, outcome.fuel_used_s, outcome.incentive) == ("home", 20.0, 19.0, 5.0)
 
 
@@ -162,7 +163,8 @@ def test_at_an_epoch_a_policy_sees_who_stands_where_and_on_how_much() -> None:
         seen.append(state)
         return {}
 
-    play([orders("uv1", ("base", "p1", "base")), orders("uv2", ("base", "p2", "base"))], [NEVER, 1], legs_of, watched)
+    team = [orders("uv1", ("base", "p1", "base")), orders("uv2", ("base", "p2", "base"))]
+    play(team, [RobotFate(), RobotFate(1)], legs_of, watched)
     # uv1 leaves at 0 and is at p1 until 11; uv2 fails on leaving, so it has one epoch.
     assert [(s.time_s, s.at_epoch) for s in seen] == [(0.0, 0), (0.0, 1), (11.0, 0)]
     first, second = seen[-1].robots
@@ -172,4 +174,4 @@ def test_at_an_epoch_a_policy_sees_who_stands_where_and_on_how_much() -> None:
 
 def test_orders_that_do_not_lead_home_are_refused() -> None:
     with pytest.raises(ValueError, match="don't end at the base"):
-        play([orders()], [NEVER], legs_of, lambda _: {"uv1": ("p2",)})
+        play([orders()], [RobotFate()], legs_of, lambda _: {"uv1": ("p2",)})

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sva_bench.execution.outcome import Assignment, Driven, Trace, trace_of
+from sva_bench.execution.outcome import Assignment, Driven, RobotFate, Trace, trace_of
 from sva_bench.execution.rules import settle
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import NEVER
@@ -53,4 +53,4 @@ def trace(robot: str, route: tuple[str, ...] = TOUR, *, fails_before: int = NEVE
         stop_s={site.name: site.stop_s for site in WORLD.sites},
         fuel_capacity_s=me.fuel_capacity_s if fuel_s is None else fuel_s, mission_limit_s=limit_s)
     planned = np.array([at[site] for site in route]).reshape(-1, 2)
-    return trace_of(orders, driven, settle(orders, driven, fails_before), BASE, planned)
+    return trace_of(orders, driven, settle(orders, driven, RobotFate(fails_before)), BASE, planned)

@@ -109,6 +109,19 @@ class PlanningTerms:
     rate: FloatArray | None = None
     loss_cost: FloatArray | None = None
 
+    def most(self, vehicle: int) -> float:
+        """Upper bound on the share of an incentive that a visit of a vehicle earns on average."""
+        survival = 1.0 if self.survival is None else float(self.survival[vehicle])
+        return 0.0 if self.rate_of(vehicle) == math.inf else float(self.share[vehicle]) * survival
+
+    def rate_of(self, vehicle: int) -> float:
+        """Failures of a vehicle in a second of driving."""
+        return 0.0 if self.rate is None else float(self.rate[vehicle])
+
+    def certain(self, vehicle: int) -> bool:
+        """Whether no failure makes a difference to a vehicle: it never fails, or is never of use."""
+        return self.most(vehicle) <= 0 or (self.most(vehicle) >= 1 and self.rate_of(vehicle) == 0)
+
 
 class Process(Protocol):
     """A failure process. It has no state; ``sva_bench.mission.failures.PROCESSES`` holds one of each.
