@@ -120,7 +120,8 @@ class History:
         if driven_s <= window.since_s:
             return None
         rate = float(self._terms.rate[robot])
-        by_then = math.expm1(-rate * (driven_s - window.since_s)) / math.expm1(-rate * (window.until_s - window.since_s))
+        by_then = math.expm1(-rate * (driven_s - window.since_s)) \
+            / math.expm1(-rate * (window.until_s - window.since_s))
         return None if self._ask(1 - by_then) else Window(window.since_s, driven_s)
 
     def middle_s(self, robot: int, window: Window) -> float:

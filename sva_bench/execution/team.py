@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from sva_bench.choices import News, Standing
 from sva_bench.execution.chance import Chance, Window
 from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
-from sva_bench.execution.policies.policy import Orders, Policy, RobotState, TeamState
+from sva_bench.execution.policies.policy import Policy, RobotState, TeamState
 from sva_bench.execution.rules import LegDriven, RobotMission
 
 _NEWS, _STOP = 0, 1  # news comes before departures at the same time
@@ -195,7 +195,7 @@ class _Play:
                 (new := self._dead - robot.learned):
             self._react(now, new, [robot])
         to = mission.ahead[0]
-        if mission.is_poi(to) and not self._chance.tries(robot.number, mission.pois + 1):
+        if mission.orders.is_poi(to) and not self._chance.tries(robot.number, mission.pois + 1):
             mission.fate = RobotFate(before_poi=mission.pois + 1)
         robot.leg = leg = _Leg(to=to, departed_s=now, due_s=robot.ready_s + self._schedule(robot, to))
         robot.remaining = mission.ahead[1:]
@@ -216,8 +216,9 @@ class _Play:
     def _drive(self, robot: _Robot, driven: LegDriven) -> None:
         """Drive a leg, and wait for the end of the stop."""
         mission, leg = robot.mission, robot.leg
-        assert mission is not None and leg is not None
-        was_poi = mission.is_poi(leg.to)
+        assert mission is not None
+        assert leg is not None
+        was_poi = mission.orders.is_poi(leg.to)
         mission.drive(driven)
         if mission.end in ("failed", "out_of_fuel", "stuck"):
             self._report_missing(robot, mission.clock_s)
@@ -252,7 +253,8 @@ class _Play:
     def _close(self, robot: _Robot, window: Window) -> None:
         """Settle when a robot failed, by the mean of what is possible."""
         leg = robot.leg
-        assert leg is not None and leg.driven is not None
+        assert leg is not None
+        assert leg.driven is not None
         leg.window = None
         self._fail_at(robot, leg.driven, self._chance.middle_s(robot.number, window))
 
@@ -370,7 +372,9 @@ class _Play:
                 self._set_off(robot, replace(self._team.orders[robot.number], route=(self._team.base, *new)), now)
             return
         robot.remaining = new
-        robot.mission.give(new, robot.leg.to if robot.leg is not None and robot.leg.window is not None else None)
+        # A leg whose failure is open hasn't been driven yet in the robot's own mission.
+        pending = robot.leg is not None and robot.leg.window is not None
+        robot.mission.give((robot.mission.ahead[0], *new) if pending else new)
 
     def outcome(self) -> TeamOutcome:
         """What came of it, once all events are over."""

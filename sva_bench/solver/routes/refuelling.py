@@ -118,6 +118,23 @@ def _quickest(own_legs: VehicleLegs, pois: tuple[int, ...]) -> TimedRoute | None
     return TimedRoute(front[0][0], front[0][2])
 
 
+def quickest_home(own_legs: VehicleLegs, site: int, burnt_s: float, left_s: float) -> TimedRoute | None:
+    """The quickest way to the base from another site; ``None`` if none keeps fuel capacity and time.
+
+    Args:
+        own_legs: The vehicle's legs.
+        site: Where it is.
+        burnt_s: Fuel burnt since it was filled last [s].
+        left_s: Time left [s].
+    """
+    base = own_legs.base
+    ways = [TimedRoute(own_legs.time_s[site][base], (site, base))] \
+        if burnt_s + own_legs.fuel_s[site][base] <= own_legs.capacity_s else []
+    ways += [TimedRoute(hop.time_s, (site, *hop.stations, base)) for hop in _hops(own_legs, site, base)
+             if burnt_s + hop.fuel_s <= own_legs.capacity_s]
+    return min((way for way in ways if way.time_s <= left_s + SLACK_S), default=None)
+
+
 def _hops(own_legs: VehicleLegs, here: int, there: int) -> list[_Hop]:
     """The chains of at least one station from one stop to another, nondominated in time and fuel at both ends."""
     if (here, there) in own_legs.hops:
