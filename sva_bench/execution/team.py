@@ -69,12 +69,14 @@ class TeamOutcome:
         stops: Stops that each robot was sent to one after the other, the base first, up to the one at which it ended or
             which it was on its way to.
         reactions: News that came, in order.
+        left_over: POIs that each robot had still to visit when it ended, or visited too late, and that nobody collected.
         doubled: POIs that two robots visited.
     """
 
     robots: tuple[Outcome, ...]
     stops: tuple[tuple[str, ...], ...]
     reactions: tuple[Reaction, ...]
+    left_over: tuple[tuple[str, ...], ...]
     doubled: int
 
 
@@ -380,7 +382,12 @@ class _Play:
         """What came of it, once all events are over."""
         visits = [poi for robot in self._robots for poi in robot.visited]
         missions = [robot.mission or RobotMission(self._team.orders[robot.number]) for robot in self._robots]
+        robots = tuple(mission.outcome() for mission in missions)
+        collected = {event.site for robot in robots for event in robot.events if event.kind == "collected"}
+        left_over = tuple(tuple(site for site in (*robot.visited, *mission.ahead)
+                                if site in self._team.pois - collected)
+                          for robot, mission in zip(self._robots, missions, strict=True))
         return TeamOutcome(
-            robots=tuple(mission.outcome() for mission in missions), reactions=tuple(self._reactions),
+            robots=robots, reactions=tuple(self._reactions), left_over=left_over,
             stops=tuple(tuple(robot.stops) if robot.mission is not None else () for robot in self._robots),
             doubled=len(visits) - len(set(visits)))
