@@ -106,7 +106,8 @@ def certify(instance: Instance | PathLike, plan: Plan | PathLike) -> Certificate
     Source:
         Constraints (1), (2), (5), (7), (9), (11) and (14a) of the paper, read as rules for a sequence of sites.
     """
-    problem = instance if isinstance(instance, Instance) else read_instance(path_of("instance", instance))
+    problem = instance if isinstance(instance, Instance) else read_instance(
+        path_of("instance", instance, "an instance or the path of its file"))
     return check(problem, plan_given("plan", plan, problem))
 
 
@@ -118,7 +119,7 @@ def plan_given(name: str, value: object, instance: Instance) -> Plan:
         ValueError: If it is neither.
     """
     if not isinstance(value, Plan):
-        return read_plan(path_of(name, value), instance)
+        return read_plan(path_of(name, value, "a plan or the path of its file"), instance)
     vehicles, sites = [vehicle.name for vehicle in instance.vehicles], list(instance.sites)
     for robot, route in value.routes.items():
         if robot not in vehicles:
@@ -132,7 +133,8 @@ def plan_given(name: str, value: object, instance: Instance) -> Plan:
 def _instance_of(source: object, scenario: str | None, progress: OnProgress) -> Instance:
     if scenario is not None:
         is_a("scenario", scenario, str, "a name")
-    path = None if isinstance(source, Instance | World) else path_of("source", source)
+    path = None if isinstance(source, Instance | World) else path_of(
+        "source", source, "an instance, a world, or the path of the file of either")
     if isinstance(source, World) or (path is not None and path.suffix.lower() in YAML_SUFFIXES):
         world, _ = world_given(source, scenario)
         with nullcontext() if path is None else about(path):

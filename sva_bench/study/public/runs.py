@@ -282,5 +282,5 @@ def _named(plans: object) -> dict[str, object]:
 def _label(plans: object, name: str, plan: object) -> Path | str:
     """What messages call a plan: its file, or the argument."""
     if not isinstance(plan, Plan):
-        return path_of(f"plans[{name!r}]", plan)
+        return path_of(f"plans[{name!r}]", plan, "a plan or the path of its file")
     return f"plans[{name!r}]" if isinstance(plans, Mapping) else "plans"
