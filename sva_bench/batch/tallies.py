@@ -10,9 +10,9 @@ import numpy as np
 from sva_bench.analysis.catalogue import measured
 from sva_bench.analysis.figures import difference_figure, value_figure
 from sva_bench.analysis.moments import Clusters, Figure, Moments, joined
+from sva_bench.analysis.over_trials import charges, plan_figures, vss_figures
 from sva_bench.analysis.results import PlanFigures, ScenarioFacts, ScenarioFigures
 from sva_bench.analysis.statistics import estimate
-from sva_bench.analysis.summary import charges, plan_figures, vss_figures
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.batch.schema import StoredFigure, StoredPlan, StoredTally
 from sva_bench.choices import ENDS, Objective

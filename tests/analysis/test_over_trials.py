@@ -13,9 +13,7 @@ from scipy.stats import beta
 
 from sva_bench.analysis.comparison import comparison_summary, ranking
 from sva_bench.analysis.figures import end_figures
-from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, ScenarioSummary, Share
-from sva_bench.analysis.statistics import bounded_mean, estimate
-from sva_bench.analysis.summary import (
+from sva_bench.analysis.over_trials import (
     Judged,
     ScenarioTrials,
     charges,
@@ -24,6 +22,8 @@ from sva_bench.analysis.summary import (
     promise_of,
     scenario_summary,
 )
+from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, ScenarioSummary, Share
+from sva_bench.analysis.statistics import bounded_mean, estimate
 from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.execution.margins import Margins
