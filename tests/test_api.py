@@ -30,6 +30,7 @@ from sva_bench.recording.rerun import end_s
 from sva_bench.study.given_plans import InfeasiblePlan
 from sva_bench.study.public.arguments import by_argument
 from sva_bench.travel.times import UnreachableSite
+from tests.reference import ERRORS
 from tests.worlds_for_tests import SMALL, world_of
 
 FUNCTIONS = ("load_world", "travel_times", "fuel_costs", "make_instance", "plan", "certify", "execute", "run", "record")
@@ -63,7 +64,8 @@ def result(world: sb.World) -> sb.Result[Summary]:
 
 
 def test_every_public_name_is_there_and_is_listed() -> None:
-    assert set(FUNCTIONS) | {"Summary"} <= set(sb.__all__) <= set(dir(sb))
+    assert set(FUNCTIONS) | {"Summary"} <= set(sb.__all__)
+    assert sorted([*sb.__all__, "__version__"]) == dir(sb)  # and no module or helper that happens to be loaded
     for name in sb.__all__:
         assert getattr(sb, name).__module__.startswith("sva_bench.")
     assert re.fullmatch(r"\d+\.\d+.*", sb.__version__)
@@ -106,6 +108,22 @@ def test_a_function_is_typed_takes_options_by_name_alone_and_says_what_it_takes_
     assert "Raises:" in told
     for parameter in parameters:
         assert re.search(rf"\b{parameter}\b", told), parameter
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_error_that_a_function_is_said_to_raise_can_be_caught_by_a_public_name(name: str) -> None:
+    told = (inspect.getdoc(getattr(sb, name)) or "").partition("Raises:")[2].partition("Source:")[0]
+    entries = re.findall(r"^    (\w+(?:, \w+)*): ", told, re.MULTILINE)
+    raised = {error for names in entries for error in names.split(", ")}
+    assert raised
+    for error in raised - {"ValueError", "KeyboardInterrupt"}:
+        assert issubclass(getattr(sb, error), sb.SvaBenchError), error
+        assert error in ERRORS
+
+
+def test_every_public_error_is_in_the_reference() -> None:
+    assert {name for name in sb.__all__ if isinstance(getattr(sb, name), type)
+            and issubclass(getattr(sb, name), Exception)} == set(ERRORS)
 
 
 @pytest.mark.parametrize(("function", "command"), [

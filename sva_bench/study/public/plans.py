@@ -52,7 +52,8 @@ def plan(
         risk: Plan for the worst outcomes: their mean (``cvar``), or the shortfall below a target (``excess``).
         beta: ``cvar``: the mean of the worst 1 - beta share of outcomes, 0.9 by default.
         weight: Share of the risk measure in the objective, 1 by default; the rest is the expected incentive.
-        target: ``excess``: the incentive below which the shortfall counts.
+        target: ``excess``: the incentive below which the shortfall counts; beyond all that can be earned, the plan is
+            the stochastic one.
         scenario: Availabilities of this scenario of a world; by default those under ``robots:``.
         time_limit: Stop after so many seconds and take the best plan; none by default.
         gap: Relative gap at which a plan counts as optimal.
@@ -60,7 +61,9 @@ def plan(
         progress: Called with what is being done, how much of it is done, and how much there is.
 
     Raises:
-        UnreachableSite: If a robot cannot get from the base of a world to a site.
+        UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
+            with the line.
+        NeverArrives: If the figures of a robot don't let it follow a path.
         BadFile, BadInput: If something is wrong with a file, or with a value, or two don't go together.
         ValueError: If an argument is of a wrong type.
         KeyboardInterrupt: On Ctrl-C; the best plan so far is not kept.
