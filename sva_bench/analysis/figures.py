@@ -19,7 +19,8 @@ def value_figure(run: Executed, *, noisy: bool) -> Figure:
     low, high = zip(*(_collected(run, m) for m in range(run.incentive.shape[1])), strict=True)
     most = _mean_exposure(run, run.margins, noisy=noisy)
     return figure_of(run.drawn_incentive.sum(axis=1), (sum(low), sum(high)),
-                     (run.drawn_incentive - run.incentive).sum(axis=1), (0.0, most), run.rollout, noisy=noisy)
+                     (run.drawn_incentive - run.incentive).sum(axis=1), (0.0, most), run.rollout, noisy=noisy,
+                     certain=(0.0, sum(_most_collected(run, m) for m in range(run.incentive.shape[1]))))
 
 
 def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
@@ -32,7 +33,8 @@ def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
         _mean_exposure(run, [r for r in run.margins if r.robot in different], noisy=noisy) for run in (a, b))
     drawn = (a.drawn_incentive - b.drawn_incentive).sum(axis=1)
     return figure_of(drawn, (sum(low), sum(high)), drawn - (a.incentive - b.incentive).sum(axis=1), (-most_b, most_a),
-                     a.rollout, noisy=noisy)
+                     a.rollout, noisy=noisy, certain=(-sum(_most_collected(b, m) for m in different) + 0.0,
+                                                      sum(_most_collected(a, m) for m in different) + 0.0))
 
 
 def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
@@ -57,7 +59,7 @@ def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
         taken = drawn.astype(np.float64) - happened
         drawn_bounds = (0.0, 1.0) if is_uncertain and end not in EXECUTION_LOSSES else observed
         figures[end] = figure_of(drawn.astype(np.float64), drawn_bounds,
-                                 taken, bounds, run.rollout, noisy=noisy)
+                                 taken, bounds, run.rollout, noisy=noisy, certain=(0.0, 1.0))
     return figures
 
 
@@ -85,6 +87,13 @@ def _collected_by_failure(run: Executed, robot: int, length: int) -> FloatArray:
 def _collected(run: Executed, robot: int) -> Bounds:
     """Least and greatest incentive of a robot's routes over all failures."""
     return _collected_beyond(run, None, robot)
+
+
+def _most_collected(run: Executed, robot: int) -> float:
+    """The most that a robot can collect in a trial: all POIs of a route, but none if it is never available."""
+    if _availability(run, robot) <= 0:
+        return 0.0
+    return max((float(route.collected[-1]) for route in run.margins if route.robot == robot), default=0.0)
 
 
 def _collected_beyond(a: Executed, b: Executed | None, robot: int) -> Bounds:
