@@ -361,6 +361,17 @@ def test_routes_may_be_lists_as_in_a_file(instance: sb.Instance) -> None:
     assert sb.certify(instance, plan).feasible
 
 
+@pytest.mark.parametrize("route", [(), ("base",), ("base", "base")])
+def test_a_robot_stays_home_by_the_same_routes_as_in_a_file(
+    instance: sb.Instance, tmp_path: Path, route: tuple[str, ...]
+) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps({"format": "sva-bench/plan@1", "routes": {"uv1": route}}))
+    found = sb.certify(instance, sb.Plan(routes={"uv1": route}))
+    assert found.feasible
+    assert found == sb.certify(instance, path)
+
+
 def test_other_availabilities_are_probabilities_of_vehicles_that_are_there(instance: sb.Instance) -> None:
     changed = instance.with_availability({"uv1": 0.25})
     assert [v.availability for v in changed.vehicles] == [0.25, instance.vehicles[1].availability]

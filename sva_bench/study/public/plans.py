@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import replace
 
 from sva_bench.choices import Cuts, Method, Objective, RiskKind
 from sva_bench.errors import BadInput, nearest
@@ -130,7 +131,9 @@ def plan_given(name: str, value: object, instance: Instance) -> Plan:
         for site in route:
             if site not in sites:
                 raise BadInput(f"{name}: {robot}: there is no site {site!r}; {nearest(site, sites)}")
-    return value
+    base = instance.sites[instance.base]
+    at_home = {robot: () for robot, route in value.routes.items() if route in ((base,), (base, base))}  # as in a file
+    return replace(value, routes={**value.routes, **at_home}) if at_home else value
 
 
 def _instance_of(source: object, scenario: str | None, progress: OnProgress) -> Instance:
