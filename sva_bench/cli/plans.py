@@ -12,7 +12,14 @@ import typer
 from sva_bench.choices import METHODS, Cuts, Method, Objective, PathPlanner, RiskKind
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import AsJson, Gap, MarginOption, PlannerOption, TimeLimit, Verbose, WorldArgument, finite
-from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.terminal import (
+    messages,
+    print_json,
+    progress_bars,
+    refuse_closed_output,
+    results,
+    set_up_logging,
+)
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.files.outputs import check_output, write_result
 from sva_bench.files.printable import counted
@@ -124,6 +131,7 @@ def certify(
         from sva_bench.mission.instance_file import read_instance
         from sva_bench.mission.plan_file import read_plan
 
+    refuse_closed_output()
     problem = read_instance(instance)
     candidate = read_plan(plan, problem)
     if candidate.instance not in (None, problem.name):

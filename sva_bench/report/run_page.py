@@ -21,6 +21,7 @@ from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
     answer,
+    assumed,
     assumption_rows,
     cell,
     finding,
@@ -52,7 +53,7 @@ def write_report(path: Path, content: Content) -> None:
         *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
-             f"planned under {summary.failure.plan}, executed under {summary.failure.execute} failures. "
+             f"{assumed(summary)}. "
              "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
         *_charts(summary),
         *_world(content.world),
