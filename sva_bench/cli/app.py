@@ -12,7 +12,7 @@ from sva_bench.cli.inputs import instance_app, world_app
 from sva_bench.cli.paper import paper_app
 from sva_bench.cli.plans import certify, plan, times
 from sva_bench.cli.run import execute, run
-from sva_bench.cli.usage import PlainCommand
+from sva_bench.cli.usage import OneAtATime, PlainCommand
 from sva_bench.cli.view import report, view
 
 app = typer.Typer(
@@ -23,8 +23,10 @@ app = typer.Typer(
            "usage, 3 an infeasible plan, 4 some trials could not be finished, 5 an expectation not met, 130 interrupted "
            "(143 by SIGTERM, 129 by SIGHUP); what is done is kept.")
 
-for command in (run, times, plan, certify, execute, view, report):
+for command in (run, times, plan, certify, execute):
     app.command(cls=PlainCommand)(command)
+for command in (view, report):
+    app.command(cls=OneAtATime)(command)
 for name, group in (("batch", batch_app), ("world", world_app), ("instance", instance_app), ("reproduce", paper_app)):
     app.add_typer(group, name=name)
 
