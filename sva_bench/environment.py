@@ -1,4 +1,4 @@
-"""What this process and those that it starts take from their surroundings: code from no current folder, one thread each.
+"""What this process and its children take from the environment: no code from the current folder, one thread each.
 
 A ``numba.py`` beside somebody's worlds is not the library: Python looks for modules in the current folder where it is
 started with ``-m`` or ``-c``, as worker processes are, and where PYTHONPATH has an empty entry, as

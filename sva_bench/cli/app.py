@@ -20,13 +20,13 @@ app = typer.Typer(
     help="What is a multi-robot mission plan worth when robots fail? Plans missions, executes them in physics with "
          "randomised failures, and measures the value of the stochastic solution (VSS).",
     epilog="Exit codes: 0 done (a plan at its limit too), 1 a fault of the program or the installation, 2 bad input or "
-           "usage, 3 an infeasible plan, 4 some trials could not be finished, 5 an expectation not met, 130 interrupted "
-           "(143 by SIGTERM, 129 by SIGHUP); what is done is kept.")
+           "usage, 3 an infeasible plan, 4 some trials could not be finished, 5 an expectation not met, 130 "
+           "interrupted (143 by SIGTERM, 129 by SIGHUP); what is done is kept.")
 
 for command in (run, times, plan, certify, execute):
     app.command(cls=PlainCommand)(command)
-for command in (view, report):
-    app.command(cls=OneAtATime)(command)
+app.command(cls=OneAtATime)(view)
+app.command(cls=OneAtATime)(report)
 for name, group in (("batch", batch_app), ("world", world_app), ("instance", instance_app), ("reproduce", paper_app)):
     app.add_typer(group, name=name)
 

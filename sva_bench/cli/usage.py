@@ -44,8 +44,8 @@ class OneAtATime(PlainCommand):
         taken = [parameter for parameter in parameters if parameter.param_type_name == "argument"]
         if beyond and not any(word.startswith("-") for word in beyond):
             what = str(taken[0].metavar)
-            raise BadInput(f"sva-bench {ctx.info_name} takes one {what}, and {len(beyond) + 1} are named; call it once for "
-                           "each")
+            raise BadInput(f"sva-bench {ctx.info_name} takes one {what}, and {len(beyond) + 1} are named; call it once "
+                           "for each")
         return super().parse_args(ctx, args)
 
 

@@ -9,10 +9,10 @@ from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
-from sva_bench.study.asked import AskedPlan
+from sva_bench.study.plan_request import PlanRequest
 
 
-def make_plan(instance: Instance, asked: AskedPlan, limits: SolveLimits) -> Plan:
+def make_plan(instance: Instance, asked: PlanRequest, limits: SolveLimits) -> Plan:
     """The plan that is asked for; on Ctrl-C, where it is heard, the best until then (``interrupted``)."""
     cuts = asked.cuts or "single"
     if asked.risk is not None:

@@ -12,8 +12,8 @@ import sys
 import time
 from multiprocessing.connection import Connection
 
-from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.environment import environment_of_children
+from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.workers.answers import Answer, Caps, Failed
 
 _START_S = 300.0

@@ -140,7 +140,8 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
     for k, site in enumerate(sites):
         for other in sites[:k]:
             if math.hypot(site.x_m - other.x_m, site.y_m - other.y_m) < 0.01:
-                raise document.error(entries[k][3], f"{site.name!r} and {other.name!r} are in one place; move one of them")
+                raise document.error(entries[k][3], f"{site.name!r} and {other.name!r} are in one place; move one of "
+                                     "them")
     return tuple(sites)
 
 

@@ -62,7 +62,8 @@ def test_a_plan_on_its_limit_is_feasible_and_one_just_over_it_is_not() -> None:
 
 
 @pytest.mark.parametrize(("plan", "reason"), [
-    (route("base", "p1", "p2", "base"), "17.000 s of fuel burnt on arrival over 'p2' -> 'base'; the capacity is 12.000 s"),
+    (route("base", "p1", "p2", "base"),
+     "17.000 s of fuel burnt on arrival over 'p2' -> 'base'; the capacity is 12.000 s"),
     (route("base", "r1", "p2", "r1", "p2", "r1", "p1", "base"), "POI 'p2' is visited twice; name it once"),
     (route("base", "p1", "base", b=("base", "p1", "base")), "b: POI 'p1' is visited already, by 'a'"),
     (route("base", "p1", "base", "r1", "base"), "the base is an intermediate stop"),
