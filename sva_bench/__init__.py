@@ -12,7 +12,7 @@ Each name is loaded when it is first used, with what it needs.
 
 import sys
 
-from sva_bench.safe_path import distrust_current_folder
+from sva_bench.environment import distrust_current_folder
 
 if sys.argv[:1] == ["-m"]:  # as a program, before anything else is imported
     distrust_current_folder()

@@ -17,10 +17,10 @@ from sva_bench.mission.instance_file import read_instance
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.mission.plan_file import plan_as_dict, read_plan
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.study.asked import AskedPlan
 from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs
 from sva_bench.study.inputs import about
 from sva_bench.study.one_plan import make_plan
+from sva_bench.study.plan_request import PlanRequest
 from sva_bench.study.public.arguments import (
     PathLike,
     called_from_python,
@@ -72,7 +72,7 @@ def plan(
     Source:
         ``docs/model.md``; the collapsed two-stage model of the paper.
     """
-    asked = AskedPlan(
+    asked = PlanRequest(
         objective=choice("objective", objective, Objective), method=choice("method", method, Method),
         cuts=None if cuts is None else choice("cuts", cuts, Cuts),
         risk=None if risk is None else choice("risk", risk, RiskKind),
