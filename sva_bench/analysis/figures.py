@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,7 +20,8 @@ def value_figure(run: Executed, *, noisy: bool) -> Figure:
     low, high = zip(*(_value(run, m) for m in range(run.value.shape[1])), strict=True)
     taken = _mean_taken(run, run.margins, noisy=noisy)
     return figure_of(run.drawn_value.sum(axis=1), (sum(low), sum(high)),
-                     (run.drawn_value - run.value).sum(axis=1), taken, run.rollout, noisy=noisy)
+                     (run.drawn_value - run.value).sum(axis=1), taken, run.rollout, noisy=noisy,
+                     certain=_certain(run, range(run.value.shape[1])))
 
 
 def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
@@ -33,7 +34,9 @@ def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
         _mean_taken(run, [r for r in run.margins if r.robot in different], noisy=noisy) for run in (a, b))
     drawn = (a.drawn_value - b.drawn_value).sum(axis=1)
     return figure_of(drawn, (sum(low), sum(high)), drawn - (a.value - b.value).sum(axis=1),
-                     (least_a - most_b, most_a - least_b), a.rollout, noisy=noisy)
+                     (least_a - most_b, most_a - least_b), a.rollout, noisy=noisy,
+                     certain=(_certain(a, different)[0] - _certain(b, different)[1],
+                              _certain(a, different)[1] - _certain(b, different)[0]))
 
 
 def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
@@ -57,7 +60,7 @@ def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
         taken = drawn.astype(np.float64) - happened
         drawn_bounds = (0.0, 1.0) if is_uncertain and end not in EXECUTION_LOSSES else observed
         figures[end] = figure_of(drawn.astype(np.float64), drawn_bounds,
-                                 taken, bounds, run.rollout, noisy=noisy)
+                                 taken, bounds, run.rollout, noisy=noisy, certain=(0.0, 1.0))
     return figures
 
 
@@ -93,6 +96,18 @@ def _value_by_failure(run: Executed, robot: int, length: int) -> FloatArray:
 def _value(run: Executed, robot: int) -> Bounds:
     """Least and greatest value of a robot's routes over all failures."""
     return _value_beyond(run, None, robot)
+
+
+def _certain(run: Executed, robots: Iterable[int]) -> Bounds:
+    """What some robots' mean value can't lie beyond: all lost with nothing, or all POIs of a route collected."""
+    low = high = 0.0
+    for robot in robots:
+        routes = [route for route in run.margins if route.robot == robot]
+        if routes and run.terms.loss_cost is not None:
+            low -= float(run.terms.loss_cost[robot])
+        if run.terms.most(robot) > 0:
+            high += max((float(route.collected[-1]) for route in routes), default=0.0)
+    return low, high
 
 
 def _value_beyond(a: Executed, b: Executed | None, robot: int) -> Bounds:
