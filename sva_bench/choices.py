@@ -47,6 +47,8 @@ POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
 News = Literal["never", "station", "report", "instant"]
 """When a team learns of a failure, the worst informed first."""
 NEWS: tuple[News, ...] = get_args(News)
+HistoryMode = Literal["enumerated", "sampled"]
+"""How the failures of a team that reacts are gone through: all histories, or a sample of trials."""
 Standing = Literal["alive", "unheard", "dead", "home"]
 """What a team knows of a robot: ``unheard`` is one that has not reported from any stop yet."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]

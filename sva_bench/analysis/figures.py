@@ -18,7 +18,7 @@ from sva_bench.execution.margins import Margins
 def value_figure(run: Executed, *, noisy: bool) -> Figure:
     """The value of a plan's team in a trial."""
     low, high = zip(*(_value(run, m) for m in range(run.value.shape[1])), strict=True)
-    taken = _mean_taken(run, run.margins, noisy=noisy)
+    taken = mean_taken(run, run.margins, noisy=noisy)
     return figure_of(run.drawn_value.sum(axis=1), (sum(low), sum(high)),
                      (run.drawn_value - run.value).sum(axis=1), taken, run.rollout, noisy=noisy,
                      certain=_certain(run, range(run.value.shape[1])))
@@ -31,7 +31,7 @@ def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
     # A robot with the same route in both plans has the same losses in both.
     different = [m for m in robots if _routes_of(a, m) != _routes_of(b, m)]
     (least_a, most_a), (least_b, most_b) = (
-        _mean_taken(run, [r for r in run.margins if r.robot in different], noisy=noisy) for run in (a, b))
+        mean_taken(run, [r for r in run.margins if r.robot in different], noisy=noisy) for run in (a, b))
     drawn = (a.drawn_value - b.drawn_value).sum(axis=1)
     return figure_of(drawn, (sum(low), sum(high)), drawn - (a.value - b.value).sum(axis=1),
                      (least_a - most_b, most_a - least_b), a.rollout, noisy=noisy,
@@ -64,7 +64,7 @@ def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
     return figures
 
 
-def _mean_taken(run: Executed, margins: Sequence[Margins], *, noisy: bool) -> Bounds:
+def mean_taken(run: Executed, margins: Sequence[Margins], *, noisy: bool) -> Bounds:
     """Bounds on the mean loss, over failures, in a noise draw that was not observed."""
     exposed = exposure_of(margins, run.value.shape[1], noisy=noisy).value
     shifts = [value_shift([r for r in margins if r.robot == m], run.terms.rate_of(m), noisy=noisy)

@@ -107,8 +107,8 @@ def vss_figures(facts: ScenarioFacts, plans: Mapping[str, PlanFigures], differen
     s, d = plans["stochastic"], plans["deterministic"]
     modelled = s.expected - d.expected + 0.0
     return VssFigures(
-        modelled=modelled, modelled_pct=_percent(modelled, s.expected), modelled_range=facts.modelled_range,
-        executed=difference, executed_pct=_percent(difference.mean, s.executed.mean),
+        modelled=modelled, modelled_pct=percent(modelled, s.expected), modelled_range=facts.modelled_range,
+        executed=difference, executed_pct=percent(difference.mean, s.executed.mean),
         distinguishable=difference.excludes_zero, same_plan=facts.same_plan,
         verdict=verdict_of(difference, "stochastic", "deterministic", same=facts.same_plan))
 
@@ -208,7 +208,7 @@ def _share(figure: Figure) -> Share:
     return Share(share=found.mean, ci95=found.ci95)
 
 
-def _percent(part: float, whole: float) -> float | None:
+def percent(part: float, whole: float) -> float | None:
     """A percentage; ``None`` of 0, or beyond ``MOST_AMOUNT``."""
     percentage = 100.0 * part / whole + 0.0 if whole else np.inf
     return percentage if abs(percentage) <= MOST_AMOUNT else None

@@ -52,6 +52,7 @@ class Reacted:
         doubled: POIs that two robots visited, shape (rows,).
         nominal: Value of the team if each leg is driven as planned: of each trial, or of all histories together,
             shape (rows,) or ().
+        bounds: Least and greatest value of the team that can be: all lost, or every POI visited by who earns most there.
         played: The missions themselves, by row.
     """
 
@@ -76,6 +77,7 @@ class Reacted:
     reacted: BoolArray
     doubled: IntArray
     nominal: FloatArray
+    bounds: tuple[float, float]
     played: tuple[TeamOutcome, ...]
 
     @property
@@ -109,7 +111,8 @@ class _Legs:
 
     def scheduled_s(self, robot: int, origin: str, destination: str) -> float:
         """What the plan reckons with, margin included [s]."""
-        return self._scheduled[self._models[robot]][self._number[origin]][self._number[destination]]
+        cost_s: float = self._scheduled[self._models[robot]][self._number[origin]][self._number[destination]]
+        return cost_s
 
     def planned(self, robot: int, stops: Stops) -> LegDriven:
         """The last leg as planned, without margin."""
@@ -299,7 +302,9 @@ def _reacted(
         left_over=np.array([[_worth(own, mission.left_over[number]) for number, own in enumerate(team.orders)]
                             for mission in played]),
         reacted=np.array([any(r.after for r in mission.reactions) for mission in played]),
-        doubled=np.array([mission.doubled for mission in played], dtype=np.int64), nominal=nominal, played=played)
+        doubled=np.array([mission.doubled for mission in played], dtype=np.int64), nominal=nominal, played=played,
+        bounds=(-sum(own.loss_cost for own in team.orders), sum(
+            max(own.incentives.get(poi, 0.0) for own in team.orders) for poi in sorted(team.pois))))
 
 
 def _worth(orders: Assignment, pois: Iterable[str]) -> float:

@@ -69,7 +69,7 @@ class TeamOutcome:
         stops: Stops that each robot was sent to one after the other, the base first, up to the one at which it ended or
             which it was on its way to.
         reactions: News that came, in order.
-        left_over: POIs that each robot had still to visit when it ended, or visited too late, and that nobody collected.
+        left_over: POIs that each robot had yet to visit when it ended, or visited too late, and that nobody collected.
         doubled: POIs that two robots visited.
     """
 

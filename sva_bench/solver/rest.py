@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sva_bench.mission.failures import process_of
-from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.mission.instance import Instance
 from sva_bench.mission.rest import Afield, Rest, instance_of_rest
 from sva_bench.solver.goal import Goal
 from sva_bench.solver.knowledge import SolveLimits, knowledge_of
@@ -56,23 +56,23 @@ def _solved(rest: Rest) -> dict[str, tuple[str, ...] | None]:
     """The best orders of vehicles that all have a safe way home; empty for those that do best to go home."""
     instance = instance_of_rest(rest)
     known = knowledge_of(instance)
-    known.orders[tuple(_visits(instance, v, afield, legs) for v, afield, legs in zip(
-        instance.vehicles, rest.vehicles, known.legs_by_vehicle, strict=True))] = None
+    known.orders[tuple(_visits(instance, afield, legs) for afield, legs in zip(
+        rest.vehicles, known.legs_by_vehicle, strict=True))] = None
     own, _ = in_own_units(instance)
     limits = SolveLimits()
     exact = len(rest.open_pois) <= MOST_POIS
-    solution = solve(own, _goal(own, rest), known, limits.clock(), limits.gap if exact else math.inf)
+    solution = solve(own, _goal(own), known, limits.clock(), limits.gap if exact else math.inf)
     return {v.name: tuple(instance.sites[k] for k in route[1:])
             for v, route in zip(instance.vehicles, solution.routes, strict=True)}
 
 
-def _goal(own: Instance, rest: Rest) -> Goal:
+def _goal(own: Instance) -> Goal:
     terms = process_of(own.failure).terms([vehicle.reliability for vehicle in own.vehicles])
     weights = np.array([vehicle.incentives for vehicle in own.vehicles]) * terms.share[:, None]
     return Goal(weights=weights, survival=terms.survival)
 
 
-def _visits(instance: Instance, vehicle: Vehicle, afield: Afield, legs: VehicleLegs) -> tuple[int, ...]:
+def _visits(instance: Instance, afield: Afield, legs: VehicleLegs) -> tuple[int, ...]:
     """The POIs of its old orders that are still open, if it can visit them: a plan to start from."""
     order = tuple(instance.sites.index(site) for site in afield.orders if site in instance.sites)
     order = tuple(k for k in order if k != instance.base and k not in instance.stations)
