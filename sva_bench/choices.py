@@ -47,6 +47,8 @@ POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
 News = Literal["never", "station", "report", "instant"]
 """When a team learns of a failure, the worst informed first."""
 NEWS: tuple[News, ...] = get_args(News)
+USUAL_NEWS: News = "report"
+"""What a team that reacts hears where nothing else is asked for: a missing report needs no radio beyond a stop's."""
 Standing = Literal["alive", "unheard", "dead", "home"]
 """What a team knows of a robot: ``unheard`` is one that has not reported from any stop yet."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from sva_bench.choices import FailureProcess, SiteKind
+from sva_bench.choices import FailureProcess, News, PolicyName, SiteKind
 from sva_bench.errors import BadInput, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
@@ -93,6 +93,19 @@ class Noise:
         return self.wheel_gain_sd == 0
 
 
+@dataclass(frozen=True, kw_only=True)
+class WorldReaction:
+    """What a team does about failures.
+
+    Attributes:
+        policy: What it does about news of one.
+        news: When it learns of one; ``never`` under the policy ``none``, which has no use for it.
+    """
+
+    policy: PolicyName = "none"
+    news: News = "never"
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MapSource:
     """The origin of a world's occupancy grid.
@@ -125,6 +138,7 @@ class World:
         margin: Planning costs are the kinematic twin's times x (1 + margin).
         noise: Noise of the execution.
         map_source: Origin of the occupancy grid; ``None`` if the obstacles are shapes.
+        reaction: What the team does about failures, unless a run asks for something else.
     """
 
     name: str
@@ -137,6 +151,7 @@ class World:
     margin: float
     noise: Noise
     map_source: MapSource | None = None
+    reaction: WorldReaction = WorldReaction()
 
     def __repr__(self) -> str:
         counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))
