@@ -49,6 +49,8 @@ News = Literal["never", "station", "report", "instant"]
 NEWS: tuple[News, ...] = get_args(News)
 HistoryMode = Literal["enumerated", "sampled"]
 """How the failures of a team that reacts are gone through: all histories, or a sample of trials."""
+USUAL_NEWS: News = "report"
+"""What a team that reacts hears where nothing else is asked for: a missing report needs no radio beyond a stop's."""
 Standing = Literal["alive", "unheard", "dead", "home"]
 """What a team knows of a robot: ``unheard`` is one that has not reported from any stop yet."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]

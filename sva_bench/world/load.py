@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sva_bench.choices import FailureProcess, SiteKind
+from sva_bench.choices import USUAL_NEWS, FailureProcess, SiteKind
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_yaml, validate
 from sva_bench.geometry.buckets import longest_view_heading, sight_checker
@@ -19,7 +20,7 @@ from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, availability_by, marginals, undefined_under, without_joint
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World, nominal_of
+from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World, WorldReaction, nominal_of
 from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
 from sva_bench.world.schema import (
     KIND,
@@ -29,6 +30,7 @@ from sva_bench.world.schema import (
     Joint,
     Map,
     RandomPois,
+    ReactionEntry,
     RobotEntry,
     Shapes,
     SiteEntry,
@@ -80,6 +82,7 @@ def world_of(
         name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=scenarios,
         plan_failure=plan, execute_failure=execute, margin=file.margin,
         noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd), map_source=source,
+        reaction=_reaction(document, file.reaction, stations=any(site.kind == "station" for site in sites)),
     )
 
 
@@ -267,6 +270,18 @@ def _refuse_unknown_failures(document: Document, file: WorldFile, robots: Sequen
                 raise document.error(loc, f"{problem} of the robot")
 
 
+def _reaction(document: Document, entry: ReactionEntry, *, stations: bool) -> WorldReaction:
+    if entry.policy == "none":
+        if entry.news not in (None, "never"):
+            raise document.error(("reaction", "news"), "the policy is 'none', as it is by default, and has no use for "
+                                 "news; leave it out, or choose 'policy: resolve'")
+        return WorldReaction()
+    if entry.news == "station" and not stations:
+        raise document.error(("reaction", "news"), "there is no station to hear it at; place one under sites.stations, "
+                             "or choose 'report' or 'instant'")
+    return WorldReaction(policy=entry.policy, news=entry.news or USUAL_NEWS)
+
+
 def _known(document: Document, loc: tuple[str | int, ...], robot: str, robots: Mapping[str, float]) -> None:
     if robot not in robots:
         raise document.error(loc, f"there is no robot {robot!r}; {nearest(robot, list(robots))}")
@@ -299,6 +314,7 @@ def world_as_dict(world: World) -> dict[str, Any]:
     shapes: list[dict[str, Any]] = [
         {"box": [b[0], b[1]], "size_m": [2 * b[2], 2 * b[3]], "yaw_deg": _degrees(b[4])} for b in o.boxes.tolist()]
     shapes += [{"cylinder": [c[0], c[1]], "radius_m": c[2]} for c in o.cylinders.tolist()]
+    reacts = world.reaction.policy != "none"
     return {
         "format": KIND, "name": world.name,
         "map": map_section(),
@@ -317,5 +333,6 @@ def world_as_dict(world: World) -> dict[str, Any]:
             {"probability": j.probability, "available": sorted(j.available)} for j in s.joint]}
             for s in world.scenarios},
         "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
+        **({"reaction": asdict(world.reaction)} if reacts else {}),  # else absent: names of runs depend on it
         "margin": world.margin, "noise": {"wheel_gain_sd": world.noise.wheel_gain_sd},
     }

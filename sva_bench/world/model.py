@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sva_bench.choices import FailureProcess, SiteKind
+from sva_bench.choices import FailureProcess, News, PolicyName, SiteKind
 from sva_bench.errors import UnknownName, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
@@ -108,6 +108,19 @@ class Noise:
         return self.wheel_gain_sd == 0
 
 
+@dataclass(frozen=True, kw_only=True)
+class WorldReaction:
+    """What a team does about failures.
+
+    Attributes:
+        policy: What it does about news of one.
+        news: When it learns of one; ``never`` under the policy ``none``, which has no use for it.
+    """
+
+    policy: PolicyName = "none"
+    news: News = "never"
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MapSource:
     """The origin of a world's occupancy grid.
@@ -140,6 +153,7 @@ class World:
         margin: Planning costs are the kinematic twin's times x (1 + margin).
         noise: Noise of the execution.
         map_source: Origin of the occupancy grid; ``None`` if the obstacles are shapes.
+        reaction: What the team does about failures, unless a run asks for something else.
     """
 
     name: str
@@ -152,6 +166,7 @@ class World:
     margin: float
     noise: Noise
     map_source: MapSource | None = None
+    reaction: WorldReaction = WorldReaction()
 
     def __repr__(self) -> str:
         counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))
