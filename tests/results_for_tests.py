@@ -12,10 +12,10 @@ from sva_bench.analysis.results import (
     PlanFigures,
     PlanResult,
     ScenarioFigures,
-    ScenarioSummary,
     Vss,
     VssFigures,
 )
+from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.summaries import Failures, Reach, Summary, Travel
 
 Interval = tuple[float, float]

@@ -9,7 +9,8 @@ import numpy as np
 
 from sva_bench.analysis.figures import difference_figure
 from sva_bench.analysis.over_trials import Judged, plan_result, totals, verdict_of
-from sva_bench.analysis.results import ComparedScenario, Comparison, GivenPlanResult, Ranked
+from sva_bench.analysis.results import Comparison, GivenPlanResult, Ranked
+from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed

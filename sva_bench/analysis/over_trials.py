@@ -19,11 +19,11 @@ from sva_bench.analysis.results import (
     PlanResult,
     Promise,
     ScenarioFacts,
-    ScenarioSummary,
     Share,
     Vss,
     VssFigures,
 )
+from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.statistics import controlled, distribution, estimate
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.arrays import FloatArray

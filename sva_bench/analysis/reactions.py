@@ -21,7 +21,6 @@ from sva_bench.analysis.reaction_results import (
 from sva_bench.analysis.results import Distribution, Promise, VssFigures
 from sva_bench.analysis.statistics import estimate, weighted_distribution
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
-from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed
 from sva_bench.execution.react import Reacted
@@ -151,7 +150,7 @@ def _figure(a: Reacted, b: Reacted | None, taken_bounds: Bounds, *, noisy: bool)
     value = a.value.sum(axis=1)
     if a.enumerated:
         draws = int(a.rollout.max()) + 1
-        means: FloatArray = draws * np.bincount(a.rollout, weights=a.weight * value)
+        means = np.asarray(draws * np.bincount(a.rollout, weights=a.weight * value), dtype=np.float64)
         if b is not None:
             means = means - draws * np.bincount(b.rollout, weights=b.weight * b.value.sum(axis=1))
         if not noisy:

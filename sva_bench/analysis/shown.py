@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sva_bench.analysis.results import ComparedScenario, ScenarioPlans, ScenarioSummary
+from sva_bench.analysis.results import ScenarioPlans
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.files.notebook import notebook_table
 from sva_bench.files.printable import counted
 

@@ -9,7 +9,8 @@ from rich.table import Table
 
 from sva_bench.analysis.catalogue import statistics
 from sva_bench.analysis.reach import lost_robots
-from sva_bench.analysis.results import ComparedScenario, GivenPlanResult
+from sva_bench.analysis.results import GivenPlanResult
+from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted

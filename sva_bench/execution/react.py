@@ -52,7 +52,7 @@ class Reacted:
         doubled: POIs that two robots visited, shape (rows,).
         nominal: Value of the team if each leg is driven as planned: of each trial, or of all histories together,
             shape (rows,) or ().
-        bounds: Least and greatest value of the team that can be: all lost, or every POI visited by who earns most there.
+        bounds: Least and greatest value of a team: all robots lost, or every POI visited by the one that earns most.
         played: The missions themselves, by row.
     """
 
@@ -166,12 +166,7 @@ def react(
     drives = Drives() if drives is None else drives
     legs, courses = _Legs(world, costs, settings), Courses(world, costs, settings)
     teams = [_team(world, costs, case, policy, legs) for case, policy in zip(cases, policies, strict=True)]
-    found = [_Enumerated(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
-    plays: Sequence[_Enumerated | _Sampled] = found
-    if not all(each.begin(legs) for each in found):
-        plays = [_Sampled(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
-        for each in plays:
-            each.begin(legs)
+    plays = _plays(world, cases, teams, settings, legs)
     while True:
         rows = [each.rows(legs) for each in plays]
         if not legs.missing:
@@ -181,6 +176,28 @@ def react(
         courses.compose(wanted, drives)
         legs.learn(wanted, drives)
     return [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
+
+
+def modelled_values(
+    world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], policies: Sequence[Policy], settings: Settings,
+) -> list[float]:
+    """Mean value of each case if every leg is driven as planned: over all histories if they are few, or over trials."""
+    legs = _Legs(world, costs, settings)
+    teams = [_team(world, costs, case, policy, legs) for case, policy in zip(cases, policies, strict=True)]
+    return [each.modelled for each in _plays(world, cases, teams, settings, legs)]
+
+
+def _plays(
+    world: World, cases: Sequence[Case], teams: Sequence[Team], settings: Settings, legs: _Legs
+) -> Sequence[_Enumerated | _Sampled]:
+    """Cases played on planned times: all histories of each, or all trials of each."""
+    enumerated = [_Enumerated(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
+    if all(each.begin(legs) for each in enumerated):
+        return enumerated
+    sampled = [_Sampled(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
+    for each in sampled:
+        each.begin(legs)
+    return sampled
 
 
 def _longest(missing: Mapping[RouteKey, bool]) -> dict[RouteKey, bool]:
@@ -225,6 +242,11 @@ class _Enumerated(_Plays):
             self._nominal += history.weight * sum(robot.value for robot in played.robots)
         return True
 
+    @property
+    def modelled(self) -> float:
+        """Expected value on planned times."""
+        return self._nominal
+
     def _histories(self) -> Histories:
         return Histories(self._terms, self._case.scenario.joint, self._robots)
 
@@ -265,6 +287,11 @@ class _Sampled(_Plays):
                 known[fates] = sum(robot.value for robot in played.robots)
             self._nominal[row] = known[fates]
         return True
+
+    @property
+    def modelled(self) -> float:
+        """Mean value on planned times."""
+        return float(self._nominal.mean())
 
     def rows(self, legs: _Legs) -> list[_Row]:
         """All trials, each under its noise draw."""

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from sva_bench.analysis.results import ComparedScenario, Estimate, ScenarioSummary
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
 from sva_bench.report.drawing import Axes, chart
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from sva_bench.analysis.catalogue import Section, statistics
 from sva_bench.analysis.reach import lost_robots
-from sva_bench.analysis.results import ComparedScenario, Estimate, ScenarioSummary, Share
+from sva_bench.analysis.results import Estimate, Share
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted

@@ -12,6 +12,7 @@ from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.react import Reacted
 from sva_bench.files.printable import counted
 from sva_bench.study.assumptions import cross_table
 from sva_bench.study.costs import plan_costs, reach_of
@@ -19,6 +20,7 @@ from sva_bench.study.informed import cases_of, combined_trials
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, plan_scenarios, two_cases
 from sva_bench.study.publish import Run, Stopwatch, publish
+from sva_bench.study.recourse import react_in_scenarios
 from sva_bench.study.summing import head_of, proved, summarise
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -37,6 +39,7 @@ class Measured:
     executed: list[Executed]
     summary: Summary
     clock: Stopwatch
+    reacted: tuple[Reacted, ...] = ()
 
 
 def run(world: World, options: Options, out: Path, executor: Executor | None, progress: OnProgress) -> Run:
@@ -91,7 +94,13 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
             rows = cross_table(world, costs, plans, settings, executor, drives)
         summary = replace(summary, scenarios=tuple(
             replace(scenario, assumptions=tuple(rows[scenario.name])) for scenario in summary.scenarios))
+    with clock.phase("reactions"):
+        reactions = react_in_scenarios(world, costs, planned, executed, options, settings, executor, drives, progress)
+    if reactions:
+        summary = replace(summary, scenarios=tuple(
+            replace(scenario, reactions=reactions[scenario.name].results) for scenario in summary.scenarios))
     return Measured(costs=costs, planned=planned, clock=clock, summary=summary,
+                    reacted=tuple(run for found in reactions.values() for run in found.reacted),
                     executed=[run for run in executed if run.case.role != "worst_tie"])
 
 

@@ -22,7 +22,8 @@ from sva_bench.analysis.over_trials import (
     promise_of,
     scenario_summary,
 )
-from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, ScenarioSummary, Share
+from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, Share
+from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.statistics import bounded_mean, estimate
 from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Case, Executed

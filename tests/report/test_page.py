@@ -18,7 +18,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.analysis.over_maps import BatchSummary, Percentage, UnitSummary
-from sva_bench.analysis.results import Estimate, ScenarioSummary
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.summaries import Summary
 from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput

@@ -1,0 +1,169 @@
+"""Teams that react: plans executed with policies, and plans made for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+from sva_bench.analysis.over_trials import promise_of
+from sva_bench.analysis.reaction_results import Candidate, ReactionResult
+from sva_bench.analysis.reactions import PlanReacted, reaction_result
+from sva_bench.choices import PolicyName
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.policies.policy import Policy
+from sva_bench.execution.policies.registry import POLICIES, Means
+from sva_bench.execution.react import Reacted, modelled_values, react
+from sva_bench.mission.certify import expected_value
+from sva_bench.mission.instance import Instance
+from sva_bench.mission.plan import Plan, unless_interrupted
+from sva_bench.solver.rest import plan_rest
+from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_stochastic
+from sva_bench.study.options import Options, reactions_of
+from sva_bench.study.planning import Planned
+from sva_bench.study.reacting import Reaction
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.workers.progress import OnProgress
+from sva_bench.world.model import Scenario, World
+
+THETAS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Exponents of the survival that candidates are made for: from no failures to those of the process."""
+_ELSEWHERE = 1 << 40
+"""First trial of those by which candidates are judged, so that the chosen one is measured on others."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ScenarioReactions:
+    """What came of one scenario with reactions.
+
+    Attributes:
+        results: A result for each policy and news.
+        reacted: Trials or histories of each plan with each of them.
+    """
+
+    results: tuple[ReactionResult, ...]
+    reacted: tuple[Reacted, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Stage:
+    """A scenario's world, with all that reactions need."""
+
+    world: World
+    costs: Mapping[str, FuelCosts]
+    scenario: Scenario
+    instance: Instance
+    settings: Settings
+    policies: Mapping[PolicyName, Policy]
+
+    def policies_of(self, cases: Iterable[Case]) -> list[Policy]:
+        """The policy of each case; all share what was decided before."""
+        return [self.policies[case.policy] for case in cases]
+
+
+def react_in_scenarios(
+    world: World, costs: Mapping[str, FuelCosts], planned: Mapping[str, Planned], executed: Sequence[Executed],
+    options: Options, settings: Settings, executor: Executor | None, drives: Drives, progress: OnProgress,
+) -> dict[str, ScenarioReactions]:
+    """Execute the plans of each scenario with every reaction asked for.
+
+    Args:
+        world, costs: The world and its fuel costs.
+        planned: The plans of each scenario.
+        executed: Their trials without reaction.
+        options, settings: As of the run.
+        executor: Where drives run; ``None`` = here.
+        drives: What was driven already; what is driven now is added.
+        progress: Called as scenarios are done.
+    """
+    pairs = reactions_of(world, options)
+    found: dict[str, ScenarioReactions] = {}
+    for number, scenario in enumerate(world.scenarios if pairs else ()):
+        progress("reacting", number, len(world.scenarios))
+        instance = replace(planned[scenario.name].instance, failure=world.execute_failure)
+        means = Means(instance=instance, plans_rest=plan_rest)
+        stage = _Stage(world=world, costs=costs, scenario=scenario, instance=instance, settings=settings,
+                       policies={name: POLICIES[name](means) for name in POLICIES})
+        mine = [run for run in executed if run.case.scenario.name == scenario.name
+                and run.case.role in ("stochastic", "deterministic")]
+        found[scenario.name] = _react(stage, pairs, mine, options, executor, drives)
+        progress("reacting", number + 1, len(world.scenarios))
+    return found
+
+
+def _react(stage: _Stage, pairs: Sequence[Reaction], executed: Sequence[Executed], options: Options,
+           executor: Executor | None, drives: Drives) -> ScenarioReactions:
+    """Execute a scenario's plans with each policy and news."""
+    made: dict[Reaction, tuple[Plan, tuple[Candidate, ...]]] = {}
+    if options.anticipate:
+        made = plan_for_reactions(stage, pairs, {run.case.planner: run.case.plan for run in executed}, options.limits)
+    ours = [run.case for run in executed]
+    anticipative = {pair: Case(scenario=stage.scenario, planner="anticipative", plan=plan, role="anticipative")
+                    for pair, (plan, _) in made.items()}
+    # Without reaction too: by that the noise draws that were not observed are judged.
+    also = execute(stage.world, stage.costs, list(anticipative.values()), stage.settings, executor, None, drives)
+    without = {id(case): run for case, run in zip([*ours, *anticipative.values()], [*executed, *also], strict=True)}
+    cases = [(pair, case) for pair in pairs for case in [*ours, *(own for k, own in anticipative.items() if k == pair)]]
+    reacting = [replace(case, policy=policy, news=news) for (policy, news), case in cases]
+    kept = list({id(case): case for _, case in cases}.values())
+    everything = react(stage.world, stage.costs, [*reacting, *kept], stage.policies_of([*reacting, *kept]),
+                       stage.settings, executor, None, drives)
+    idle = {id(case): run for case, run in zip(kept, everything[len(reacting):], strict=True)}
+    results = []
+    for pair in pairs:
+        plans = {case.planner: PlanReacted(
+            promise=promise_of(case.plan, expected_value(stage.instance, case.plan)), reacted=run, kept=idle[id(case)],
+            executed=without[id(case)], trials=stage.settings.trials)
+            for (whose, case), run in zip(cases, everything, strict=False) if whose == pair}
+        results.append(reaction_result(plans, made[pair][1] if pair in made else (),
+                                       noisy=not stage.world.noise.silent))
+    return ScenarioReactions(results=tuple(results), reacted=tuple(everything[:len(reacting)]))
+
+
+def plan_for_reactions(
+    stage: _Stage, pairs: Sequence[Reaction], plans: Mapping[str, Plan], limits: SolveLimits
+) -> dict[Reaction, tuple[Plan, tuple[Candidate, ...]]]:
+    """The anticipative plan for each reaction: of plans that are optimal for more or less reliable robots the best.
+
+    Args:
+        stage: The scenario.
+        pairs: Policy and news of each reaction.
+        plans: Plans that are candidates too.
+        limits: When each solve may stop.
+    """
+    candidates: dict[str, tuple[float | None, Plan]] = {name: (None, plan) for name, plan in plans.items()}
+    known = knowledge_of(stage.instance)
+    for exponent in THETAS:
+        plan = unless_interrupted(plan_stochastic(more_reliable(stage.instance, exponent), limits, known=known))
+        candidates[f"survival^{exponent:g}"] = exponent, plan
+    distinct: dict[str, tuple[float | None, Plan]] = {}
+    for name, (theta, plan) in candidates.items():
+        if not any(plan.drives_like(other) for _, other in distinct.values()):
+            distinct[name] = theta, plan
+    elsewhere = replace(stage.settings, first=_ELSEWHERE, recorded=False)
+    found: dict[Reaction, tuple[Plan, tuple[Candidate, ...]]] = {}
+    for pair in pairs:
+        policy, news = pair
+        cases = [Case(scenario=stage.scenario, planner=name, plan=plan, policy=policy, news=news)
+                 for name, (_, plan) in distinct.items()]
+        values = modelled_values(stage.world, stage.costs, cases, stage.policies_of(cases), elsewhere)
+        tried = tuple(Candidate(plan=name, theta=theta, modelled=value)
+                      for (name, (theta, _)), value in zip(distinct.items(), values, strict=True))
+        best = max(tried, key=lambda candidate: candidate.modelled)  # of equals the first
+        plan = distinct[best.plan][1]
+        worth = expected_value(stage.instance, plan)
+        found[pair] = replace(plan, objective="stochastic", value=worth, bound=None,
+                              details={"made_for": f"{policy} on {news} news", "candidate": best.plan}), tried
+    return found
+
+
+def more_reliable(instance: Instance, theta: float) -> Instance:
+    """The instance with every probability of survival to the power of theta; 0^0 = 1."""
+    vehicles = []
+    for vehicle in instance.vehicles:
+        mtbf_s = vehicle.mtbf_s if vehicle.mtbf_s is None or theta == 1 else (
+            vehicle.mtbf_s / theta if theta > 0 else float("inf"))
+        vehicles.append(replace(vehicle, availability=vehicle.availability**theta, mtbf_s=mtbf_s))
+    return replace(instance, vehicles=tuple(vehicles), joint=None)
