@@ -20,8 +20,9 @@ InstanceFamily = Literal["A", "B", "C"]
 # Planning
 PathPlanner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
 Objective = Literal["stochastic", "deterministic"]
-PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess"]
-"""What a plan was made for; the last two are the stochastic objective with a risk."""
+PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess", "anticipative"]
+"""What a plan was made for; ``cvar`` and ``excess`` are the stochastic objective with a risk, and ``anticipative`` is the
+value with a reaction."""
 RiskKind = Literal["cvar", "excess"]
 Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
 METHODS: Mapping[Method, str] = {

@@ -152,10 +152,8 @@ def plan_for_reactions(
         tried = tuple(Candidate(plan=name, theta=theta, modelled=value)
                       for (name, (theta, _)), value in zip(distinct.items(), values, strict=True))
         best = max(tried, key=lambda candidate: candidate.modelled)  # of equals the first
-        plan = distinct[best.plan][1]
-        worth = expected_value(stage.instance, plan)
-        found[pair] = replace(plan, objective="stochastic", value=worth, bound=None,
-                              details={"made_for": f"{policy} on {news} news", "candidate": best.plan}), tried
+        found[pair] = replace(distinct[best.plan][1], objective="anticipative", value=best.modelled, bound=None,
+                              status="feasible", details={"made_for": f"{policy} on {news} news", "candidate": best.plan}), tried
     return found
 
 
