@@ -21,8 +21,8 @@ InstanceFamily = Literal["A", "B", "C"]
 PathPlanner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
 Objective = Literal["stochastic", "deterministic"]
 PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess", "anticipative"]
-"""What a plan was made for; ``cvar`` and ``excess`` are the stochastic objective with a risk, and ``anticipative`` is the
-value with a reaction."""
+"""What a plan was made for; ``cvar`` and ``excess`` are the stochastic objective with a risk, and ``anticipative`` is
+the value with a reaction."""
 RiskKind = Literal["cvar", "excess"]
 Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
 METHODS: Mapping[Method, str] = {

@@ -152,8 +152,9 @@ def plan_for_reactions(
         tried = tuple(Candidate(plan=name, theta=theta, modelled=value)
                       for (name, (theta, _)), value in zip(distinct.items(), values, strict=True))
         best = max(tried, key=lambda candidate: candidate.modelled)  # of equals the first
-        found[pair] = replace(distinct[best.plan][1], objective="anticipative", value=best.modelled, bound=None,
-                              status="feasible", details={"made_for": f"{policy} on {news} news", "candidate": best.plan}), tried
+        made = replace(distinct[best.plan][1], objective="anticipative", value=best.modelled, bound=None,
+                       status="feasible", details={"made_for": f"{policy} on {news} news", "candidate": best.plan})
+        found[pair] = made, tried
     return found
 
 

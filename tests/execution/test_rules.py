@@ -1,21 +1,11 @@
-"""The rules of one mission, each by hand, and teams whose policy may change their orders."""
+"""The rules of one mission, each by hand."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import pairwise
-from typing import get_args
-
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from sva_bench.choices import PolicyName
-from sva_bench.execution.outcome import Assignment, Driven, Outcome, RobotFate
-from sva_bench.execution.policies.policy import TeamState
-from sva_bench.execution.policies.registry import POLICIES
-from sva_bench.execution.rules import LegDriven, RobotMission, play, settle
+from sva_bench.execution.outcome import Assignment, RobotFate
+from sva_bench.execution.rules import LegDriven, RobotMission
 from sva_bench.mission.failures import NEVER
 
 ROUTE = ("base", "p1", "r1", "p2", "base")
@@ -92,86 +82,3 @@ def test_it_comes_home_late_or_in_time_and_is_not_lost() -> None:
 def test_a_mission_that_goes_on_has_no_outcome() -> None:
     with pytest.raises(ValueError, match="not over"):
         begun(10.0).outcome()
-
-
-# Teams and policies
-
-
-def legs_of(number: int, origin: str, destination: str) -> LegDriven:
-    return LegDriven(TIMES[origin, destination] + number)
-
-
-def driven(number: int, route: tuple[str, ...]) -> Driven:
-    times = [TIMES[leg] + number for leg in pairwise(route)]
-    return Driven(leg_s=np.array(times), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
-
-
-def test_every_policy_is_registered() -> None:
-    assert set(POLICIES) == set(get_args(PolicyName))
-
-
-fuels, fates = st.floats(0, 40), st.sampled_from([0, 1, 2, NEVER])
-routes = st.sampled_from([ROUTE, ("base", "p1", "base"), ("base", "p1", "p2", "base"), ()])
-
-
-@given(routes, routes, fuels, fuels, st.floats(0, 60), fates, fates)
-def test_under_none_a_team_fares_as_its_robots_do_alone(
-        one: tuple[str, ...], two: tuple[str, ...], fuel: float, other: float, limit: float, fails: int, fails_too: int
-) -> None:
-    team = [orders("uv1", one, fuel=fuel, limit=limit), orders("uv2", two, fuel=other, limit=limit)]
-    found = play(team, [RobotFate(fails), RobotFate(fails_too)], legs_of, POLICIES["none"])
-    assert found == [settle(team[0], driven(0, one), RobotFate(fails)),
-                     settle(team[1], driven(1, two), RobotFate(fails_too))]
-
-
-@pytest.mark.parametrize("name", sorted(POLICIES))
-@given(fails=fates, fails_too=fates)
-def test_a_policy_gives_orders_that_end_at_the_base_and_the_same_for_the_same_state(
-        name: PolicyName, fails: int, fails_too: int) -> None:
-    seen: list[TeamState] = []
-
-    def watched(state: TeamState) -> Mapping[str, tuple[str, ...]]:
-        seen.append(state)
-        given = POLICIES[name](state)
-        assert given == POLICIES[name](state)
-        assert set(given) <= {robot.robot for robot in state.robots}
-        for robot in state.robots:
-            if robot.end is None and robot.robot in given:
-                assert given[robot.robot][-1] == "base"
-        return given
-
-    team = [orders("uv1"), orders("uv2", ("base", "p2", "base"))]
-    first: list[Outcome] = play(team, [RobotFate(fails), RobotFate(fails_too)], legs_of, watched)
-    assert play(team, [RobotFate(fails), RobotFate(fails_too)], legs_of, watched) == first
-    times = [state.time_s for state in seen[: len(seen) // 2]]
-    assert times == sorted(times)
-
-
-def test_a_policy_may_change_what_is_left_at_an_epoch() -> None:
-    # At p1, its stop over at 11 s, uv1 is sent home: 9 s more. It burns 19 s of its 20.
-    def homewards(state: TeamState) -> Mapping[str, tuple[str, ...]]:
-        return {"uv1": ("base",)} if state.robots[0].site == "p1" else {}
-
-    (outcome,) = play([orders()], [RobotFate()], legs_of, homewards)
-    assert (outcome.end, outcome.end_time_s, outcome.fuel_used_s, outcome.incentive) == ("home", 20.0, 19.0, 5.0)
-
-
-def test_at_an_epoch_a_policy_sees_who_stands_where_and_on_how_much() -> None:
-    seen: list[TeamState] = []
-
-    def watched(state: TeamState) -> Mapping[str, tuple[str, ...]]:
-        seen.append(state)
-        return {}
-
-    team = [orders("uv1", ("base", "p1", "base")), orders("uv2", ("base", "p2", "base"))]
-    play(team, [RobotFate(), RobotFate(1)], legs_of, watched)
-    # uv1 leaves at 0 and is at p1 until 11; uv2 fails on leaving, so it has one epoch.
-    assert [(s.time_s, s.at_epoch) for s in seen] == [(0.0, 0), (0.0, 1), (11.0, 0)]
-    first, second = seen[-1].robots
-    assert (first.site, first.ready_s, first.burnt_s, first.remaining, first.end) == ("p1", 11.0, 10.0, ("base",), None)
-    assert second.end == "failed"
-
-
-def test_orders_that_do_not_lead_home_are_refused() -> None:
-    with pytest.raises(ValueError, match="don't end at the base"):
-        play([orders()], [RobotFate()], legs_of, lambda _: {"uv1": ("p2",)})
