@@ -78,7 +78,7 @@ class History:
 
     Args:
         terms: Probabilities to leave, to survive until the next POI, and failures in a second of driving.
-        joint: Joint distribution of availabilities; ``None`` = independent.
+        joint: Joint distribution of availabilities, which decides about whole missions alone; ``None`` = independent.
         answers: The first answers.
 
     Attributes:
@@ -88,7 +88,8 @@ class History:
 
     def __init__(self, terms: PlanningTerms, joint: Sequence[JointState] | None, robots: Sequence[str],
                  answers: Sequence[bool] = ()) -> None:
-        self._terms, self._joint, self._robots, self._given = terms, joint, robots, answers
+        self._terms, self._robots, self._given = terms, robots, answers
+        self._joint = joint if terms.survival is None and terms.rate is None else None  # else robots fail on their own
         self._known: dict[int, bool] = {}
         self.answers: list[bool] = []
         self.weight = 1.0
