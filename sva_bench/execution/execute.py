@@ -13,7 +13,7 @@ from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.execution.case import Case as Case
 from sva_bench.execution.case import Settings as Settings
 from sva_bench.execution.drives import Chunk, Courses, Drives, RouteKey, drive_all, receive
-from sva_bench.execution.fate import Fate, draw_fate, reliability_of
+from sva_bench.execution.fate import Fate, draw_fate
 from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, trace_of
 from sva_bench.execution.rules import settle
@@ -152,7 +152,7 @@ def drives_ahead(
     for case in cases:
         for robot in world.robots:
             route = case.plan.route(robot.name)
-            can_leave = route and process_of(world.execute_failure).can_leave(reliability_of(robot, case.scenario))
+            can_leave = route and process_of(world.execute_failure).can_leave(case.scenario.reliability(robot))
             for rollout in range(min(settings.rollouts, settings.trials) if can_leave else 0):
                 wanted[robot.name, route, rollout, 0] = False
     courses = Courses(world, costs, settings)
@@ -273,7 +273,7 @@ def _settle_all(
         planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
         drawn_value=np.column_stack([value for value, _ in drawn]),
         drawn_failed=np.column_stack([fails for _, fails in drawn]),
-        terms=process_of(world.execute_failure).terms([reliability_of(r, case.scenario) for r in world.robots]),
+        terms=process_of(world.execute_failure).terms([case.scenario.reliability(r) for r in world.robots]),
         margins=margins_of_team(orders, drives),
         available=figures["available"].astype(np.bool_), lost=figures["lost"].astype(np.bool_),
         incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],

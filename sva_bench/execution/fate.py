@@ -11,8 +11,8 @@ from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.execution.case import Settings
 from sva_bench.execution.noise import Disturbance, draw_disturbance
 from sva_bench.execution.outcome import RobotFate
-from sva_bench.mission.failures import NEVER, FailureDraw, Failures, Reliability, process_of
-from sva_bench.world.model import Robot, Scenario, World
+from sva_bench.mission.failures import NEVER, FailureDraw, Failures, process_of
+from sva_bench.world.model import Scenario, World
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,12 +64,6 @@ def _failures(world: World, scenario: Scenario, pois: IntArray, settings: Settin
     drawn = process_of(world.execute_failure).draw(FailureDraw(
         seed=settings.seed, vehicles=tuple(robot.name for robot in world.robots), trials=settings.trials,
         first=settings.first, pois=int(pois.max(initial=0)), joint=scenario.joint,
-        reliability=tuple(reliability_of(robot, scenario) for robot in world.robots)))
+        reliability=tuple(scenario.reliability(robot) for robot in world.robots)))
     # Draws for a longer route of another robot mean nothing to this one.
     return replace(drawn, before_poi=np.where(drawn.before_poi > pois, NEVER, drawn.before_poi))
-
-
-def reliability_of(robot: Robot, scenario: Scenario) -> Reliability:
-    """What a failure process has to know of a robot under a scenario."""
-    return Reliability(availability=scenario.availability[robot.name], mission_limit_s=robot.mission_limit_s,
-                       mtbf_s=scenario.mtbf_s.get(robot.name), loss_cost=robot.loss_cost)

@@ -99,6 +99,7 @@ class Instance:
         raise BadInput(f"{self.name} has no vehicle {name!r}; {nearest(name, [v.name for v in self.vehicles])}")
 
     def with_availability(self, availability: dict[str, float]) -> Instance:
-        """The same instance with other, independent availabilities."""
-        vehicles = tuple(replace(v, availability=availability.get(v.name, v.availability)) for v in self.vehicles)
+        """The same instance with other, independent availabilities, which replace ``mtbf_s`` too."""
+        vehicles = tuple(replace(v, availability=availability[v.name], mtbf_s=None) if v.name in availability else v
+                         for v in self.vehicles)
         return replace(self, vehicles=vehicles, joint=None)

@@ -17,11 +17,11 @@ from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import Executed, execute
 from sva_bench.files.printable import counted
 from sva_bench.report.wording import verdict, with_interval
-from sva_bench.study.costs import NOMINAL, plan_costs
+from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios, two_cases
 from sva_bench.workers.progress import OnProgress
-from sva_bench.world.model import World
+from sva_bench.world.model import NOMINAL, World
 
 
 @dataclass(frozen=True, kw_only=True)

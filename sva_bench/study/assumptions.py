@@ -49,7 +49,8 @@ def cross_table(
     The loss of a plan is what the plan for the failures executed collects beyond it, trial by trial.
     """
     rows: dict[str, list[AssumptionRow]] = {scenario.name: [] for scenario in world.scenarios}
-    for process in PROCESSES:
+    known = plans[world.scenarios[0].name].stochastic
+    for process in (name for name in PROCESSES if name in known):
         cases = [made.case(scenario) for scenario in world.scenarios for made in _all_of(plans[scenario.name])]
         executed = iter(execute(replace(world, execute_failure=process), costs, cases, settings, executor, None,
                                 drives))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sva_bench.choices import FailureProcess, SiteKind
 from sva_bench.errors import BadInput, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.mission.failures import JointState
+from sva_bench.mission.failures import JointState, Reliability
 from sva_bench.robot.model import RobotModel
 from sva_bench.world.maps.files import MapFile
 
@@ -75,6 +75,21 @@ class Scenario:
     availability: Mapping[str, float]
     joint: tuple[JointState, ...] | None = None
     mtbf_s: Mapping[str, float] = field(default_factory=dict)
+
+    def reliability(self, robot: Robot) -> Reliability:
+        """What a failure process has to know of a robot."""
+        return Reliability(availability=self.availability[robot.name], mission_limit_s=robot.mission_limit_s,
+                           mtbf_s=self.mtbf_s.get(robot.name), loss_cost=robot.loss_cost)
+
+
+NOMINAL = "nominal"
+"""The scenario of the availabilities under ``robots:``."""
+
+
+def nominal_of(robots: Sequence[Robot]) -> Scenario:
+    """The scenario of the robots' own availabilities and lifetimes."""
+    return Scenario(name=NOMINAL, availability={robot.name: robot.availability for robot in robots},
+                    mtbf_s={robot.name: robot.mtbf_s for robot in robots if robot.mtbf_s is not None})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
 from sva_bench.choices import FailureProcess
-from sva_bench.files.fields import Bounded, Name, NonNegativeInt, Number, Positive, Probability, Section
+from sva_bench.files.fields import Bounded, MeanTime, Name, NonNegativeInt, Number, Positive, Probability, Section
 from sva_bench.seeds import MOST_SEED
 from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
@@ -172,7 +172,9 @@ class RobotEntry(Section):
     model: Name | Figures
     fuel_capacity_s: Bounded | None = None
     mission_limit_s: Bounded | None = None
-    availability: Probability = 1.0
+    availability: Probability | None = None
+    mtbf_s: MeanTime | None = None
+    loss_cost: Bounded = 0.0
     incentives: dict[Name, Bounded] | Drawn
 
 

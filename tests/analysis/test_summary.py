@@ -181,7 +181,7 @@ def test_equal_plans_are_not_distinguishable_and_per_cent_of_nothing_is_none() -
 def test_the_executed_range_goes_to_the_least_fortunate_of_the_tied_plans() -> None:
     other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], ENDED, [90, 60], promised=150.0, planner="deterministic",
                      near=False)
-    worst = replace(other, incentive=other.incentive - [5.0, 0.0])
+    worst = replace(other, value=other.value - [5.0, 0.0])
     summary = summary_of(Judged(expected=130.0, executed=CLEAR), Judged(expected=120.0, executed=other), worst=worst,
                          modelled_range=(10.0, 15.0), ws=140.0, evpi=10.0)
     assert summary.vss.executed_range == pytest.approx((10.0, 15.0))
@@ -201,9 +201,9 @@ def test_ends_are_counted_by_robot_with_their_intervals() -> None:
 
 def test_an_end_that_cannot_happen_has_no_interval_to_speak_of() -> None:
     # uv1 is always available: it can't fail by draw, whatever noise does. uv2 never is: it can't run dry.
-    certain = Scenario(name="S4", availability={"uv1": 1.0, "uv2": 0.0})
+    certain = process_of("mission").terms([Reliability(availability=1.0), Reliability(availability=0.0)])
     run = executed([[100, 0]] * 8, [["home", "failed"]] * 8, [100.0, 60.0], promised=100.0, rollouts=8)
-    figures = [end_figures(replace(run, case=replace(run.case, scenario=certain)), m, noisy=True) for m in (0, 1)]
+    figures = [end_figures(replace(run, terms=certain), m, noisy=True) for m in (0, 1)]
     assert estimate(figures[0]["failed"]).ci95 == (0.0, 0.0)
     assert estimate(figures[1]["failed"]).ci95 == (1.0, 1.0)
     assert estimate(figures[1]["out_of_fuel"]).ci95 == (0.0, 0.0)

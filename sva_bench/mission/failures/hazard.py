@@ -77,8 +77,17 @@ def mtbf_s(reliability: Reliability) -> float:
     if reliability.availability in (0.0, 1.0):
         return math.inf if reliability.availability else 0.0
     if math.isinf(reliability.mission_limit_s):
-        raise ValueError("without a mission limit, an availability says nothing of driving times")
+        raise ValueError(f"an availability of {reliability.availability:g} is the probability to survive driving for "
+                         "the whole mission limit, and there is none; set mission_limit_s or mtbf_s")
     return -reliability.mission_limit_s / math.log(reliability.availability)
+
+
+def availability_by(mtbf: float | None, mission_limit_s: float) -> float:
+    """Availability of a robot for which none is given: the probability to survive driving for its mission limit.
+
+    1 without a limit, or if nothing is known of failures.
+    """
+    return 1.0 if mtbf is None or math.isinf(mission_limit_s) else survival(mission_limit_s, mtbf)
 
 
 def survival(driven_s: float, mtbf: float) -> float:
