@@ -102,7 +102,7 @@ def test_a_world_file_gives_its_world(tmp_path: Path) -> None:
     ("bounds_m: [0, 0, 6, 6]", "bounds_m: [0, 0, 6, 0]", "map.shapes.bounds_m", "min below max"),
     ("bounds_m: [0, 0, 6, 6]", "bounds_m: [0, 0, 6, 1.0e9]", "map.shapes.bounds_m", "at most 2000 m"),
     ("wheel_gain_sd: 0.01", "wheel_gain_sd: 0.5", "noise.wheel_gain_sd", "expected at most 0.2"),
-    ("name: small\n", "name: small\nfailure: sometimes\n", "failure", "'mission' or 'per_leg'"),
+    ("name: small\n", "name: small\nfailure: sometimes\n", "failure", "'mission', 'per_leg' or 'hazard'"),
     ("name: small\n", "name: small\ninteraction: shared\n", None, "this version knows only"),
     ("name: small\n", "name: small\nmargin: -0.1\n", "margin", "expected at least 0"),
 ])
@@ -121,7 +121,7 @@ def test_each_complaint_names_line_and_key(tmp_path: Path, old: str, new: str, k
     ("size_m: [1.2, 0.5]", "size_m: [1.2, 0]", "map.shapes.obstacles[1].size_m[1]", "expected at least 1e-06"),
     ("[[3.0, 0.0], [3.0, 2.6]]", "[[3.0, 0.0], [3.0, 0.0]]", "map.shapes.obstacles[0].wall", "the same point"),
     ("name: small\n", "name: small\nfailure: {plan: mission, execute: never}\n", "failure.execute",
-     "'mission' or 'per_leg'"),
+     "'mission', 'per_leg' or 'hazard'"),
     ("model: turtlebot2\n    fuel_capacity_s: 60\n    mission_limit_s: 120\n    avail",
      "model: {radius_m: 0.2}\n    fuel_capacity_s: 60\n    mission_limit_s: 120\n    avail",
      "robots.uv2.model.wheel_radius_m", "is missing; add it"),
