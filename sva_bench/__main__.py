@@ -5,9 +5,10 @@ What takes time to import is imported in functions here, once there is somebody 
 
 from __future__ import annotations
 
-from sva_bench.safe_path import distrust_current_folder
+from sva_bench.environment import distrust_current_folder, limit_threads
 
 distrust_current_folder()  # before all else, for what else is imported
+limit_threads()
 
 import errno  # noqa: E402
 import os  # noqa: E402
@@ -16,10 +17,6 @@ import sys  # noqa: E402
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-# One thread a process: the workers are the parallelism, and sums keep one order. Before numpy is imported.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
 
 _INTERRUPTED = 130
 _ends: list[int] = []

@@ -32,6 +32,16 @@ class BadInput(SvaBenchError):
         super().__init__(message)
 
 
+class UnknownName(BadInput, KeyError):
+    """A name that is not there, with the nearest that is; a ``KeyError`` too, as of any mapping."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+
+    def __str__(self) -> str:
+        return str(self.args[0])  # a KeyError shows the repr of its key
+
+
 class Interrupted(SvaBenchError):
     """Ctrl-C, once a command has kept what it had: says what that is."""
 

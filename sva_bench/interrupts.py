@@ -1,24 +1,24 @@
-"""Ctrl-C, held back where it would break something or lose work, and heard where the work so far is kept.
+"""Ctrl-C, deferred where it would break something or lose work, and raised where the work so far is kept.
 
-Python raises ``KeyboardInterrupt`` wherever it stands, in a callback of compiled code too, which turns it into another
-error or swallows it. So whoever keeps work says where it may come:
+Python raises ``KeyboardInterrupt`` at whatever line is executing, in a callback of compiled code too, which turns it
+into another error or swallows it. So code that keeps partial results marks where it may be raised:
 
 - ``deferring_ctrl_c``: nothing is raised in the block. Around calls of compiled code, and around work that is worth
   keeping, from its beginning until it is written.
-- ``hearing_ctrl_c``, inside such a block: here it is raised, at once if it was pressed before. Whoever opens this block
-  catches it and keeps what there is.
-- ``holding_back_ctrl_c``: the signal itself is held back. For imports, and for starting workers, which inherit that.
+- ``hearing_ctrl_c``, inside such a block: here it is raised, at once if it was pressed before. The code that opens this
+  block catches it and keeps the partial result.
+- ``holding_back_ctrl_c``: the signal itself is blocked. For imports, and for starting workers, which inherit the mask.
 
-Once pressed it stays so until the outermost block ends: whatever is begun in the meantime and would hear it ends at
-once. The outermost block raises it at its end unless somebody heard it. Outside of all blocks nothing is changed;
+Once pressed, Ctrl-C stays pending until the outermost block ends: a ``hearing_ctrl_c`` block entered in the meantime
+ends at once. The outermost block raises it at its end unless it was handled. Outside of all blocks nothing is changed;
 blocks do nothing outside of the main thread, where Python raises no ``KeyboardInterrupt``, or where Ctrl-C is ignored.
 
-Libraries may swallow what is raised in a callback, or answer it with an error of their own. So it is raised again soon,
-until somebody has heard it; never while it is on its way, where that would cut short what is cleared away. The command
-line runs each command in such a block (``as_ctrl_c``).
+Libraries may swallow what is raised in a callback, or replace it by an error of their own. So it is raised again at
+short intervals until it is handled; never while a ``KeyboardInterrupt`` is propagating, where that would interrupt the
+cleanup. The command line runs each command in such a block (``as_ctrl_c``).
 
-Compiled code that takes long looks at ``flag`` (``solver/polling.py``) and ends early, with a result of no use: the end
-of the block around it raises before anybody uses it.
+Compiled code that takes long polls ``flag`` (``solver/polling.py``) and returns early with an invalid result: the end
+of the block around it raises before the result is used.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _flag = bytearray(1)  # shared with compiled code, so it stays one and the same 
 _blocks: list[bool] = []  # whether Ctrl-C is heard; the innermost last
 _before: Callable[[int, FrameType | None], Any] | None = None
 _reminding = _thread.allocate_lock()
-_reminds = _reminded = False  # whether a thread presses it again, and whether it has since the handler ran
+_reminds = _reminded = False  # whether a thread sends the signal again, and whether it has since the handler ran
 
 
 def flag() -> bytearray:
@@ -53,26 +53,26 @@ def pressed() -> bool:
 
 
 def hear_ctrl_c() -> None:
-    """Raise what was pressed and not heard yet, if it is heard here: for loops, in case a callback swallowed it."""
+    """Raise a pending Ctrl-C where it may be raised: for loops, in case a callback swallowed it."""
     if pressed() and _flag[0] == _PRESSED and _blocks[-1] and not _on_its_way():
         raise KeyboardInterrupt
 
 
 def heard_ctrl_c() -> None:
-    """Say that somebody acts upon it: no need to raise it in the end."""
+    """Mark it as handled: it is not raised at the end of the outermost block."""
     if pressed():
         _flag[0] = _HEARD
 
 
 @contextmanager
 def as_ctrl_c(*meant: type[Exception]) -> Iterator[None]:
-    """A block that hears Ctrl-C, whatever a library makes of it that is at work just then.
+    """A block that raises Ctrl-C as ``KeyboardInterrupt``, whatever error a library replaces it by.
 
     Args:
-        meant: Errors that are ours, and stay what they are.
+        meant: Our own errors, which are passed on unchanged.
 
     Raises:
-        KeyboardInterrupt: If Ctrl-C was pressed and nobody has acted upon it, at the latest at the end.
+        KeyboardInterrupt: If Ctrl-C was pressed and not handled, at the latest at the end of the block.
     """
     with deferring_ctrl_c(), hearing_ctrl_c():
         try:
@@ -86,7 +86,7 @@ def as_ctrl_c(*meant: type[Exception]) -> Iterator[None]:
 
 
 class _Block:
-    """A block in which Ctrl-C is heard, or isn't."""
+    """A block in which Ctrl-C is raised, or deferred."""
 
     _hears = False
     _masks = False
@@ -113,7 +113,7 @@ class _Block:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
     ) -> None:
         if self._active:
-            _blocks[self._depth:] = [False]  # and with it blocks whose end was cut short
+            _blocks[self._depth:] = [False]  # removes inner blocks too whose exit was interrupted
         if self._masks:
             signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)
         if not self._active:
@@ -125,7 +125,7 @@ class _Block:
             if kind is None:
                 hear_ctrl_c()
             return
-        with _reminding:  # from here on nobody presses it again
+        with _reminding:  # from here on the thread sends no further signal
             due = _flag[0] == _PRESSED
             _flag[0] = _NOT
         _blocks.pop()
@@ -136,17 +136,17 @@ class _Block:
 
 
 class deferring_ctrl_c(_Block):
-    """Ctrl-C waits until the end of the block. Numba's compiler, which takes long, doesn't let it wait."""
+    """Ctrl-C is deferred to the end of the block, except while Numba compiles, which takes long."""
 
 
 class hearing_ctrl_c(_Block):
-    """Ctrl-C is raised in the block, though it waits around it; at once if it was pressed before."""
+    """Ctrl-C is raised in this block, inside one that defers it; at once if it was pressed before."""
 
     _hears = True
 
 
 class holding_back_ctrl_c(_Block):
-    """Ctrl-C waits until the end of the block, the signal itself too; nothing of it is lost.
+    """Ctrl-C is deferred to the end of the block by masking the signal, which stays pending.
 
     For starting workers, which inherit the mask for good, and for imports: native libraries abort the process when
     an exception comes up in the middle of their initialisation.
@@ -159,7 +159,7 @@ def _on_ctrl_c(signum: int, frame: FrameType | None) -> None:
     global _reminded
     again, _reminded = _reminded, False
     if again and _flag[0] != _PRESSED:
-        return  # somebody has heard meanwhile
+        return  # it was handled meanwhile
     if not _blocks:  # between two
         if _before is not None:
             _before(signum, frame)
@@ -169,12 +169,12 @@ def _on_ctrl_c(signum: int, frame: FrameType | None) -> None:
     if not (_blocks[-1] or (len(_blocks) > 1 and _blocks[-2] and _compiling(frame))):
         return
     _remind()
-    if not (_swallowed(frame) or _on_its_way()):  # else once more soon
+    if not (_swallowed(frame) or _on_its_way()):  # else the thread sends it again soon
         raise KeyboardInterrupt
 
 
 def _swallowed(frame: FrameType | None) -> bool:
-    """Whether what is raised here goes no further: in a callback of llvmlite, or where an object is being deleted."""
+    """Whether an exception raised here would be swallowed: in a callback of llvmlite, or in ``__del__``."""
     if frame is not None and "llvmlite" in frame.f_code.co_filename:
         return True
     while frame is not None:
@@ -185,7 +185,7 @@ def _swallowed(frame: FrameType | None) -> bool:
 
 
 def _on_its_way() -> bool:
-    """Whether a ``KeyboardInterrupt`` is being handled by some caller: clearing away should not be cut short by it."""
+    """Whether a caller is handling a ``KeyboardInterrupt``: another one would interrupt its cleanup."""
     error = sys.exception()
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
@@ -195,7 +195,7 @@ def _on_its_way() -> bool:
 
 
 def _remind() -> None:
-    """Have Ctrl-C pressed again, and again, until it is heard."""
+    """Send the signal again at intervals until it is handled."""
     global _reminds
     with _reminding:
         begun, _reminds = _reminds, True

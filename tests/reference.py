@@ -10,16 +10,21 @@ import sva_bench as sb
 
 ROOT = Path(__file__).parents[1]
 FUNCTIONS = ("load_world", "travel_times", "fuel_costs", "make_instance", "plan", "certify", "execute", "run", "record")
-TYPES = ("World", "TravelTimes", "FuelCosts", "Instance", "Plan", "Certificate", "Result", "Summary")
+TYPES = ("World", "TravelTimes", "FuelCosts", "Instance", "Plan", "Certificate", "Result", "Summary",
+         "ComparisonSummary")
+ERRORS = ("SvaBenchError", "BadInput", "BadFile", "UnknownName", "UnreachableSite", "NeverArrives", "InfeasiblePlan",
+          "WorkerLost")
 
 HEAD = """\
 # From Python
 
 `import sva_bench as sb` gives the stages of the commands as functions: the same names for the same options, the same
 defaults, and the same figures to the bit. Paths are words or `Path`; worlds, instances and plans may be given as the
-paths of their files. Nothing is written unless a place is named, and nothing is printed: `progress=print` says how far
-it is. What is wrong with an input is an `sb.SvaBenchError` that says what to change, an argument of a wrong type is a
-`ValueError`, Ctrl-C is `KeyboardInterrupt`. Workers need no guard of a script's main module.
+paths of their files. Nothing is written unless a place is named, and no function prints: `progress=print` says how far
+it is. Warnings, such as of a narrow passage or of a plan driven though it is infeasible, go to the logger `sva_bench`,
+which Python shows on standard error until a program sets up `logging`. What is wrong with an input is one of the
+[errors](#errors), each an `sb.SvaBenchError` that says what to change, an argument of a wrong type is a `ValueError`,
+Ctrl-C is `KeyboardInterrupt`. Workers need no guard of a script's main module.
 
 ```python
 {example}```
@@ -42,10 +47,24 @@ def reference() -> str:
     parts.append("## What they take and give\n")
     for name in TYPES:
         kind = getattr(sb, name)
-        members = [f"- `.{member}`: {_first_line(value)}" for member, value in vars(kind).items()
+        members = [f"- `.{member}`: {_first_line(value)}" for member, value in _members(kind).items()
                    if not member.startswith("_") and (inspect.isfunction(value) or isinstance(value, property))]
         parts.append(f"### `sb.{name}`\n\n{_told(kind)}" + ("\n" + "\n".join(members) + "\n" if members else ""))
-    return "\n".join(parts)
+    parts.append("## Errors\n\nAll can be caught by these names, or together as `sb.SvaBenchError`:\n")
+    parts += [f"- `sb.{name}`{_kinds(getattr(sb, name))}: {_first_line(getattr(sb, name))}" for name in ERRORS]
+    return "\n".join(parts) + "\n"
+
+
+def _members(kind: type) -> dict[str, object]:
+    """What a class and those that it extends hold, the outermost first."""
+    return {name: value for of in reversed(kind.__mro__) for name, value in vars(of).items()}
+
+
+def _kinds(error: type) -> str:
+    """What else an error is."""
+    told = [f"`sb.{of.__name__}`" if of.__module__.startswith("sva_bench") else f"`{of.__name__}`"
+            for of in error.__bases__ if of.__name__ not in ("SvaBenchError", "Exception")]
+    return f" (a {' and a '.join(told)})" if told else ""
 
 
 def _signature(name: str, function: object) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -23,12 +24,13 @@ from sva_bench.__main__ import run_command_line
 from sva_bench.analysis.summaries import Summary
 from sva_bench.cli import plans as plan_commands
 from sva_bench.cli import run as run_commands
-from sva_bench.errors import BadFile, BadInput
+from sva_bench.errors import BadFile, BadInput, UnknownName
 from sva_bench.files.pretty import pretty_json
 from sva_bench.recording.rerun import end_s
 from sva_bench.study.given_plans import InfeasiblePlan
 from sva_bench.study.public.arguments import by_argument
 from sva_bench.travel.times import UnreachableSite
+from tests.reference import ERRORS
 from tests.worlds_for_tests import SMALL, world_of
 
 FUNCTIONS = ("load_world", "travel_times", "fuel_costs", "make_instance", "plan", "certify", "execute", "run", "record")
@@ -62,7 +64,8 @@ def result(world: sb.World) -> sb.Result[Summary]:
 
 
 def test_every_public_name_is_there_and_is_listed() -> None:
-    assert set(FUNCTIONS) | {"Summary"} <= set(sb.__all__) <= set(dir(sb))
+    assert set(FUNCTIONS) | {"Summary"} <= set(sb.__all__)
+    assert sorted([*sb.__all__, "__version__"]) == dir(sb)  # and no module or helper that happens to be loaded
     for name in sb.__all__:
         assert getattr(sb, name).__module__.startswith("sva_bench.")
     assert re.fullmatch(r"\d+\.\d+.*", sb.__version__)
@@ -105,6 +108,22 @@ def test_a_function_is_typed_takes_options_by_name_alone_and_says_what_it_takes_
     assert "Raises:" in told
     for parameter in parameters:
         assert re.search(rf"\b{parameter}\b", told), parameter
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_error_that_a_function_is_said_to_raise_can_be_caught_by_a_public_name(name: str) -> None:
+    told = (inspect.getdoc(getattr(sb, name)) or "").partition("Raises:")[2].partition("Source:")[0]
+    entries = re.findall(r"^    (\w+(?:, \w+)*): ", told, re.MULTILINE)
+    raised = {error for names in entries for error in names.split(", ")}
+    assert raised
+    for error in raised - {"ValueError", "KeyboardInterrupt"}:
+        assert issubclass(getattr(sb, error), sb.SvaBenchError), error
+        assert error in ERRORS
+
+
+def test_every_public_error_is_in_the_reference() -> None:
+    assert {name for name in sb.__all__ if isinstance(getattr(sb, name), type)
+            and issubclass(getattr(sb, name), Exception)} == set(ERRORS)
 
 
 @pytest.mark.parametrize(("function", "command"), [
@@ -239,7 +258,10 @@ def test_results_are_shown_in_a_few_lines_and_as_an_escaped_table(
 
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"trials": 0}, r"trials 0: expected 1 to 10000000"), ({"rollouts": 100_001}, "rollouts 100001"),
-    ({"seed": -1}, "seed -1"), ({"fidelity": "kinematik"}, "fidelity 'kinematik': did you mean 'kinematic'"),
+    ({"seed": -1}, r"seed -1: expected 0 to 9223372036854775807$"),
+    ({"trials": 10**5000}, "trials with 16610 bits: expected 1 to"), ({"margin": 10**400}, "margin inf"),
+    ({"margin": 1.0000001}, r"margin 1\.0000001: expected 0 to 1"), ({"out": "a\0b"}, r"out: 'a\\x00b' holds a null"),
+    ({"fidelity": "kinematik"}, "fidelity 'kinematik': did you mean 'kinematic'"),
     ({"planner": "rrt"}, "planner 'rrt'"), ({"scenario": "hlaf"}, "scenario hlaf: .*did you mean 'half'"),
     ({"scenario": ["half", "half"]}, "scenario half: given twice"), ({"margin": 2}, "margin 2: expected 0 to 1"),
     ({"margin": float("nan")}, "margin nan"), ({"gap": -1}, "gap -1"), ({"time_limit": float("inf")}, "time_limit inf"),
@@ -253,6 +275,7 @@ MISTYPED: list[tuple[dict[str, Any], str]] = [
     ({"trials": True}, "trials"), ({"fidelity": 3}, "fidelity: expected a word"), ({"out": 3}, "out: expected a path"),
     ({"scenario": 3}, "scenario"), ({"margin": "a"}, "margin"), ({"evpi": 1}, "evpi: expected True or False"),
     ({"progress": 3}, "progress"), ({"out": b"x"}, "out: expected a path"),
+    ({"world": 3}, "world: expected a world or the path of its file, found int 3"),
 ]
 
 
@@ -269,7 +292,7 @@ def test_a_value_that_cannot_be_meant_is_refused_by_the_name_of_the_argument(
 @pytest.mark.parametrize(("wrong", "said"), MISTYPED)
 def test_an_argument_of_a_wrong_type_is_a_value_error(world: sb.World, wrong: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        sb.run(world, **{**QUICK, **wrong})
+        sb.run(**{"world": world, **QUICK, **wrong})
 
 
 def test_inputs_of_a_wrong_type_are_value_errors(world: sb.World) -> None:
@@ -283,6 +306,106 @@ def test_inputs_of_a_wrong_type_are_value_errors(world: sb.World) -> None:
     for call in calls:
         with pytest.raises(ValueError, match="expected"):
             call()
+
+
+def test_where_an_object_may_be_given_the_message_says_so_beside_the_path(
+    world: sb.World, instance: sb.Instance
+) -> None:
+    given: Any = 3
+    for call, said in (
+            (lambda: sb.plan(given), "source: expected an instance, a world, or the path"),
+            (lambda: sb.certify(given, given), "instance: expected an instance or the path"),
+            (lambda: sb.certify(instance, given), "plan: expected a plan or the path"),
+            (lambda: sb.execute(world, {"a": given}), r"plans\['a'\]: expected a plan or the path"),
+            (lambda: sb.travel_times(given), "world: expected a world or the path")):
+        with pytest.raises(ValueError, match=said):
+            call()
+
+
+def test_a_path_with_a_null_character_is_refused_wherever_one_is_taken(
+    world: sb.World, instance: sb.Instance, result: sb.Result[Summary]
+) -> None:
+    bad, plan = "a\0.json", sb.Plan(routes={})
+    for call in (
+            lambda: sb.load_world(bad), lambda: sb.make_instance(world, output=bad), lambda: sb.plan(bad),
+            lambda: sb.plan(instance, output=bad), lambda: sb.certify(bad, plan), lambda: sb.certify(instance, bad),
+            lambda: sb.execute(world, [bad]), lambda: sb.execute(world, {"a": bad}),
+            lambda: sb.execute(world, plan, out=bad), lambda: sb.run(world, out=bad),
+            lambda: sb.record(result, "a\0.rrd")):
+        with pytest.raises(BadInput, match="holds a null character"):
+            call()
+
+
+WRONG_PLANS: list[tuple[dict[str, Any], str]] = [
+    ({"routes": None}, "routes: expected the route of each robot by its name, found nothing"),
+    ({"routes": ["base"]}, "routes: .*found list"), ({"routes": {1: ("base",)}}, "names of robots"),
+    ({"routes": {"uv1": (1, 2)}}, r"routes\['uv1'\]\[0\]: expected the name of a site, found int"),
+    ({"routes": {"uv1": "base"}}, r"routes\['uv1'\]: expected the names of its sites, .*found str"),
+    ({"routes": {"uv1": None}}, r"routes\['uv1'\]: .*found nothing"), ({"routes": {"uv1": 3}}, "found int"),
+    ({"routes": {}, "fuel_s": None}, "fuel_s: .*found nothing"), ({"routes": {}, "value": "x"}, "value: expected"),
+    ({"routes": {}, "fuel_s": {"uv1": "x"}}, r"fuel_s\['uv1'\]: expected a number"),
+    ({"routes": {}, "details": None}, "details"), ({"routes": {}, "bound": True}, "bound: expected a number"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "said"), WRONG_PLANS)
+def test_what_is_no_plan_is_refused_as_it_is_made(wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        sb.Plan(**wrong)
+
+
+def test_routes_may_be_lists_as_in_a_file(instance: sb.Instance) -> None:
+    route: Any = ["base", "p1", "base"]
+    plan = sb.Plan(routes={"uv1": route})
+    assert plan.routes == {"uv1": ("base", "p1", "base")}
+    assert sb.certify(instance, plan).feasible
+
+
+@pytest.mark.parametrize("route", [(), ("base",), ("base", "base")])
+def test_a_robot_stays_home_by_the_same_routes_as_in_a_file(
+    instance: sb.Instance, tmp_path: Path, route: tuple[str, ...]
+) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps({"format": "sva-bench/plan@1", "routes": {"uv1": route}}))
+    found = sb.certify(instance, sb.Plan(routes={"uv1": route}))
+    assert found.feasible
+    assert found == sb.certify(instance, path)
+
+
+def test_other_availabilities_are_probabilities_of_vehicles_that_are_there(instance: sb.Instance) -> None:
+    changed = instance.with_availability({"uv1": 0.25})
+    assert [v.availability for v in changed.vehicles] == [0.25, instance.vehicles[1].availability]
+    with pytest.raises(BadInput, match="no vehicle 'uv9'; did you mean"):
+        instance.with_availability({"uv9": 0.5})
+    for wrong in (2, -0.1, float("nan"), float("inf")):
+        with pytest.raises(BadInput, match=r"availability of uv1: .* is no probability; expected 0 to 1"):
+            instance.with_availability({"uv1": wrong})
+        with pytest.raises(ValueError, match="availability of uv1: expected 0 to 1"):
+            replace(instance.vehicles[0], availability=wrong)
+    half: Any = "half"
+    with pytest.raises(ValueError, match="availability of uv1: expected a number, found str"):
+        instance.with_availability({"uv1": half})
+
+
+def test_a_name_that_is_not_there_is_bad_input_and_a_key_error_and_names_the_nearest(
+    world: sb.World, instance: sb.Instance, result: sb.Result[Summary]
+) -> None:
+    (times,), (costs,) = (sb.travel_times(world).values(), sb.fuel_costs(world).values())
+    for call, said in (
+            (lambda: world.scenario("hlaf"), "small has no scenario 'hlaf'; did you mean 'half'?"),
+            (lambda: result.summary.scenario("hlaf"), "small has no scenario 'hlaf'; did you mean 'half'?"),
+            (lambda: instance.vehicle("uv9"), "small-half has no vehicle 'uv9'; did you mean 'uv2'?"),
+            (lambda: times.path("bsae", "p1"), "there is no site 'bsae'; did you mean 'base'?"),
+            (lambda: times.path("base", "bsae"), "there is no site 'bsae'; did you mean 'base'?"),
+            (lambda: times.course("base", "bsae"), "there is no site 'bsae'; did you mean 'base'?"),
+            (lambda: costs.chain("bsae", "p1"), "there is no site 'bsae'; did you mean 'base'?")):
+        with pytest.raises(UnknownName) as refused:
+            call()
+        assert isinstance(refused.value, KeyError)
+        assert isinstance(refused.value, sb.SvaBenchError)
+        assert str(refused.value) == said
+        again = pickle.loads(pickle.dumps(refused.value))  # as it comes from a worker
+        assert (type(again), str(again)) == (UnknownName, said)
 
 
 def test_plans_that_cannot_be_driven_are_refused_by_the_name_that_they_go_by(world: sb.World) -> None:
@@ -415,11 +538,3 @@ def test_costs_of_sites_of_the_same_names_elsewhere_are_refused(tmp_path: Path) 
         sb.make_instance(moved, costs=sb.fuel_costs(world))
     with pytest.raises(BadInput, match="make them for this world"):
         sb.fuel_costs(moved, times=sb.travel_times(world))
-
-
-def test_a_scenario_or_vehicle_that_is_not_there_is_named_with_the_nearest(tmp_path: Path) -> None:
-    world = world_of(tmp_path)
-    with pytest.raises(BadInput, match="no scenario 'hlaf'; did you mean 'half'"):
-        world.scenario("hlaf")
-    with pytest.raises(BadInput, match="no vehicle 'uv9'"):
-        sb.make_instance(world).vehicle("uv9")

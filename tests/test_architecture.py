@@ -16,7 +16,7 @@ MODULES = [path.relative_to(PACKAGE).as_posix() for path in FILES]
 
 # Low to high: each may know those before it, whoever asks, and when.
 ROOMS = (
-    "safe_path", "arrays", "errors", "seeds", "interrupts", "choices", "files", "workers", "geometry", "robot",
+    "environment", "arrays", "errors", "seeds", "interrupts", "choices", "files", "workers", "geometry", "robot",
     "mission", "world", "solver", "travel", "execution", "analysis", "recording", "storage", "report", "study",
     "generate", "batch", "paper", "cli", "__init__", "__main__",
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import shutil
 from collections.abc import Callable, Iterator
@@ -292,8 +293,8 @@ def test_the_shard_of_another_unit_is_refused(
     (["report"], "batch", "the folder of a batch, not of a run"), (["view"], "batch", "the folder of a batch"),
     (["batch", "status"], "run", "the folder of a run, not of a batch"),
     (["batch", "retry"], "run", "the folder of a run, not of a batch"),
-    (["report"], "parent", "name one of the folders in it, such as"),
-    (["view"], "parent", "name one of the folders in it, such as"),
+    (["report"], "parent", "holds 1 run, and is none itself; name one of them; the newest is"),
+    (["view"], "parent", "holds 1 run, and is none itself; name one of them; the newest is"),
     (["batch", "status"], "parent", "no folder of a batch")])
 def test_a_folder_of_another_kind_is_called_what_it_is(
     command: list[str], kind: str, said: str, folders: dict[str, Path], capsys: pytest.CaptureFixture[str]
@@ -301,6 +302,69 @@ def test_a_folder_of_another_kind_is_called_what_it_is(
     folder = folders["run"].parent if kind == "parent" else folders[kind]
     assert run_command_line([*command, str(folder)]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_newest_run_of_a_folder_is_named_and_no_batch_or_draft(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for age, (name, kind) in enumerate((("b", "run"), ("a", "execution"), ("c", "run"), ("batch", "batch"),
+                                        (".small.7.tmp", "run"))):
+        shutil.copytree(folders[kind], tmp_path / name)
+        if kind == "batch":
+            shutil.copy(folders["run"] / "summary.json", tmp_path / name)
+        os.utime(tmp_path / name / "summary.json", (age if name != "c" else 0, age if name != "c" else 0))
+    assert run_command_line(["report", str(tmp_path)]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"holds 3 runs, and is none itself; name one of them; the newest is {tmp_path / 'a'}" in said
+
+
+@pytest.mark.parametrize("command", ["report", "view"])
+def test_several_run_folders_on_one_line_are_answered_with_a_hint(
+    command: str, folders: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command_line([command, str(folders["run"]), str(folders["execution"])]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"sva-bench {command} takes one" in said
+    assert "call it once for each" in said
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("kind", ["run", "execution"])
+def test_a_plan_with_another_route_than_was_driven_is_refused_by_its_file(
+    kind: str, folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    work = tmp_path / "work"
+    shutil.copytree(folders[kind], work)
+    for path in sorted((work / "plans").glob("*tic.json")):  # a perfect-information plan has many routes
+        text = path.read_text(encoding="utf-8")
+        plan = json.loads(text)
+        robot, route = max(plan["routes"].items(), key=lambda item: len(item[1]))
+        for other in (route[:-2] + route[-1:], [route[0], *reversed(route[1:-1]), route[-1]], [], route[:1]):
+            if other == route:
+                continue
+            path.write_text(json.dumps(plan | {"routes": plan["routes"] | {robot: other}}), encoding="utf-8")
+            assert run_command_line(["report", str(work)]) == 2, (path, other)
+            said = " ".join(capsys.readouterr().err.split())
+            assert f"{path.name}: routes.{robot}: not the route that was driven" in said
+        path.write_text(text, encoding="utf-8")
+    assert run_command_line(["report", str(work)]) == 0
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_report_names_the_missing_files_that_it_can_do_without(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    work = tmp_path / "work"
+    shutil.copytree(folders["run"], work)
+    recording = sorted((work / "recordings").iterdir())[0].relative_to(work).as_posix()
+    for name in ("travel_times.parquet", "instance-half.json", recording):
+        (work / name).unlink()
+    assert run_command_line(["report", str(work)]) == 0
+    said, page = " ".join(capsys.readouterr().err.split()), (work / "report.html").read_text(encoding="utf-8")
+    named = f"travel_times.parquet, instance-half.json, {recording}"
+    assert f"missing, but the report doesn't rest on them: {named}" in said
+    assert f"Missing in this run folder: {named}." in page
+    assert f'href="{recording}"' not in page
 
 
 def test_a_run_that_was_not_finished_is_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,7 +20,8 @@ def value_figure(run: Executed, *, noisy: bool) -> Figure:
     low, high = zip(*(_value(run, m) for m in range(run.value.shape[1])), strict=True)
     taken = _mean_taken(run, run.margins, noisy=noisy)
     return figure_of(run.drawn_value.sum(axis=1), (sum(low), sum(high)),
-                     (run.drawn_value - run.value).sum(axis=1), taken, run.rollout, noisy=noisy)
+                     (run.drawn_value - run.value).sum(axis=1), taken, run.rollout, noisy=noisy,
+                     certain=_possible(run, range(run.value.shape[1])))
 
 
 def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
@@ -31,9 +32,11 @@ def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
     different = [m for m in robots if _routes_of(a, m) != _routes_of(b, m)]
     (least_a, most_a), (least_b, most_b) = (
         _mean_taken(run, [r for r in run.margins if r.robot in different], noisy=noisy) for run in (a, b))
+    (low_a, high_a), (low_b, high_b) = (_possible(run, different) for run in (a, b))
     drawn = (a.drawn_value - b.drawn_value).sum(axis=1)
     return figure_of(drawn, (sum(low), sum(high)), drawn - (a.value - b.value).sum(axis=1),
-                     (least_a - most_b, most_a - least_b), a.rollout, noisy=noisy)
+                     (least_a - most_b, most_a - least_b), a.rollout, noisy=noisy,
+                     certain=(low_a - high_b, high_a - low_b))
 
 
 def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
@@ -57,7 +60,7 @@ def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
         taken = drawn.astype(np.float64) - happened
         drawn_bounds = (0.0, 1.0) if is_uncertain and end not in EXECUTION_LOSSES else observed
         figures[end] = figure_of(drawn.astype(np.float64), drawn_bounds,
-                                 taken, bounds, run.rollout, noisy=noisy)
+                                 taken, bounds, run.rollout, noisy=noisy, certain=(0.0, 1.0))
     return figures
 
 
@@ -93,6 +96,21 @@ def _value_by_failure(run: Executed, robot: int, length: int) -> FloatArray:
 def _value(run: Executed, robot: int) -> Bounds:
     """Least and greatest value of a robot's routes over all failures."""
     return _value_beyond(run, None, robot)
+
+
+def _possible(run: Executed, robots: Iterable[int]) -> Bounds:
+    """Least and greatest value of some robots in a trial: all POIs of a route, and the cost of each robot's loss.
+
+    A robot that is never available collects nothing, and costs something only where it fails along its route.
+    """
+    low = high = 0.0
+    for robot in robots:
+        routes = [route for route in run.margins if route.robot == robot]
+        if run.terms.most(robot) > 0:
+            high += max((float(route.collected[-1]) for route in routes), default=0.0)
+        if run.terms.most(robot) > 0 or run.terms.loss_cost is not None:
+            low -= max((route.loss_cost for route in routes), default=0.0)
+    return low, high
 
 
 def _value_beyond(a: Executed, b: Executed | None, robot: int) -> Bounds:

@@ -55,12 +55,14 @@ class Figure:
         drawn_bounds: Its least and greatest possible value.
         taken: The losses due to noise; trials of one noise draw are correlated.
         taken_bounds: Least and greatest loss possible in a noise draw that was not observed (``analysis.unseen``).
+        certain: What its mean can't lie beyond, whatever failures and noise do; ``None`` = not known.
     """
 
     drawn: Moments
     drawn_bounds: Bounds
     taken: Clusters
     taken_bounds: Bounds
+    certain: Bounds | None = None
 
     @property
     def mean(self) -> float:
@@ -74,7 +76,7 @@ class Figure:
 
 
 def figure_of(drawn: FloatArray, drawn_bounds: Bounds, taken: FloatArray, taken_bounds: Bounds, rollout: IntArray,
-              *, noisy: bool) -> Figure:
+              *, noisy: bool, certain: Bounds | None = None) -> Figure:
     """The figure of some trials.
 
     Args:
@@ -83,6 +85,7 @@ def figure_of(drawn: FloatArray, drawn_bounds: Bounds, taken: FloatArray, taken_
         rollout: Noise draw of each trial, shape (trials,).
         noisy: Whether noise draws differ. Without noise, losses are a function of the failures,
             so ``drawn`` holds the whole figure.
+        certain: What its mean can't lie beyond.
     """
     shared = Clusters(counts=np.zeros(0, dtype=np.int64), sums=np.zeros(0))
     if noisy:
@@ -93,7 +96,7 @@ def figure_of(drawn: FloatArray, drawn_bounds: Bounds, taken: FloatArray, taken_
     mean = float(np.mean(drawn))
     return Figure(
         drawn=Moments(count=len(drawn), mean=mean, squares=float(np.sum((drawn - mean) ** 2))),
-        drawn_bounds=drawn_bounds, taken=shared, taken_bounds=taken_bounds)
+        drawn_bounds=drawn_bounds, taken=shared, taken_bounds=taken_bounds, certain=certain)
 
 
 def joined(a: Figure, b: Figure) -> Figure:
@@ -122,7 +125,8 @@ def _combined(a: Figure, b: Figure, taken: Clusters) -> Figure:
         drawn=Moments(count=count, mean=x.mean + step * y.count / count,
                       squares=x.squares + y.squares + step**2 * x.count * y.count / count),
         drawn_bounds=_hull(a.drawn_bounds, b.drawn_bounds), taken=taken,
-        taken_bounds=_hull(a.taken_bounds, b.taken_bounds))
+        taken_bounds=_hull(a.taken_bounds, b.taken_bounds),
+        certain=None if a.certain is None or b.certain is None else _hull(a.certain, b.certain))
 
 
 def _hull(a: Bounds, b: Bounds) -> Bounds:

@@ -24,7 +24,8 @@ def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
     """Mean of trials that share noise draws, with its interval.
 
     Failures vary from trial to trial and noise from draw to draw, so each part has an interval from its own sample;
-    the two are combined by the method of variance estimates recovery.
+    the two are combined by the method of variance estimates recovery. The losses' interval knows nothing of what the
+    failures drawn left to lose, so the whole may go beyond what is possible; it is cut off there, which loses no truth.
 
     Args:
         figure: The figure, such as a difference of two plans under the same failures.
@@ -40,7 +41,7 @@ def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
     middle, lost = figure.drawn.mean, figure.mean_taken
     below = math.hypot(middle - drawn[0], max(taken[1] - lost, 0.0))
     above = math.hypot(drawn[1] - middle, max(lost - taken[0], 0.0))
-    return _estimate(figure.mean, (figure.mean - below, figure.mean + above))
+    return _within_certain(figure, figure.mean, figure.mean - below, figure.mean + above)
 
 
 def controlled(figure: Figure, expected: float) -> Estimate:
@@ -63,7 +64,14 @@ def controlled(figure: Figure, expected: float) -> Estimate:
     mean = expected - figure.mean_taken
     if taken is None:
         return _estimate(mean, None)
-    return _estimate(mean, (min(mean, expected - taken[1]), max(mean, expected - taken[0])))
+    return _within_certain(figure, mean, min(mean, expected - taken[1]), max(mean, expected - taken[0]))
+
+
+def _within_certain(figure: Figure, mean: float, low: float, high: float) -> Estimate:
+    """The estimate, its interval cut off where the mean certainly isn't; the estimated mean stays within."""
+    if figure.certain is not None:
+        low, high = max(low, min(figure.certain[0], mean)), min(high, max(figure.certain[1], mean))
+    return _estimate(mean, (low, high))
 
 
 def _estimate(mean: float, ci95: tuple[float, float] | None) -> Estimate:
@@ -140,7 +148,8 @@ def sample_mean(values: Sequence[float]) -> Estimate:
     """Mean of a sample, such as of maps, with its confidence interval; none from fewer than two, or if all are equal.
 
     Student's t interval is too narrow where most maps have values near 0 and a few large ones, so it is widened to
-    ``bounded_mean`` with bounds beyond the observations by their range over the square root of their number.
+    ``bounded_mean`` with bounds beyond the observations by their range over the square root of their number. It is not
+    cut off anywhere: nothing is certain of the maps that were not observed.
 
     Raises:
         ValueError: If the sample is empty.

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Literal, TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Generic, Literal, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -21,9 +21,9 @@ from sva_bench.analysis.results import (
 )
 from sva_bench.analysis.shown import headline, lines_of, table_of
 from sva_bench.choices import FailureProcess, Fidelity
-from sva_bench.errors import nearest
+from sva_bench.errors import UnknownName, nearest
 from sva_bench.files.fields import Name, NonNegativeInt, Seed
-from sva_bench.files.records import Record
+from sva_bench.files.records import Record, stands_after
 
 ScenarioT = TypeVar("ScenarioT", bound=ScenarioPlans)
 
@@ -103,60 +103,58 @@ class Facts(Head):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Summary(Head):
+class OfScenarios(Head, Generic[ScenarioT]):
+    """A whole summary: one entry for each scenario, all of the same plans and robots."""
+
+    scenarios: tuple[ScenarioT, ...]
+    reach: Reach
+
+    def scenario(self, name: str) -> ScenarioT:
+        """The scenario of that name.
+
+        Raises:
+            UnknownName: If there is none.
+        """
+        for scenario in self.scenarios:
+            if scenario.name == name:
+                return scenario
+        raise UnknownName(f"{self.world} has no scenario {name!r}; {nearest(name, [s.name for s in self.scenarios])}")
+
+    def __repr__(self) -> str:
+        return "\n".join([self._headline(), *lines_of(self.scenarios)])
+
+    def _repr_html_(self) -> str:
+        """A notebook's table."""
+        return table_of(self._headline(), self.scenarios)
+
+    def _headline(self) -> str:
+        return headline(self.world, self.seed, self.trials, self.rollouts, self.fidelity)
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        first = self.scenarios[0]
+        if len({scenario.name for scenario in self.scenarios}) < len(self.scenarios):
+            raise ValueError("scenarios: a name is a duplicate")
+        for number, scenario in enumerate(self.scenarios):
+            if (list(scenario.plans), list(scenario.availability)) != (list(first.plans), list(first.availability)):
+                raise ValueError(f"scenarios[{number}]: other plans or robots than in the first scenario")
+        return self
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Summary(OfScenarios[ScenarioSummary]):
     """``summary.json`` of ``run``."""
 
     scenarios: Annotated[tuple[ScenarioSummary, ...], Field(min_length=1, max_length=10_000)]
-    precision: Annotated[ReachedPrecision | None, BeforeValidator(not_null)] = None
-    reach: Reach
-
-    def scenario(self, name: str) -> ScenarioSummary:
-        """The scenario of that name.
-
-        Raises:
-            KeyError: If there is none.
-        """
-        return _of_name(self.scenarios, name)
-
-    def __repr__(self) -> str:
-        return "\n".join([_headline(self), *lines_of(self.scenarios)])
-
-    def _repr_html_(self) -> str:
-        """A notebook's table."""
-        return table_of(_headline(self), self.scenarios)
-
-    @model_validator(mode="after")
-    def _is_consistent(self) -> Summary:
-        _refuse_other_plans(self.scenarios)
-        return self
+    precision: Annotated[ReachedPrecision | None, BeforeValidator(not_null)] = field(
+        default=None, metadata=stands_after("scenarios"))
 
 
-@dataclass(frozen=True, kw_only=True)
-class ComparisonSummary(Head):
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ComparisonSummary(OfScenarios[ComparedScenario]):
     """``summary.json`` of ``execute``."""
 
     scenarios: Annotated[tuple[ComparedScenario, ...], Field(min_length=1, max_length=10_000)]
-    reach: Reach
-
-    def scenario(self, name: str) -> ComparedScenario:
-        """The scenario of that name.
-
-        Raises:
-            KeyError: If there is none.
-        """
-        return _of_name(self.scenarios, name)
-
-    def __repr__(self) -> str:
-        return "\n".join([_headline(self), *lines_of(self.scenarios)])
-
-    def _repr_html_(self) -> str:
-        """A notebook's table."""
-        return table_of(_headline(self), self.scenarios)
-
-    @model_validator(mode="after")
-    def _is_consistent(self) -> ComparisonSummary:
-        _refuse_other_plans(self.scenarios)
-        return self
 
 
 AnySummary = Summary | ComparisonSummary
@@ -167,23 +165,3 @@ def summary_form(data: object) -> type[Summary] | type[ComparisonSummary]:
     scenarios = data.get("scenarios") if isinstance(data, dict) else None
     first = scenarios[0] if isinstance(scenarios, list) and scenarios else None
     return ComparisonSummary if isinstance(first, dict) and "comparisons" in first else Summary
-
-
-def _headline(head: Head) -> str:
-    return headline(head.world, head.seed, head.trials, head.rollouts, head.fidelity)
-
-
-def _of_name(scenarios: Sequence[ScenarioT], name: str) -> ScenarioT:
-    for scenario in scenarios:
-        if scenario.name == name:
-            return scenario
-    raise KeyError(f"no scenario {name!r}; {nearest(name, [scenario.name for scenario in scenarios])}")
-
-
-def _refuse_other_plans(scenarios: Sequence[ScenarioPlans]) -> None:
-    first = scenarios[0]
-    if len({scenario.name for scenario in scenarios}) < len(scenarios):
-        raise ValueError("scenarios: a name is a duplicate")
-    for number, scenario in enumerate(scenarios):
-        if (list(scenario.plans), list(scenario.availability)) != (list(first.plans), list(first.availability)):
-            raise ValueError(f"scenarios[{number}]: other plans or robots than in the first scenario")

@@ -89,12 +89,13 @@ class StoredFigure(Record):
     taken_bounds: _Bounds
     counts: tuple[_Count, ...]
     sums: tuple[_Sum, ...]
+    certain: _Bounds | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> StoredFigure:
         if len(self.counts) != len(self.sums) or (self.counts and sum(self.counts) != self.count):
             raise ValueError("counts and sums by noise draw don't add up to the trials")
-        if self.drawn_bounds[0] > self.drawn_bounds[1] or self.taken_bounds[0] > self.taken_bounds[1]:
+        if any(low > high for low, high in (self.drawn_bounds, self.taken_bounds, self.certain or (0.0, 0.0))):
             raise ValueError("bounds: expected [low, high]")
         return self
 

@@ -10,9 +10,9 @@ import numpy as np
 from sva_bench.analysis.catalogue import measured
 from sva_bench.analysis.figures import difference_figure, value_figure
 from sva_bench.analysis.moments import Clusters, Figure, Moments, joined
+from sva_bench.analysis.over_trials import charges, plan_figures, vss_figures
 from sva_bench.analysis.results import PlanFigures, ScenarioFacts, ScenarioFigures
 from sva_bench.analysis.statistics import estimate
-from sva_bench.analysis.summary import charges, plan_figures, vss_figures
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.batch.schema import StoredFigure, StoredPlan, StoredTally
 from sva_bench.choices import ENDS, Objective
@@ -110,12 +110,12 @@ def stored_figure(figure: Figure) -> StoredFigure:
     return StoredFigure(
         count=figure.drawn.count, mean=figure.drawn.mean, squares=figure.drawn.squares,
         drawn_bounds=figure.drawn_bounds, taken_bounds=figure.taken_bounds,
-        counts=tuple(figure.taken.counts.tolist()), sums=tuple(figure.taken.sums.tolist()))
+        counts=tuple(figure.taken.counts.tolist()), sums=tuple(figure.taken.sums.tolist()), certain=figure.certain)
 
 
 def figure_from(stored: StoredFigure) -> Figure:
     """The figure stored in a shard."""
     return Figure(
         drawn=Moments(count=stored.count, mean=stored.mean, squares=stored.squares),
-        drawn_bounds=stored.drawn_bounds, taken_bounds=stored.taken_bounds,
+        drawn_bounds=stored.drawn_bounds, taken_bounds=stored.taken_bounds, certain=stored.certain,
         taken=Clusters(counts=np.array(stored.counts, dtype=np.int64), sums=np.array(stored.sums, dtype=np.float64)))

@@ -12,18 +12,21 @@ from sva_bench.cli.inputs import instance_app, world_app
 from sva_bench.cli.paper import paper_app
 from sva_bench.cli.plans import certify, plan, times
 from sva_bench.cli.run import execute, run
-from sva_bench.cli.usage import PlainCommand
+from sva_bench.cli.usage import OneAtATime, PlainCommand
 from sva_bench.cli.view import report, view
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
     help="What is a multi-robot mission plan worth when robots fail? Plans missions, executes them in physics with "
          "randomised failures, and measures the value of the stochastic solution (VSS).",
-    epilog="Exit codes: 0 done, 1 a fault of the program, 2 bad input or usage, 3 an infeasible plan, "
-           "4 some trials unfinished, 130 interrupted.")
+    epilog="Exit codes: 0 done (a plan at its limit too), 1 a fault of the program or the installation, 2 bad input or "
+           "usage, 3 an infeasible plan, 4 some trials could not be finished, 5 an expectation not met, 130 "
+           "interrupted (143 by SIGTERM, 129 by SIGHUP); what is done is kept.")
 
-for command in (run, times, plan, certify, execute, view, report):
+for command in (run, times, plan, certify, execute):
     app.command(cls=PlainCommand)(command)
+app.command(cls=OneAtATime)(view)
+app.command(cls=OneAtATime)(report)
 for name, group in (("batch", batch_app), ("world", world_app), ("instance", instance_app), ("reproduce", paper_app)):
     app.add_typer(group, name=name)
 

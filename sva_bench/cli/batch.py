@@ -23,7 +23,14 @@ from sva_bench.cli.options import (
     WorkerCount,
     finite,
 )
-from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.terminal import (
+    messages,
+    print_json,
+    progress_bars,
+    refuse_closed_output,
+    results,
+    set_up_logging,
+)
 from sva_bench.cli.usage import PlainCommand, UnnamedCommand, WorldsFirst
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.files.outputs import check_folder
@@ -106,7 +113,9 @@ def over(
         from sva_bench.batch.grid import batch_name
         from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 
-    if not dry_run:  # before worlds are read: with their variants, that takes its time
+    if dry_run:  # before worlds are read: with their variants, that takes its time
+        refuse_closed_output()
+    else:
         check_folder(out or Path("runs"), "--out")
         check_folder(cache or default_folder(), "--cache")
     sweep = sweep_of(worlds, Sweep(
@@ -158,6 +167,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
         from sva_bench.cli.watching import over_maps, print_failed
         from sva_bench.files.records import as_dict
 
+    refuse_closed_output()
     _existing(folder)
     running = at_work(folder)
     grid = grid_of(*settings_in(folder))

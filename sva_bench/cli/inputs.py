@@ -11,7 +11,14 @@ import typer
 from sva_bench.choices import InstanceFamily, Unknown, WorldFamily
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import Force, PlannerOption, Verbose, WorldArgument, finite
-from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.terminal import (
+    messages,
+    print_json,
+    progress_bars,
+    refuse_closed_output,
+    results,
+    set_up_logging,
+)
 from sva_bench.cli.usage import PlainCommand
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_beside, write_result
@@ -35,6 +42,7 @@ def check_world(
         from sva_bench.study.inputs import about, load
 
     set_up_logging(verbose)
+    refuse_closed_output()
     loaded = load(world)
     with loading():
         from sva_bench.analysis.reach import NOTHING, beyond_reach
@@ -155,6 +163,7 @@ def copy_example(
     if listed:
         if name is not None or output is not None:
             raise BadInput("--list takes neither a name nor -o")
+        refuse_closed_output()
         width = max(map(len, example_names()))
         for each in example_names():
             typer.echo(f"{each:{width}}  {example_title(each)}")

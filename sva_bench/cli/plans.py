@@ -12,12 +12,19 @@ import typer
 from sva_bench.choices import METHODS, Cuts, Method, Objective, PathPlanner, RiskKind
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import AsJson, Gap, MarginOption, PlannerOption, TimeLimit, Verbose, WorldArgument, finite
-from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.terminal import (
+    messages,
+    print_json,
+    progress_bars,
+    refuse_closed_output,
+    results,
+    set_up_logging,
+)
 from sva_bench.errors import BadInput, ExitCode, Interrupted
 from sva_bench.files.outputs import check_output, write_result
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import deferring_ctrl_c
-from sva_bench.study.asked import AskedPlan
+from sva_bench.study.plan_request import PlanRequest
 
 if TYPE_CHECKING:
     from sva_bench.mission.instance import Instance
@@ -81,7 +88,8 @@ def plan(
 
     set_up_logging(verbose)
     check_output(output, source)
-    asked = AskedPlan(objective=objective, method=method, cuts=cuts, risk=risk, beta=beta, weight=weight, target=target)
+    request = PlanRequest(
+        objective=objective, method=method, cuts=cuts, risk=risk, beta=beta, weight=weight, target=target)
     with progress_bars() as progress:
         if source.suffix.lower() in YAML_SUFFIXES:
             instance = _instance_of_world(source, scenario, "prmstar", None, progress)
@@ -95,7 +103,7 @@ def plan(
 
         progress("solving", 0, 1)
         with deferring_ctrl_c():  # the solver hears it; from there on the plan is written
-            made = make_plan(instance, asked, SolveLimits(time_limit_s=time_limit, gap=gap))
+            made = make_plan(instance, request, SolveLimits(time_limit_s=time_limit, gap=gap))
             write_result(output, pretty_json(plan_as_dict(made)))
         progress("solving", 1, 1)
     assert made.value is not None
@@ -124,6 +132,7 @@ def certify(
         from sva_bench.mission.instance_file import read_instance
         from sva_bench.mission.plan_file import read_plan
 
+    refuse_closed_output()
     problem = read_instance(instance)
     candidate = read_plan(plan, problem)
     if candidate.instance not in (None, problem.name):

@@ -13,16 +13,24 @@ from sva_bench.analysis.results import ComparedScenario, GivenPlanResult
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import ASSUMPTION_HEAD, answer, assumption_rows, cell, ranked, remarks, vss_verdict
+from sva_bench.report.wording import (
+    ASSUMPTION_HEAD,
+    answer,
+    assumed,
+    assumption_rows,
+    cell,
+    ranked,
+    remarks,
+    vss_verdict,
+)
 
 
 def print_summary(summary: AnySummary) -> None:
     """Print a summary as a table, and what it comes to."""
-    console, travel, failure = results(), summary.travel, summary.failure
+    console, travel = results(), summary.travel
     console.print(_plans_table(summary))
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
-                  f"{travel.max_excess_pct:.1f} %; planned under {failure.plan}, executed under {failure.execute} "
-                  "failures.", highlight=False)
+                  f"{travel.max_excess_pct:.1f} %; {assumed(summary)}.", highlight=False)
     _print_unhappy(summary, console)
     if isinstance(summary, ComparisonSummary):
         for scenario in summary.scenarios:

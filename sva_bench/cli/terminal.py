@@ -43,14 +43,23 @@ def results() -> Console:
     return SafeConsole(width=None if sys.stdout.isatty() else 140, markup=False)  # names may hold brackets
 
 
+def refuse_closed_output() -> None:
+    """Check, before any work, that standard output takes a result that goes nowhere else.
+
+    Raises:
+        BadInput: If it is closed.
+    """
+    if output_is_closed():
+        raise BadInput(f"{CLOSED}; open it")
+
+
 def print_json(data: Mapping[str, Any]) -> None:
     """Print a result as JSON on standard output.
 
     Raises:
         BadInput: If that is closed.
     """
-    if output_is_closed():
-        raise BadInput(f"{CLOSED}; open it")
+    refuse_closed_output()
     sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 

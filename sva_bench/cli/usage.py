@@ -35,6 +35,20 @@ class PlainCommand(TyperCommand):
         return [*pieces, *(given.metavar or str(given.name) for given in arguments)]
 
 
+class OneAtATime(PlainCommand):
+    """A command that takes one thing; several, as a shell's pattern gives, are answered with what to do."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Say how it is called, where more than one is named."""
+        _, beyond, parameters = self.make_parser(ctx).parse_args(args=list(args))
+        taken = [parameter for parameter in parameters if parameter.param_type_name == "argument"]
+        if beyond and not any(word.startswith("-") for word in beyond):
+            what = str(taken[0].metavar)
+            raise BadInput(f"sva-bench {ctx.info_name} takes one {what}, and {len(beyond) + 1} are named; call it once "
+                           "for each")
+        return super().parse_args(ctx, args)
+
+
 class _NameOfTheGroup(typer.Context):
     """The group's words are the command's: nobody types its own."""
 

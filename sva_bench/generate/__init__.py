@@ -1,1 +1,1 @@
-"""Inputs made: terrain, missions, worlds, instances."""
+"""Generation of inputs: terrain, missions, worlds, instances."""

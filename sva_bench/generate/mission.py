@@ -36,8 +36,8 @@ MOST_INCENTIVE = {True: 150, False: 170}
 """What a certain and an uncertain robot earns at most at a POI (section 5.1 of the paper)."""
 
 _COLLECTED = 0.8  # share of all incentives that a team of available robots collects, at most
-_PROOF = 0.2  # gap to which that is proved: 0.8 x 1.2 is still less than everything
-_PAYS = 1.05  # worth of the certain robots' best plan where all others fail, in what they collect otherwise
+_PROOF = 0.2  # relative gap of the solves that bound that: 0.8 x 1.2 is still less than everything
+_PAYS = 1.05  # least ratio of what the certain robots collect by their own best plan to their share of a common plan
 _DRAWS = 8  # draws of incentives tried until that is so
 _STEP_S = 5.0  # capacities and limits are multiples of it, or of its doubles where missions are long
 _STEPS = 50  # about this number of steps is the time to the remotest POI and back
@@ -192,9 +192,9 @@ def _is_trivial(instance: Instance) -> bool:
 
 
 def _planning_pays(instance: Instance, certain: int) -> bool:
-    """Whether the certain robots would do better than in a plan for all, if the others all failed.
+    """Whether the certain robots would collect more by a plan of their own than in a plan for all, if all others fail.
 
-    Judged by good plans, not by proved ones: that is quick, and seldom wrong.
+    Compared by heuristic plans, not proved optimal ones: that is quick, and seldom wrong.
     """
     weights = _weights(instance)
     for_all = _good_orders(instance, weights, lambda value: False)  # noqa: ARG005

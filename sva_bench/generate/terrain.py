@@ -45,7 +45,7 @@ _WALL_M = 0.2
 _GRID_M = 0.1  # coordinates that people can read
 _FULL = 0.3  # share of the area above which scattered things never leave passages
 _FAILED = 25  # obstacles that found no place, after which there is none for more
-_MISSING = 0.01  # of the density, for rounding
+_MISSING = 0.01  # share of the density that may be missing, for rounding
 _TRIES = 400  # places tried for one obstacle, and for one site
 _STREAMS = {"terrain": 0, "sites": 1}
 
@@ -215,7 +215,7 @@ def _scattered(
             if _gap_m(obstacles, moved) >= PASSAGE_M:
                 placed.append(moved)
                 break
-        else:  # two of half its size take its place, unless they would be pebbles, or too much has been in vain
+        else:  # two of half its size replace it, unless they would be too small or too many tries failed
             failed += 1
             if _area_m2(shape) < 0.2 or failed == _FAILED:
                 break

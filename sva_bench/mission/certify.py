@@ -83,9 +83,9 @@ def certify(instance: Instance, plan: Plan) -> Certificate:
             if site == instance.base or site in instance.stations:
                 continue
             if name in visited:
-                reason = f"{vehicle.name}: POI {name} is visited twice; name it once" \
+                reason = f"{vehicle.name}: POI {name!r} is visited twice; name it once" \
                     if visited[name] == vehicle.name else \
-                    f"{vehicle.name}: POI {name} is visited already, by {visited[name]}; leave it to one of them"
+                    f"{vehicle.name}: POI {name!r} is visited already, by {visited[name]!r}; leave it to one of them"
                 reasons += [reason] if reason not in reasons else []
             visited[name] = vehicle.name
             earned.append(float(vehicle.incentives[site]))
@@ -110,16 +110,16 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
     sites = [instance.sites.index(name) for name in route]
     name = vehicle.name
     if sites[0] != instance.base or sites[-1] != instance.base or len(sites) < 2:
-        reasons.append(f"{name}: the route must start and end at the base {instance.sites[instance.base]}")
+        reasons.append(f"{name}: the route must start and end at the base, {instance.sites[instance.base]!r}")
     if instance.base in sites[1:-1]:
         reasons.append(f"{name}: the base is an intermediate stop of the route; it is left and entered once")
     since_refuel = fuel = duration = 0.0
     for i, j in itertools.pairwise(sites):
         leg = float(vehicle.fuel_s[i, j])
-        where = f"{instance.sites[i]} -> {instance.sites[j]}"
+        where = f"{instance.sites[i]!r} -> {instance.sites[j]!r}"
         if i == j:  # repeated POIs, and the base as an intermediate stop, have messages of their own
             if i in instance.stations or len(sites) == 2:
-                reasons.append(f"{name}: {instance.sites[i]} follows itself; name a stop once")
+                reasons.append(f"{name}: {instance.sites[i]!r} follows itself; name a stop once")
         elif leg == INFINITE:
             reasons.append(f"{name}: there is no leg {where}")
         since_refuel += leg

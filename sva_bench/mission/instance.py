@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import FailureProcess
-from sva_bench.errors import BadInput, nearest
+from sva_bench.errors import BadInput, UnknownName, nearest
 from sva_bench.files.printable import counted
-from sva_bench.mission.failures import JointState, Reliability
+from sva_bench.mission.failures import JointState, Reliability, undefined_under
 
 TOLERANCE_S = 1e-6
 """Feasibility tolerance of fuel and time [s]."""
@@ -41,6 +43,8 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         n = len(self.incentives)
+        if not 0 <= self.availability <= 1:
+            raise ValueError(f"availability of {self.name}: expected 0 to 1, found {self.availability}")
         object.__setattr__(self, "incentives", frozen(self.incentives, (n,)))
         object.__setattr__(self, "fuel_s", frozen(self.fuel_s, (n, n)))
 
@@ -91,15 +95,32 @@ class Instance:
         """The vehicle of that name.
 
         Raises:
-            BadInput: If there is none.
+            UnknownName: If there is none.
         """
         for vehicle in self.vehicles:
             if vehicle.name == name:
                 return vehicle
-        raise BadInput(f"{self.name} has no vehicle {name!r}; {nearest(name, [v.name for v in self.vehicles])}")
+        raise UnknownName(f"{self.name} has no vehicle {name!r}; {nearest(name, [v.name for v in self.vehicles])}")
 
-    def with_availability(self, availability: dict[str, float]) -> Instance:
-        """The same instance with other, independent availabilities, which replace ``mtbf_s`` too."""
+    def with_availability(self, availability: Mapping[str, float]) -> Instance:
+        """The same instance with other, independent availabilities; vehicles that aren't named keep theirs.
+
+        An availability replaces ``mtbf_s`` too.
+
+        Raises:
+            UnknownName: If the instance has no such vehicle.
+            BadInput: If an availability is no probability, or says nothing of failures under the instance's process.
+            ValueError: If it is no number.
+        """
+        for name, probability in availability.items():
+            self.vehicle(name)
+            if not isinstance(probability, Real):
+                raise ValueError(f"availability of {name}: expected a number, found {type(probability).__name__}")
+            if not 0 <= probability <= 1:
+                raise BadInput(f"{self.name}: availability of {name}: {probability} is no probability; expected 0 to 1")
         vehicles = tuple(replace(v, availability=availability[v.name], mtbf_s=None) if v.name in availability else v
                          for v in self.vehicles)
+        for vehicle in vehicles:
+            if problem := undefined_under([self.failure], vehicle.reliability):
+                raise BadInput(f"{self.name}: availability of {vehicle.name}: {problem} of the vehicle")
         return replace(self, vehicles=vehicles, joint=None)

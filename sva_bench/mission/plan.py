@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 from sva_bench.choices import PlanObjective, Status
@@ -14,6 +15,7 @@ Route = tuple[str, ...]
 """Site names from base to base; empty for a robot that stays home."""
 
 _MOST_SHOWN = 60  # stops of a route in a table
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
@@ -31,6 +33,9 @@ class Plan:
         runtime_s: Wall-clock time of the solve [s]; the only figure that differs between equal runs.
         seed: Seed of the method.
         details: Other data of the planner.
+
+    Raises:
+        ValueError: If a route is none, or a claim is no number.
     """
 
     routes: Mapping[str, Route]
@@ -44,6 +49,20 @@ class Plan:
     runtime_s: float | None = None
     seed: int | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.routes, Mapping):
+            raise ValueError(f"routes: expected the route of each robot by its name, found {_kind(self.routes)}")
+        object.__setattr__(self, "routes", {robot: _route(robot, stops) for robot, stops in self.routes.items()})
+        if not isinstance(self.fuel_s, Mapping):
+            raise ValueError(f"fuel_s: expected the fuel of each robot by its name, found {_kind(self.fuel_s)}")
+        if not isinstance(self.details, Mapping):
+            raise ValueError(f"details: expected data by name, found {_kind(self.details)}")
+        claims = {"value": self.value, "bound": self.bound, "runtime_s": self.runtime_s,
+                  **{f"fuel_s[{robot!r}]": fuel for robot, fuel in self.fuel_s.items()}}
+        for claim, figure in claims.items():
+            if isinstance(figure, bool) or not isinstance(figure, Real | None):
+                raise ValueError(f"{claim}: expected a number, found {_kind(figure)}")
 
     def __repr__(self) -> str:
         return f"Plan({self._said()}; {', '.join(f'{name}: {self._stops(name)}' for name in self.routes)})"
@@ -72,6 +91,27 @@ class Plan:
     def drives_like(self, other: Plan) -> bool:
         """Whether every robot has the same route in both plans."""
         return all(self.route(robot) == other.route(robot) for robot in {*self.routes, *other.routes})
+
+
+def _route(robot: object, stops: object) -> Route:
+    """A route as data of any kind.
+
+    Raises:
+        ValueError: If it is none.
+    """
+    if not isinstance(robot, str):
+        raise ValueError(f"routes: expected names of robots, found a key of type {_kind(robot)}")
+    if isinstance(stops, str | bytes) or not isinstance(stops, Sequence):
+        raise ValueError(f"routes[{robot!r}]: expected the names of its sites, such as ('base', 'p1', 'base'), "
+                         f"found {_kind(stops)}")
+    for number, site in enumerate(stops):
+        if not isinstance(site, str):
+            raise ValueError(f"routes[{robot!r}][{number}]: expected the name of a site, found {_kind(site)}")
+    return tuple(stops)
+
+
+def _kind(value: object) -> str:
+    return "nothing" if value is None else type(value).__name__
 
 
 def unless_interrupted(plan: Plan) -> Plan:

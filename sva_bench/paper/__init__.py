@@ -1,1 +1,1 @@
-"""The paper's experiments again."""
+"""Reproduction of the paper's experiments."""

@@ -7,9 +7,9 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from sva_bench.analysis.figures import difference_figure
+from sva_bench.analysis.over_trials import totals
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.statistics import estimate, sample_mean
-from sva_bench.analysis.summary import totals
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Settings

@@ -31,7 +31,7 @@ _DISCREET = {"CI": "true"}  # with it the viewer sends no usage statistics
 class NoVulkanDriver(SvaBenchError):
     """No working Vulkan driver for a picture."""
 
-    exit_code = ExitCode.FAULT
+    exit_code = ExitCode.FAULT  # of the installation: no other recording or option would do
 
     def __init__(self) -> None:
         super().__init__()

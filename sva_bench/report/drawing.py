@@ -59,6 +59,8 @@ _SETTINGS: dict[Any, Any] = {
 _PER_LINE = 4  # incentives on a line of a label
 _MOST_MINDED = 300  # paths that labels try to leave free; more leave no room anyway
 _LEADER = 9.0  # pixels between a marker and its label from which on a line joins them
+_OPAQUE = 4000  # edges of a roadmap that are drawn in full colour; more share their ink, so that the map is seen
+_FAINTEST = 0.15  # opacity of an edge of a roadmap at least, else single edges can't be seen
 _MANY = 2000  # boxes, or edges, from which on an SVG holds them as an image
 
 
@@ -221,8 +223,10 @@ def _corners(boxes: FloatArray) -> FloatArray:
 
 def _planned(axes: Axes, overlays: Overlays) -> None:
     if overlays.roadmap is not None:
-        axes.add_collection(LineCollection(list(overlays.roadmap), colors="#56B4E9", linewidths=0.1, zorder=2,
-                                           rasterized=len(overlays.roadmap) > _MANY), autolim=False)
+        edges = len(overlays.roadmap)
+        axes.add_collection(LineCollection(
+            list(overlays.roadmap), colors="#56B4E9", linewidths=0.1, zorder=2, rasterized=edges > _MANY,
+            alpha=min(1.0, max(_OPAQUE / max(edges, 1), _FAINTEST))), autolim=False)
     axes.add_collection(LineCollection(list(overlays.paths), colors="#0072B2", linewidths=0.6, zorder=3),
                         autolim=False)
 

@@ -21,6 +21,7 @@ from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
     answer,
+    assumed,
     assumption_rows,
     cell,
     finding,
@@ -52,7 +53,7 @@ def write_report(path: Path, content: Content) -> None:
         *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
-             f"planned under {summary.failure.plan}, executed under {summary.failure.execute} failures. "
+             f"{assumed(summary)}. "
              "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
         *_charts(summary),
         *_world(content.world),
@@ -63,7 +64,7 @@ def write_report(path: Path, content: Content) -> None:
         *_measured(scenarios),
         *_legs(content.legs),
         *_routes(content.routes),
-        *_recordings(content.stems),
+        *_recordings(content.stems, content.lacking),
         *_again(summary, content.manifest),
     ]
     write_page(path, summary.world, parts)
@@ -234,11 +235,16 @@ def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> li
     return [heading("Routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
 
 
-def _recordings(stems: Mapping[tuple[str, str], str]) -> list[str]:
+def _recordings(stems: Mapping[tuple[str, str], str], lacking: Sequence[str]) -> list[str]:
     links = [f'<a href="recordings/{quote(stem)}.rrd">{text(f"{scenario}, {planner}")}</a>'
-             for (scenario, planner), stem in stems.items()]
-    return [heading("Recordings"), f"<p>Trial 0 of each plan, for the Rerun viewer: {', '.join(links)}. Open them all "
-            "with <code>sva-bench view</code> and this folder.</p>"]
+             for (scenario, planner), stem in stems.items() if f"recordings/{stem}.rrd" not in lacking]
+    parts = [heading("Recordings")]
+    if links:
+        parts.append(f"<p>Trial 0 of each plan, for the Rerun viewer: {', '.join(links)}. Open them all with "
+                     "<code>sva-bench view</code> and this folder.</p>")
+    if lacking:
+        parts.append(note(f"Missing in this run folder: {', '.join(lacking)}. This page doesn't rest on them."))
+    return parts
 
 
 def _again(summary: AnySummary, manifest: Manifest) -> list[str]:

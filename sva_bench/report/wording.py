@@ -53,7 +53,11 @@ def _of_given_plans(summary: ComparisonSummary) -> str:
 def _of_the_two_plans(summary: Summary) -> str:
     differing = [s for s in summary.scenarios if not s.vss.same_plan]
     alike = [s.name for s in summary.scenarios if s.vss.same_plan]
+    unproved = not all(plan.status == "optimal" for s in summary.scenarios for plan in (s.stochastic, s.deterministic))
     if not differing:
+        if unproved:
+            return f"Nothing can be said of planning for failures: {_UNPROVED}, and both plans found are the same" + (
+                "." if len(alike) == 1 else " in every scenario.")
         return "Planning for failures changes nothing here: both plans are the same" + (
             "." if len(alike) == 1 else " in every scenario.")
     same = f" In {listed(alike)} both plans are the same." if alike else ""
@@ -62,11 +66,14 @@ def _of_the_two_plans(summary: Summary) -> str:
     pays = [s for s in differing if s.vss.distinguishable and s.vss.executed.mean > 0]
     costs = [s.name for s in differing if s.vss.distinguishable and s.vss.executed.mean < 0]
     loses = f" In {listed(costs)} it collects less." if costs else ""
+    named = listed([s.name + _share(s.vss) for s in pays]) if pays else ""
+    rest = [s.name for s in differing if not s.vss.distinguishable]
+    other = f" In {listed(rest)} the two can't be told apart." if rest and (pays or unproved) else ""
+    if unproved:
+        more = f" The stochastic plan found collects more in {named}." if pays else ""
+        return f"Whether planning for failures pays is not settled: {_UNPROVED}.{more}{other}{loses}{same}"
     if not pays:
         return f"Planning for failures pays in no scenario, as far as these trials can tell.{loses}{same}"
-    named = listed([s.name + _share(s.vss) for s in pays])
-    rest = [s.name for s in differing if not s.vss.distinguishable]
-    other = f" In {listed(rest)} the two can't be told apart." if rest else ""
     return f"Planning for failures pays in {named}.{other}{loses}{same}"
 
 
@@ -74,6 +81,14 @@ def _share(vss: VssFigures) -> str:
     return "" if vss.executed_pct is None else f" (VSS {per_cent(vss.executed_pct)})"
 
 
+def assumed(summary: AnySummary) -> str:
+    """The failure process that was planned for and the one that was executed; given plans were not planned here."""
+    failure = summary.failure
+    executed = f"executed under {failure.execute} failures"
+    return executed if isinstance(summary, ComparisonSummary) else f"planned under {failure.plan}, {executed}"
+
+
+_UNPROVED = "some plans are not proved optimal"
 _MOST_NAMED = 6
 FEW_MAPS = 10
 """Maps below which an interval over them wants a word of caution: it is wide and shaky there."""

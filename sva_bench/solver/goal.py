@@ -53,11 +53,12 @@ class Goal:
         return replace(self, weights=np.where(reach, self.weights, 0.0), risk=risk)
 
     def essential(self) -> Goal:
-        """The same goal but for a constant: its measure of risk reduced to the outcomes that depend on the plan."""
+        """The same goal but for a constant: its measure of risk reduced to what is not linear in the visits."""
         if self.risk is None:
             return self
         risk = self.risk.essential()
-        return replace(self, risk=risk, floors=() if risk is None else risk.floors())
+        return replace(self, weights=self.weights + self.risk.linear(), risk=risk,
+                       floors=() if risk is None else risk.floors())
 
     def rates(self) -> FloatArray:
         """The most that the visit of vehicle m to site j can earn, or cost, shape (M, n)."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sva_bench.arrays import FloatArray
+from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.choices import RiskKind
 from sva_bench.solver.outcomes import Outcomes
 
@@ -63,8 +63,20 @@ class Risk:
         return Risk(measure=replace(self.measure, target=self.measure.target * factor),
                     outcomes=self.outcomes.times(factor), constant=self.constant * factor)
 
+    def linear(self) -> FloatArray:
+        """What a visit by vehicle m to site j adds to the measure in every plan, weight included, shape (M, n).
+
+        That is all of ``excess`` in the outcomes whose target no plan exceeds: their shortfall is the target less the
+        incentive, whatever the plan.
+        """
+        outcomes = self.outcomes
+        if self.measure.kind != "excess":
+            return np.zeros_like(outcomes.incentives)
+        share = (outcomes.probability * self._never_beyond_target()) @ outcomes.available
+        return self.measure.weight / math.fsum(outcomes.probability) * share[:, None] * outcomes.incentives
+
     def essential(self) -> Risk | None:
-        """The same measure but for ``constant``, over outcomes with a reward; ``None`` where no plan changes it.
+        """The same measure but for ``constant`` and ``linear``, over the other outcomes; ``None`` where none is left.
 
         An outcome without reward, whatever the plan, may have nearly all the probability; the part of the measure that
         a plan can change would then be lost to rounding. Without such outcomes the tail of ``cvar`` begins among the
@@ -72,14 +84,16 @@ class Risk:
         """
         measure, outcomes = self.measure, self.outcomes
         probability = outcomes.probability / math.fsum(outcomes.probability)
-        rewarded = outcomes.available @ outcomes.incentives.any(axis=1) > 0
-        chance = min(math.fsum(probability[rewarded]), 1.0)
         if measure.kind == "excess":
-            lost = self.constant - measure.weight * measure.target * math.fsum(probability[~rewarded])
-            measure = replace(measure, weight=measure.weight * chance)
+            kept = ~self._never_beyond_target()
+            chance = min(math.fsum(probability[kept]), 1.0)
             left = chance if measure.target > 0 else 0.0
+            lost = self.constant - measure.weight * measure.target * math.fsum(probability[~kept])
+            measure = replace(measure, weight=measure.weight * chance)
             incentives = np.minimum(outcomes.incentives, measure.target)
         else:
+            kept = outcomes.available @ outcomes.incentives.any(axis=1) > 0
+            chance = min(math.fsum(probability[kept]), 1.0)
             lost, left, incentives = self.constant, chance - measure.beta, outcomes.incentives
             if left > 0:
                 measure = replace(measure, weight=measure.weight * left / (1 - measure.beta),
@@ -87,8 +101,13 @@ class Risk:
         if left <= 0 or measure.weight == 0:
             return None
         return Risk(measure=measure, constant=lost, outcomes=replace(
-            outcomes, incentives=incentives, probability=probability[rewarded] / chance,
-            available=outcomes.available[rewarded]))
+            outcomes, incentives=incentives, probability=probability[kept] / chance,
+            available=outcomes.available[kept]))
+
+    def _never_beyond_target(self) -> BoolArray:
+        """Outcomes in which all POIs together earn no more than the target, shape (outcomes,)."""
+        most = (self.outcomes.available[:, :, None] * self.outcomes.incentives).max(axis=1, initial=0.0).sum(axis=1)
+        return np.asarray(most <= self.measure.target)
 
     def rates(self) -> FloatArray:
         """The most that a visit by vehicle m to site j can add to the measure, weight included, shape (M, n)."""

@@ -116,7 +116,9 @@ def plan_averse(
     clock = limits.clock()
     warn_of_unreachable(instance)
     own, unit = in_own_units(instance)
-    in_own = replace(measure, target=in_unit(measure.target, unit))
+    # A target beyond all incentives together adds a constant to every plan's shortfall, and would drown the rest.
+    most = float(_incentives(own).max(axis=0, initial=0.0).sum())
+    in_own = replace(measure, target=min(in_unit(measure.target, unit), most))
     solution = solve(own, _averse(own, in_own), known, clock, limits.gap)
     value = value_of(_averse(instance, measure), known.legs_by_vehicle, solution.orders)
     return _finish(instance, measure.kind, solution.orders, known, value=value,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from sva_bench.files.printable import counted
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
+from sva_bench.storage.agreement import check_outcomes, check_routes
 from sva_bench.storage.manifest import MANIFEST, Manifest
 from sva_bench.storage.run_folder import MAP, Legs, stem_of
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
@@ -31,7 +32,6 @@ from sva_bench.storage.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
 from sva_bench.world.model import World
 
-_AGREE = 1e-6  # relative tolerance of means that are summed in another order
 MOST_LEGS = 5_000_000
 """Most legs of a report, which are held in memory."""
 
@@ -47,6 +47,7 @@ class Content:
         legs: The legs that were driven.
         world: The world, for its picture.
         manifest: What was run.
+        lacking: Files of the run folder that are missing, and that the report can do without.
     """
 
     summary: AnySummary
@@ -55,6 +56,7 @@ class Content:
     legs: Legs
     world: World
     manifest: Manifest
+    lacking: tuple[str, ...] = ()
 
 
 def run_folder_at(path: Path) -> Path:
@@ -71,16 +73,26 @@ def run_folder_at(path: Path) -> Path:
     if is_batch(path):
         raise BadInput(f"{path}: the folder of a batch, not of a run; its own report.html shows it, and 'sva-bench "
                        "batch status' with this folder says how far it is")
-    if path.name.startswith(".") and path.suffix == ".tmp":
+    if _is_draft(path):
         raise BadInput(f"{path}: a run that was not finished; run its command again")
     if not (path / "summary.json").exists() and (path / "outcomes.parquet").exists():
         raise missing(path, path / "summary.json")
     if not (path / "summary.json").is_file():
-        within = [entry for entry in sorted(path.iterdir()) if (entry / "summary.json").is_file()]
-        hint = f"name one of the folders in it, such as {within[0]}" if within else \
-            "name one as in runs/<world>-seed0-<hash>"
-        raise BadInput(f"{path}: no run folder of ours (summary.json is missing); {hint}")
+        raise BadInput(f"{path}: {_no_run(path)}")
     return path
+
+
+def _no_run(path: Path) -> str:
+    """What a folder is that isn't a run's, and what to name instead."""
+    runs = sorted(((entry / "summary.json").stat().st_mtime, entry) for entry in path.iterdir()
+                  if (entry / "summary.json").is_file() and not is_batch(entry) and not _is_draft(entry))
+    if runs:
+        return f"holds {counted(len(runs), 'run')}, and is none itself; name one of them; the newest is {runs[-1][1]}"
+    return "no run folder of ours (summary.json is missing); name one as in runs/<world>-seed0-<hash>"
+
+
+def _is_draft(path: Path) -> bool:
+    return path.name.startswith(".") and path.suffix == ".tmp"
 
 
 @contextlib.contextmanager
@@ -169,11 +181,22 @@ def _content(folder: Path) -> Content:
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
              "robot": frozenset(first.availability), "end": frozenset(ENDS), "policy": frozenset(POLICY_NAMES),
              "news": frozenset(NEWS), "fidelity": frozenset((summary.fidelity,))}
-    _check_outcomes(folder / "outcomes.parquet", plans, summary.trials, len(first.availability), words)
+    reached = check_outcomes(folder / "outcomes.parquet", plans, summary.trials,
+                             {robot.name: robot.loss_cost for robot in world.robots}, words)
     stems = {(scenario, name): stem_of(scenario, name, foreign=isinstance(summary, ComparisonSummary))
              for scenario, name in plans}
-    return Content(summary=summary, routes=_routes(folder, world, stems), stems=stems, manifest=manifest,
-                   world=world, legs=_legs(folder / "legs.parquet", world, words))
+    routes, legs = _routes(folder, world, stems), _legs(folder / "legs.parquet", world, words)
+    check_routes({key: folder / "plans" / f"{stem}.json" for key, stem in stems.items()
+                  if isinstance(summary, ComparisonSummary) or key[1] != "informed"}, routes, legs, reached)
+    return Content(summary=summary, routes=routes, stems=stems, manifest=manifest, world=world, legs=legs,
+                   lacking=_lacking(folder, [scenario.name for scenario in world.scenarios], stems.values()))
+
+
+def _lacking(folder: Path, scenarios: Iterable[str], stems: Iterable[str]) -> tuple[str, ...]:
+    """The files of a run folder that aren't there and that no page rests on, relative to it."""
+    expected = ["travel_times.parquet", *(f"instance-{name}.json" for name in scenarios),
+                *(f"recordings/{stem}.rrd" for stem in stems)]
+    return tuple(name for name in expected if not (folder / name).is_file())
 
 
 def _some(names: Sequence[str]) -> str:
@@ -215,23 +238,3 @@ def _as_column(column: pa.ChunkedArray) -> Any:
         words = chunk.dictionary.to_pylist()
         found += [words[k] for k in chunk.indices.to_pylist()]
     return found
-
-
-def _check_outcomes(path: Path, plans: Mapping[tuple[str, str], float], trials: int, robots: int,
-                    words: Mapping[str, frozenset[str]]) -> None:
-    """Check that outcomes have a row for each trial and robot, and the means of the summary."""
-    sums, counts = dict.fromkeys(plans, 0.0), dict.fromkeys(plans, 0)
-    for piece in pieces_of(path, OUTCOMES, rows=len(plans) * trials * robots, words=words):
-        grouped = piece.group_by(["scenario", "planner"]).aggregate([("incentive", "sum"), ("trial", "count")])
-        for row in grouped.to_pylist():
-            key = row["scenario"], row["planner"]
-            sums[key] += row["incentive_sum"]
-            counts[key] += row["trial_count"]
-    for (scenario, name), mean in plans.items():
-        found = sums[scenario, name] / trials
-        if counts[scenario, name] != trials * robots or not np.isclose(found, mean, rtol=_AGREE, atol=_AGREE):
-            raise BadFile(path, None, "incentive", f"these aren't the trials of summary.json: {scenario}, {name} "
-                          f"collected {mean:.6g} there and {found:.6g} here, in "
-                          f"{counted(counts[scenario, name] // robots, 'trial')}; run the command in manifest.json "
-                          "again")
-

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sva_bench.analysis.comparison import comparison_summary
+from sva_bench.analysis.over_trials import Judged
 from sva_bench.analysis.summaries import ComparisonSummary
-from sva_bench.analysis.summary import Judged
 from sva_bench.execution.execute import Case, Executed, execute
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance

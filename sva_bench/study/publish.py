@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -37,6 +38,8 @@ from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.load import world_as_dict
 from sva_bench.world.model import World
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,6 +104,8 @@ def report_again(folder: Path) -> Path:
         BadInput, BadFile: If this is no run folder, or a file in it is truncated, invalid or not of the same run.
     """
     content = read_content(run_folder_at(folder))
+    if content.lacking:
+        _log.warning("%s: missing, but the report doesn't rest on them: %s", folder, ", ".join(content.lacking))
     path = folder / "report.html"
     with draft_file(path) as draft:
         write_report(draft, content)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from sva_bench.analysis.over_trials import Judged, ScenarioTrials, promise_of, scenario_summary
 from sva_bench.analysis.results import Promise, ScenarioFacts
 from sva_bench.analysis.summaries import Failures, Head, Reach, Summary, Travel
-from sva_bench.analysis.summary import Judged, ScenarioTrials, promise_of, scenario_summary
 from sva_bench.choices import Role
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.mission.certify import expected_value

@@ -44,9 +44,13 @@ class FuelCosts:
         return np.round(self.repaired_ms * (1.0 + self.margin) / 1000.0, 9)
 
     def chain(self, origin: str, destination: str) -> tuple[str, ...]:
-        """Sites of the cheapest chain from one site to another, both included."""
+        """Sites of the cheapest chain from one site to another, both included.
+
+        Raises:
+            UnknownName: If there is no such site.
+        """
         sites = self.times.sites
-        here, end = sites.index(origin), sites.index(destination)
+        here, end = self.times.number_of(origin), self.times.number_of(destination)
         chain = [here]
         while here != end:
             here = int(self.via[here, end])

@@ -11,7 +11,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray, frozen_int
 from sva_bench.choices import PathPlanner
-from sva_bench.errors import SvaBenchError
+from sva_bench.errors import BadInput, SvaBenchError, UnknownName, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
 from sva_bench.geometry.distances import clearance
@@ -86,14 +86,30 @@ class TravelTimes:
                 f"{self.time_ms.max(initial=0) / 1000:.1f} s)")
 
     def path(self, origin: str, destination: str) -> FloatArray:
-        """The path from one site to another [m], shape (k, 2)."""
-        path = self.paths[self.sites.index(origin)][self.sites.index(destination)]
-        assert path is not None, "a site has no path to itself"
+        """The path from one site to another [m], shape (k, 2).
+
+        Raises:
+            UnknownName: If there is no such site.
+            BadInput: If they are the same.
+        """
+        path = self.paths[self.number_of(origin)][self.number_of(destination)]
+        if path is None:
+            raise BadInput(f"{origin!r} has no path to itself; name two sites")
         return path
+
+    def number_of(self, site: str) -> int:
+        """A site's index.
+
+        Raises:
+            UnknownName: If there is no such site.
+        """
+        if site not in self.sites:
+            raise UnknownName(f"there is no site {site!r}; {nearest(str(site), list(self.sites))}")
+        return self.sites.index(site)
 
     def course(self, origin: str, destination: str) -> tuple[Stretch, ...]:
         """That path as the stretches that the follower drives."""
-        heading = self.headings_rad[self.sites.index(destination)]
+        heading = self.headings_rad[self.number_of(destination)]
         return stretches(self.path(origin, destination), heading)
 
 

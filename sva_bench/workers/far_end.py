@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import pickle
 import resource
 import sys
@@ -66,6 +65,4 @@ def _answer(content: bytes, memory_mb: int, captured: _Warnings) -> Answer:
 
 
 if __name__ == "__main__":
-    for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(_name, "1")
     main()

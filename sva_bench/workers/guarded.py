@@ -12,8 +12,8 @@ import sys
 import time
 from multiprocessing.connection import Connection
 
+from sva_bench.environment import environment_of_children
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.safe_path import environment_of_children
 from sva_bench.workers.answers import Answer, Caps, Failed
 
 _START_S = 300.0
@@ -32,15 +32,13 @@ class GuardedWorker:
     def __init__(self, caps: Caps) -> None:
         self.caps = caps
         ours, theirs = socket.socketpair()
-        environment = environment_of_children() | dict.fromkeys(
-            ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
         with theirs, holding_back_ctrl_c():  # the child inherits the signal mask: only the parent handles Ctrl-C
             # Libraries may print to standard output, which belongs to the command.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "sva_bench.workers.far_end", str(theirs.fileno()), str(os.getpid()),
                  str(caps.memory_mb), caps.preload],
                 pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, env=environment)
+                stderr=subprocess.DEVNULL, env=environment_of_children())
         self.connection = Connection(ours.detach())
         self.ready = False
         self._due = time.monotonic() + _START_S

@@ -15,6 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from importlib import import_module
 from multiprocessing import resource_tracker, util
+from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from types import ModuleType
 from typing import Any
@@ -86,7 +87,9 @@ def local_workers(wanted: int | None, preload: str) -> Iterator[Executor | None]
                 executor.submit(import_module, preload)
             _hear_of_cut_off_answers(executor)
         started = set(multiprocessing.active_children()) - before
-        yield executor
+        with _ending_together(started):
+            yield executor
+            executor.shutdown(wait=True, cancel_futures=True)  # within: it waits for answers too
     except BaseException as error:
         for worker in set(multiprocessing.active_children()) - before:
             worker.terminate()  # their results are no longer needed, and may take long
@@ -107,6 +110,32 @@ def _hear_of_cut_off_answers(executor: Any) -> None:
     rest of it as long as anybody could write there.
     """
     executor._result_queue._writer.close()
+
+
+@contextmanager
+def _ending_together(workers: set[BaseProcess]) -> Iterator[None]:
+    """A block in which the end of one worker ends the others.
+
+    A worker that is killed in the middle of an answer leaves it cut off and the lock of the pipe taken: the others wait
+    for the lock, and this process for the rest of the answer as long as anybody lives who could write it.
+    A worker ends by itself only when no work is left, so nothing is lost with the others.
+    """
+    closed, closing = multiprocessing.Pipe(duplex=False)
+
+    def end_others() -> None:
+        if closed not in wait([closed, *(worker.sentinel for worker in workers)]):
+            for worker in workers:
+                worker.terminate()
+
+    with holding_back_ctrl_c():  # the thread inherits it: Ctrl-C is the main thread's to hear
+        watching = threading.Thread(target=end_others, daemon=True)
+        watching.start()
+    try:
+        yield
+    finally:
+        closing.close()
+        watching.join()
+        closed.close()
 
 
 def _death_of(workers: set[BaseProcess]) -> str:

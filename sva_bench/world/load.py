@@ -133,17 +133,28 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
         x, y = entry.at_m
         gap = clearance(obstacles, x, y)
         if gap < widest_m:
-            where = "inside an obstacle or outside the bounds" if gap <= 0 else f"only {gap:.3f} m from an obstacle"
-            raise document.error((*loc, "at_m"), f"{name} is {where}; a robot of radius {widest_m} m doesn't fit "
-                                 "there: move the site")
+            raise document.error((*loc, "at_m"), f"{name!r} is {_misplaced(obstacles, x, y, gap)}; a robot of radius "
+                                 f"{widest_m} m doesn't fit there: move the site")
         heading = (_radians(math.degrees(longest_view_heading(obstacles, x, y, sight))) if entry.heading_deg is None
                    else _radians(entry.heading_deg))
         sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s))
     for k, site in enumerate(sites):
         for other in sites[:k]:
             if math.hypot(site.x_m - other.x_m, site.y_m - other.y_m) < 0.01:
-                raise document.error(entries[k][3], f"{site.name} and {other.name} are in one place; move one of them")
+                raise document.error(entries[k][3], f"{site.name!r} and {other.name!r} are in one place; move one of "
+                                     "them")
     return tuple(sites)
+
+
+def _misplaced(obstacles: Obstacles, x: float, y: float, gap: float) -> str:
+    """What is wrong with a place that has too little room, a gap of so much [m]."""
+    x_min, y_min, x_max, y_max = obstacles.bounds_m
+    outer = min(x - x_min, y - y_min, x_max - x, y_max - y)
+    if outer < 0:
+        return f"outside the bounds, {x_min:g} to {x_max:g} m and {y_min:g} to {y_max:g} m"
+    if gap < outer:
+        return "inside an obstacle" if gap <= 0 else f"only {gap:.3f} m from an obstacle"
+    return "on the bounds, where the outer walls stand" if gap <= 0 else f"only {gap:.3f} m from an outer wall"
 
 
 def _stations_and_pois(document: Document, sites: Sites, obstacles: Obstacles, widest_m: float) -> list[_Entry]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sva_bench.choices import FailureProcess, SiteKind
-from sva_bench.errors import BadInput, nearest
+from sva_bench.errors import UnknownName, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, Reliability
@@ -171,9 +171,9 @@ class World:
         """The scenario of that name.
 
         Raises:
-            BadInput: If there is none.
+            UnknownName: If there is none.
         """
         for scenario in self.scenarios:
             if scenario.name == name:
                 return scenario
-        raise BadInput(f"{self.name} has no scenario {name!r}; {nearest(name, [s.name for s in self.scenarios])}")
+        raise UnknownName(f"{self.name} has no scenario {name!r}; {nearest(name, [s.name for s in self.scenarios])}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -111,13 +111,18 @@ def test_every_entry_names_the_key_of_its_figure_in_the_summary() -> None:
         object.__setattr__(plan, name, float(next(numbers)))
     for name in ("executed", "executed_controlled"):
         object.__setattr__(plan, name, Estimate(mean=float(next(numbers)), ci95=None))
+    # With measured entries among them: two, as their figures might be mixed up.
+    entries = (*STATISTICS, HOME, replace(HOME, key="nobody_home", factor=1.0))
+    object.__setattr__(plan, "statistics", {
+        entry.key: Estimate(mean=float(next(numbers)), ci95=None) for entry in entries if entry.measure is not None})
     data = as_dict(plan)
-    for entry in STATISTICS:
+    for entry in entries:
         held: Any = data
-        for key in entry.place.split("."):
+        for key in entry.place.split(".", 1 if entry.measure is not None else -1):
             held = held[key]
         value = entry.of(plan)
-        assert (as_dict(value) if isinstance(value, Estimate) else value) == held, entry.key
+        mean = held["mean"] if isinstance(value, Estimate) else held
+        assert (value.mean if isinstance(value, Estimate) else value) == entry.factor * mean, entry.key
         assert entry.interval == isinstance(value, Estimate), entry.key
     keys = [entry.key for entry in STATISTICS]
     assert len(set(keys)) == len(keys)

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import beta
 from scipy.stats import t as student_t
 
-from sva_bench.analysis.moments import Bounds, Figure, figure_of
+from sva_bench.analysis.moments import Bounds, Figure, figure_of, joined
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.statistics import (
     bounded_mean,
@@ -61,6 +61,24 @@ def test_what_eight_noise_draws_did_not_show_may_have_a_share_of_a_third() -> No
 
 def test_what_noise_cannot_take_leaves_certainty() -> None:
     assert interval_of(estimate(taken_only(np.zeros(8000), 0.0, 8))) == (0.0, 0.0)
+
+
+def test_an_interval_is_cut_off_where_the_mean_certainly_is_not() -> None:
+    # Failures leave 0 or 10, in few trials; noise took nothing in two draws, and might take 10 in another.
+    drawn, draws = np.array([0.0, 10.0, 0.0, 0.0]), np.arange(4) % 2
+
+    def figure(certain: Bounds | None) -> Figure:
+        return figure_of(drawn, (0.0, 10.0), np.zeros(4), (0.0, 10.0), draws, noisy=True, certain=certain)
+
+    low, high = interval_of(estimate(figure(None)))
+    assert low < 0 < high < 10
+    assert interval_of(estimate(figure((0.0, 10.0)))) == (0.0, high)
+    assert interval_of(estimate(figure((-100.0, 100.0)))) == (low, high)
+    assert interval_of(estimate(joined(figure((0.0, 10.0)), figure((0.0, 10.0)))))[0] == 0.0
+    # The closed form says 2.5; its mean may lie beyond by chance, and is within its interval all the same.
+    assert interval_of(controlled(figure(None), 2.5))[0] < 0.0
+    assert interval_of(controlled(figure((0.0, 10.0)), 2.5)) == (0.0, 2.5)
+    assert interval_of(controlled(figure((0.0, 10.0)), -1.0)) == (-1.0, -1.0)
 
 
 def test_many_trials_far_from_their_bounds_have_the_normal_interval() -> None:

@@ -314,7 +314,7 @@ def test_what_is_wrong_with_an_option_is_said_with_its_value(
     ('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", 5]}}', 2,
      'found the number 5; if it is a name, write "5"'),
     ('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "p1", "base"]}}', 3,
-     "uv1: POI p1 is visited twice; name it once"),
+     "uv1: POI 'p1' is visited twice; name it once"),
     ('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1"]}}', 3, "must start and end at the base"),
 ])
 def test_a_plan_that_cannot_be_driven_is_refused_before_anything_is_planned(

@@ -37,7 +37,6 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     ("sva-bench certify tiny.json plan.json | true", ""),
     ("sva-bench plan tiny.json | true", "optimal"),
     ("sva-bench --help >&-", ""),
-    ("sva-bench certify tiny.json plan.json >&-", ""),
     ("sva-bench instance random --pois 3 -o made.json >&-", ""),
     ("sva-bench instance random --pois 3 -o made.json 2>&-", ""),
     ("sva-bench instance random --pois 3 -o made.json >&- 2>&- <&-", ""),
@@ -73,7 +72,9 @@ def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Pat
 
 @pytest.mark.parametrize("line", [
     "plan tiny.json", "plan tiny.json -o -", "times small.yaml", "instance random", "world random",
-    "world schema", "reproduce rewards", "certify tiny.json plan.json --json", "run small.yaml --json",
+    "world schema", "reproduce rewards", "certify tiny.json plan.json --json", "certify tiny.json plan.json",
+    "world check small.yaml", "world example --list", "batch status .", "batch small.yaml --dry-run",
+    "run small.yaml --json",
     "batch small.yaml --json"])
 def test_a_result_that_a_closed_output_would_lose_is_refused_before_any_work(line: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY)

@@ -62,16 +62,17 @@ def test_a_plan_on_its_limit_is_feasible_and_one_just_over_it_is_not() -> None:
 
 
 @pytest.mark.parametrize(("plan", "reason"), [
-    (route("base", "p1", "p2", "base"), "17.000 s of fuel burnt on arrival over p2 -> base; the capacity is 12.000 s"),
-    (route("base", "r1", "p2", "r1", "p2", "r1", "p1", "base"), "POI p2 is visited twice; name it once"),
-    (route("base", "p1", "base", b=("base", "p1", "base")), "b: POI p1 is visited already, by a"),
+    (route("base", "p1", "p2", "base"),
+     "17.000 s of fuel burnt on arrival over 'p2' -> 'base'; the capacity is 12.000 s"),
+    (route("base", "r1", "p2", "r1", "p2", "r1", "p1", "base"), "POI 'p2' is visited twice; name it once"),
+    (route("base", "p1", "base", b=("base", "p1", "base")), "b: POI 'p1' is visited already, by 'a'"),
     (route("base", "p1", "base", "r1", "base"), "the base is an intermediate stop"),
     (route("r1", "p1", "base"), "must start and end at the base"),
-    (route("base", "p1"), "must start and end at the base"),
+    (route("base", "p1"), "must start and end at the base, 'base'"),
     (route("base"), "must start and end at the base"),
-    (route("base", "r1", "r1", "base"), "r1 follows itself"),
-    (route("base", "r1", "p2", "p1", "base"), "there is no leg p2 -> p1"),
-    (route("base", "r1", "p1", "r1", "p1", "r1", "base"), "POI p1 is visited twice; name it once"),
+    (route("base", "r1", "r1", "base"), "'r1' follows itself"),
+    (route("base", "r1", "p2", "p1", "base"), "there is no leg 'p2' -> 'p1'"),
+    (route("base", "r1", "p1", "r1", "p1", "r1", "base"), "POI 'p1' is visited twice; name it once"),
 ])
 def test_a_plan_that_breaks_a_rule_is_refused_with_the_reason(plan: Plan, reason: str) -> None:
     certificate = certify(instance(limit=100), plan)
@@ -83,7 +84,7 @@ def test_a_plan_that_breaks_a_rule_is_refused_with_the_reason(plan: Plan, reason
 @pytest.mark.parametrize("stops", [("p1", "p1"), ("p1", "r1", "p1"), ("p1", "p1", "p1"), ("p1", "r1", "p1", "p1")])
 def test_a_duplicate_poi_in_a_route_gets_one_message(stops: tuple[str, ...]) -> None:
     certificate = certify(instance(capacity=100, limit=100), route("base", *stops, "base"))
-    assert certificate.reasons == ("a: POI p1 is visited twice; name it once",)
+    assert certificate.reasons == ("a: POI 'p1' is visited twice; name it once",)
 
 
 def test_a_base_in_the_middle_gets_one_message() -> None:

@@ -24,6 +24,7 @@ from sva_bench.geometry.cells import bounds_of, boxes_of
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world, frame_of
 from sva_bench.report.labels import place_labels
+from sva_bench.travel.roadmap import roadmap_edges
 from sva_bench.world.maps.ros import read_ros_map
 from sva_bench.world.model import World
 from tests.oracles.distances import points_clearance
@@ -136,6 +137,16 @@ def test_roadmap_paths_and_routes_are_where_they_are_planned(small: World) -> No
         row, column = at
         assert changed[row - 2:row + 3, column].any()
         assert not changed[frame.pixel(1.2, 3.0)]
+
+
+def test_the_map_is_seen_through_a_roadmap_of_many_edges(small: World) -> None:
+    edges = roadmap_edges(small.obstacles, np.array([(site.x_m, site.y_m) for site in small.sites]), 0.3)
+    assert len(edges) > 5000
+    plain = pixels(small, Overlays())
+    ground = (plain == 255).all(axis=2)
+    ground[:, int(0.75 * ground.shape[1]):] = False  # the legend's side
+    ink = (255 - pixels(small, Overlays(roadmap=edges))[ground]).mean()
+    assert 2 < ink < 15  # of 89 where lines cover everything; 30 with lines in full colour
 
 
 def test_robots_are_distinguishable_without_colour() -> None:

@@ -18,15 +18,27 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.analysis.over_maps import BatchSummary, Percentage, UnitSummary
-from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.results import Estimate, ScenarioSummary
 from sva_bench.analysis.summaries import Summary
 from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.report import charts
 from sva_bench.report.batch_page import _over_maps as over_maps_said
 from sva_bench.report.batch_page import write_batch_report
-from sva_bench.report.wording import answer, finding, over_few_maps, percentage, remarks, vss_verdict, with_interval
+from sva_bench.report.wording import (
+    answer,
+    assumed,
+    finding,
+    over_few_maps,
+    percentage,
+    remarks,
+    vss_verdict,
+    with_interval,
+)
 from sva_bench.storage.stored_run import write_csv
+from sva_bench.study.compare import execute_plans
+from sva_bench.study.costs import plan_costs
+from sva_bench.study.given_plans import read_plans
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run, report_again
 from sva_bench.study.run import run
@@ -273,6 +285,30 @@ def test_two_equal_plans_are_called_the_same_not_indistinguishable(finished: Run
     alone = replace(results_of(finished), scenarios=(safe,))
     assert answer(alone) == "Planning for failures changes nothing here: both plans are the same."
     assert remarks(alone) == []
+
+
+def test_of_plans_that_are_not_proved_the_answer_says_that_nothing_is_settled(finished: Run) -> None:
+    def unproved(scenario: ScenarioSummary) -> ScenarioSummary:
+        late = replace(scenario.plans["deterministic"], status="time_limit")
+        return replace(scenario, plans={**scenario.plans, "deterministic": late})
+
+    half, safe = sorted(results_of(finished).scenarios, key=lambda s: s.name)
+    said = answer(replace(results_of(finished), scenarios=(unproved(half), safe), reproducible=False))
+    assert said.startswith("Whether planning for failures pays is not settled: some plans are not proved optimal.")
+    assert "pays in" not in said
+    alone = answer(replace(results_of(finished), scenarios=(unproved(safe),), reproducible=False))
+    assert alone == ("Nothing can be said of planning for failures: some plans are not proved optimal, and both plans "
+                     "found are the same.")
+
+
+def test_given_plans_are_not_said_to_be_planned_under_anything(finished: Run, tmp_path: Path) -> None:
+    assert assumed(finished.summary) == "planned under mission, executed under mission failures"
+    plans = {path.stem: path for path in sorted((finished.folder / "plans").glob("half-*"))}
+    world = world_of(tmp_path)
+    given = execute_plans(world, read_plans(world, plans), Options(trials=10, rollouts=2, fidelity="kinematic"),
+                          tmp_path / "runs", None, lambda *_: None, plan_costs(world, "prmstar", lambda *_: None))
+    assert assumed(given.summary) == "executed under mission failures"
+    assert "planned under" not in (given.folder / "report.html").read_text(encoding="utf-8")
 
 
 def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished: Run) -> None:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import route_value
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.risk import RiskMeasure
@@ -66,6 +67,25 @@ def test_without_weight_a_measure_of_risk_changes_nothing(seed: int) -> None:
     instance = random_instance(seed)
     plan = plan_averse(instance, RiskMeasure(kind="cvar", weight=0.0))
     assert plan.value == pytest.approx(best(instance), rel=2e-6, abs=2e-6)
+
+
+@few
+@given(seeds, st.sampled_from([1.0, 1.5, 1e6, 1e20, 1e300]), st.sampled_from([0.3, 1.0]))
+def test_a_target_out_of_reach_gives_the_stochastic_plan_however_large_it_is(
+        seed: int, factor: float, weight: float) -> None:
+    # Then the shortfall is the target less the incentive in every outcome: (1 - l) E - l (T - E) = E - l T.
+    instance = random_instance(seed)
+    target = factor * float(np.max([v.incentives for v in instance.vehicles], axis=0).sum())
+    plan = plan_averse(instance, RiskMeasure(kind="excess", weight=weight, target=target))
+    worth = certify(instance, plan).expected
+    assert worth is not None
+    assert plan.value is not None
+    assert plan.bound is not None
+    assert worth == pytest.approx(best(instance), rel=1e-6)
+    assert plan.status == "optimal"
+    assert plan.value == pytest.approx(worth - weight * target, rel=1e-12)
+    # And the gap is one of the incentive that can be earned.
+    assert plan.value <= plan.bound <= plan.value + 1e-6 * worth + 1e-12 * weight * target
 
 
 @few

@@ -93,6 +93,42 @@ def test_a_worker_that_is_ended_in_the_middle_of_its_answer_is_not_waited_for(tm
     assert done.stdout == "caught\n", done.stderr
 
 
+def die_in_an_answer() -> None:
+    """In a worker: begin an answer, as its queue does, and be killed."""
+    frame = sys._getframe()
+    while "result_queue" not in frame.f_locals:
+        assert frame.f_back is not None
+        frame = frame.f_back
+    queue = frame.f_locals["result_queue"]
+    queue._wlock.acquire()
+    os.write(queue._writer.fileno(), (1000).to_bytes(4, "big") + b"x")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+KILLED_IN_AN_ANSWER = """
+from sva_bench.workers.pool import WorkerLost, local_workers
+from tests.workers.test_pool import die_in_an_answer
+
+try:
+    with local_workers(2, "json") as executor:
+        answer = executor.submit(die_in_an_answer)
+        WHAT
+except WorkerLost as lost:
+    print("lost", "SIGKILL" in str(lost))
+"""
+
+
+@pytest.mark.parametrize(("what", "said"), [
+    ("answer.result()", "lost True\n"),
+    ("pass", ""),  # nobody asks for the answer, and the pool still closes
+])
+def test_a_worker_killed_in_the_middle_of_its_answer_does_not_hang_the_pool(what: str, said: str) -> None:
+    done = subprocess.run([sys.executable, "-c", KILLED_IN_AN_ANSWER.replace("WHAT", what)], capture_output=True,
+                          text=True, cwd=Path(__file__).parents[2], timeout=60, check=False)
+    assert done.stdout == said, done.stderr
+    assert done.returncode == 0, done.stderr
+
+
 HELPED = """
 from sva_bench.workers.pool import local_workers
 if __name__ == "__main__":

@@ -62,7 +62,8 @@ def integer(name: str, value: object, least: int, most: int | None = None) -> in
     except TypeError:
         raise ValueError(f"{name}: expected an integer, found {_shown(value)}") from None
     if number < least or (most is not None and number > most):
-        raise BadInput(f"{name} {number}: expected {_bounds(least, most)}")
+        shown = number if number.bit_length() <= 128 else f"with {number.bit_length()} bits"  # Python prints no more
+        raise BadInput(f"{name} {shown}: expected {_bounds(least, most)}")
     return number
 
 
@@ -78,10 +79,12 @@ def number(name: str, value: object, least: float, most: float | None = None) ->
             raise TypeError
         given: Any = value
         figure = float(given)
+    except OverflowError:  # an integer beyond all floats
+        figure = math.inf
     except TypeError:
         raise ValueError(f"{name}: expected a number, found {_shown(value)}") from None
     if not math.isfinite(figure) or figure < least or (most is not None and figure > most):
-        raise BadInput(f"{name} {figure:g}: expected {_bounds(least, most)}")
+        raise BadInput(f"{name} {figure:.15g}: expected {_bounds(least, most)}")
     return figure
 
 
@@ -120,20 +123,28 @@ def chosen(words: object) -> Callable[[str, T], T]:
     return lambda name, value: choice(name, value, words)
 
 
-def path_of(name: str, value: object) -> Path:
+def path_of(name: str, value: object, what: str = "a path") -> Path:
     """A path.
+
+    Args:
+        name: The argument.
+        value: Its value.
+        what: What may be given, for the message: where an object may be too, that as well.
 
     Raises:
         ValueError: If it is none.
-        BadInput: If it is empty, which would be the current folder, and mostly is a mistake.
+        BadInput: If it is empty, which would be the current folder, and mostly is a mistake; or if no file can be
+            called so.
     """
     if not isinstance(value, str | os.PathLike):
-        raise ValueError(f"{name}: expected a path, found {_shown(value)}")
+        raise ValueError(f"{name}: expected {what}, found {_shown(value)}")
     path: Any = os.fspath(value)
     if not isinstance(path, str):
         raise ValueError(f"{name}: expected a path of characters, found one of bytes")
     if not path:
         raise BadInput(f"{name}: an empty path")
+    if "\0" in path:
+        raise BadInput(f"{name}: {path[:60]!r} holds a null character, which no path can; leave it out")
     return Path(path)
 
 
@@ -205,9 +216,7 @@ def world_given(
     share = None if margin is None else number("margin", margin, 0, 1)
     if isinstance(value, World):
         return adapted(value, names, share, plan_failure, execute_failure), None
-    if not isinstance(value, str | os.PathLike):
-        raise ValueError(f"world: expected a world or the path of its file, found {_shown(value)}")
-    path = path_of("world", value)
+    path = path_of("world", value, "a world or the path of its file")
     return load(path, names, share, plan_failure, execute_failure), path
 
 
@@ -225,7 +234,8 @@ def progress_of(progress: OnProgress | None) -> OnProgress:
 
 
 def _bounds(least: float, most: float | None) -> str:
-    return f"at least {least:g}" if most is None else f"{least:.15g} to {most:.15g}"
+    low, high = (str(end) if isinstance(end, int) else f"{end:.15g}" for end in (least, 0 if most is None else most))
+    return f"at least {low}" if most is None else f"{low} to {high}"
 
 
 def _shown(value: object) -> str:

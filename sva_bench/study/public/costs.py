@@ -45,7 +45,9 @@ def travel_times(
         By the name of the robot model: times [ms], shape (n, n) for n sites, directed, and the paths [m] behind them.
 
     Raises:
-        UnreachableSite: If a robot cannot get from the base to a site.
+        UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
+            with the line.
+        NeverArrives: If the figures of a robot don't let it follow a path.
         BadFile, BadInput: If something is wrong with the file, or with a value.
         ValueError: If an argument is of a wrong type.
 
@@ -75,7 +77,9 @@ def fuel_costs(
         each.
 
     Raises:
-        UnreachableSite: If a robot cannot get from the base to a site.
+        UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
+            with the line.
+        NeverArrives: If the figures of a robot don't let it follow a path.
         BadFile, BadInput: If something is wrong with the file, or with a value.
         ValueError: If an argument is of a wrong type.
 
@@ -109,7 +113,9 @@ def make_instance(
         output: Instance file (JSON) to write, for other solvers.
 
     Raises:
-        UnreachableSite: If a robot cannot get from the base to a site.
+        UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
+            with the line.
+        NeverArrives: If the figures of a robot don't let it follow a path.
         BadFile, BadInput: If something is wrong with the file, or with a value.
         ValueError: If an argument is of a wrong type.
     """

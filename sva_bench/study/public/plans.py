@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import replace
 
 from sva_bench.choices import Cuts, Method, Objective, RiskKind
 from sva_bench.errors import BadInput, nearest
@@ -16,10 +17,10 @@ from sva_bench.mission.instance_file import read_instance
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.mission.plan_file import plan_as_dict, read_plan
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.study.asked import AskedPlan
 from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs
 from sva_bench.study.inputs import about
 from sva_bench.study.one_plan import make_plan
+from sva_bench.study.plan_request import PlanRequest
 from sva_bench.study.public.arguments import (
     PathLike,
     called_from_python,
@@ -52,7 +53,8 @@ def plan(
         risk: Plan for the worst outcomes: their mean (``cvar``), or the shortfall below a target (``excess``).
         beta: ``cvar``: the mean of the worst 1 - beta share of outcomes, 0.9 by default.
         weight: Share of the risk measure in the objective, 1 by default; the rest is the expected incentive.
-        target: ``excess``: the incentive below which the shortfall counts.
+        target: ``excess``: the incentive below which the shortfall counts; beyond all that can be earned, the plan is
+            the stochastic one.
         scenario: Availabilities of this scenario of a world; by default those under ``robots:``.
         time_limit: Stop after so many seconds and take the best plan; none by default.
         gap: Relative gap at which a plan counts as optimal.
@@ -60,7 +62,9 @@ def plan(
         progress: Called with what is being done, how much of it is done, and how much there is.
 
     Raises:
-        UnreachableSite: If a robot cannot get from the base of a world to a site.
+        UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
+            with the line.
+        NeverArrives: If the figures of a robot don't let it follow a path.
         BadFile, BadInput: If something is wrong with a file, or with a value, or two don't go together.
         ValueError: If an argument is of a wrong type.
         KeyboardInterrupt: On Ctrl-C; the best plan so far is not kept.
@@ -68,7 +72,7 @@ def plan(
     Source:
         ``docs/model.md``; the collapsed two-stage model of the paper.
     """
-    asked = AskedPlan(
+    asked = PlanRequest(
         objective=choice("objective", objective, Objective), method=choice("method", method, Method),
         cuts=None if cuts is None else choice("cuts", cuts, Cuts),
         risk=None if risk is None else choice("risk", risk, RiskKind),
@@ -106,7 +110,8 @@ def certify(instance: Instance | PathLike, plan: Plan | PathLike) -> Certificate
     Source:
         Constraints (1), (2), (5), (7), (9), (11) and (14a) of the paper, read as rules for a sequence of sites.
     """
-    problem = instance if isinstance(instance, Instance) else read_instance(path_of("instance", instance))
+    problem = instance if isinstance(instance, Instance) else read_instance(
+        path_of("instance", instance, "an instance or the path of its file"))
     return check(problem, plan_given("plan", plan, problem))
 
 
@@ -118,7 +123,7 @@ def plan_given(name: str, value: object, instance: Instance) -> Plan:
         ValueError: If it is neither.
     """
     if not isinstance(value, Plan):
-        return read_plan(path_of(name, value), instance)
+        return read_plan(path_of(name, value, "a plan or the path of its file"), instance)
     vehicles, sites = [vehicle.name for vehicle in instance.vehicles], list(instance.sites)
     for robot, route in value.routes.items():
         if robot not in vehicles:
@@ -126,13 +131,16 @@ def plan_given(name: str, value: object, instance: Instance) -> Plan:
         for site in route:
             if site not in sites:
                 raise BadInput(f"{name}: {robot}: there is no site {site!r}; {nearest(site, sites)}")
-    return value
+    base = instance.sites[instance.base]
+    at_home = {robot: () for robot, route in value.routes.items() if route in ((base,), (base, base))}  # as in a file
+    return replace(value, routes={**value.routes, **at_home}) if at_home else value
 
 
 def _instance_of(source: object, scenario: str | None, progress: OnProgress) -> Instance:
     if scenario is not None:
         is_a("scenario", scenario, str, "a name")
-    path = None if isinstance(source, Instance | World) else path_of("source", source)
+    path = None if isinstance(source, Instance | World) else path_of(
+        "source", source, "an instance, a world, or the path of the file of either")
     if isinstance(source, World) or (path is not None and path.suffix.lower() in YAML_SUFFIXES):
         world, _ = world_given(source, scenario)
         with nullcontext() if path is None else about(path):

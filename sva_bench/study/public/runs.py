@@ -90,7 +90,9 @@ def run(
         Summary, plans, and the outcomes and legs as Arrow tables; the same figures as those of the command.
 
     Raises:
-        UnreachableSite: If a robot cannot get from the base to a site.
+        UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
+            with the line.
+        NeverArrives: If the figures of a robot don't let it follow a path.
         BadFile, BadInput: If something is wrong with the file, or with a value, or two don't go together.
         WorkerLost: If a worker process died.
         ValueError: If an argument is of a wrong type.
@@ -124,7 +126,7 @@ def execute(
     Args:
         world: The world, or its file.
         plans: One plan, which goes by the name ``plan``; plans by their names; or plan files, which go by their stems.
-        allow_infeasible: Drive plans that break fuel capacity or mission limit too.
+        allow_infeasible: Drive plans that break fuel capacity or mission limit too; each is warned of.
         seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure: As for ``run``.
         out, workers, progress: As for ``run``.
 
@@ -133,7 +135,9 @@ def execute(
 
     Raises:
         InfeasiblePlan: If a plan can't be driven; or breaks fuel or limit, and that isn't allowed.
-        UnreachableSite: If a robot cannot get from the base to a site.
+        UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
+            with the line.
+        NeverArrives: If the figures of a robot don't let it follow a path.
         BadFile, BadInput: If something is wrong with a file, or with a value.
         WorkerLost: If a worker process died.
         ValueError: If an argument is of a wrong type.
@@ -282,5 +286,5 @@ def _named(plans: object) -> dict[str, object]:
 def _label(plans: object, name: str, plan: object) -> Path | str:
     """What messages call a plan: its file, or the argument."""
     if not isinstance(plan, Plan):
-        return path_of(f"plans[{name!r}]", plan)
+        return path_of(f"plans[{name!r}]", plan, "a plan or the path of its file")
     return f"plans[{name!r}]" if isinstance(plans, Mapping) else "plans"

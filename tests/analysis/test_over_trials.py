@@ -12,10 +12,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import beta
 
 from sva_bench.analysis.comparison import comparison_summary, ranking
-from sva_bench.analysis.figures import end_figures
-from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, ScenarioSummary, Share
-from sva_bench.analysis.statistics import bounded_mean, estimate
-from sva_bench.analysis.summary import (
+from sva_bench.analysis.figures import difference_figure, end_figures, value_figure
+from sva_bench.analysis.over_trials import (
     Judged,
     ScenarioTrials,
     charges,
@@ -24,6 +22,8 @@ from sva_bench.analysis.summary import (
     promise_of,
     scenario_summary,
 )
+from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, ScenarioSummary, Share
+from sva_bench.analysis.statistics import bounded_mean, estimate
 from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.execution.margins import Margins
@@ -218,6 +218,23 @@ def test_one_trial_has_figures_and_no_intervals() -> None:
     assert summary.executed_controlled == Estimate(mean=130.0, ci95=None)
     assert summary.end_shares["uv2"] == {"home": Share(share=1.0, ci95=None)}
     assert summary.distribution.q50 == 160.0
+
+
+@given(st.lists(st.sampled_from([("home", 60.0), ("failed", 0.0), ("out_of_fuel", 0.0)]), min_size=2, max_size=12),
+       st.booleans())
+def test_no_interval_goes_below_nothing_or_beyond_what_the_routes_hold(
+        found: list[tuple[End, float]], noisy: bool) -> None:
+    # Plan a sends both robots, uv1 to 100 and uv2 to 60; b sends uv1 alone, to 30 on another route.
+    a = executed([[100, worth] for _, worth in found], [["home", end] for end, _ in found], [100, 60], promised=130)
+    b = executed([[30, 0] for _ in found], [["home", end] for end, _ in found], [30, 0], promised=30, planner="b")
+    for figure, (low, high) in ((value_figure(a, noisy=noisy), (0, 160)), (value_figure(b, noisy=noisy), (0, 30)),
+                                (difference_figure(a, b, noisy=noisy), (-30, 160)),
+                                (difference_figure(b, a, noisy=noisy), (-160, 30))):
+        for got in (estimate(figure), estimate(figure, comparisons=3)):
+            assert got.ci95 is None or low <= got.ci95[0] <= got.mean <= got.ci95[1] <= high
+        assert figure.certain == (low, high)
+    # One plan's own route is worth as much in both.
+    assert difference_figure(a, a, noisy=noisy).certain == (0.0, 0.0)
 
 
 def test_pairs_are_compared_by_simultaneous_intervals() -> None:

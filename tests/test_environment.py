@@ -1,4 +1,4 @@
-"""What lies in the current folder is data: no module there is imported by any process of ours."""
+"""What lies in the current folder is data, imported by no process of ours; and each of them has one thread."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sva_bench.safe_path import environment_of_children
+from sva_bench.environment import environment_of_children, limit_threads
 from tests.worlds_for_tests import SMALL
 
 BESIDE = Path(sys.executable).with_name("sva-bench")
@@ -73,7 +73,7 @@ def test_no_command_runs_code_of_the_current_folder(
 
 def test_an_empty_entry_of_pythonpath_is_taken_out_for_us_and_our_children(tmp_path: Path) -> None:
     (tmp_path / "trap.py").write_text("print('sprung')\n", encoding="utf-8")
-    script = ("import os, subprocess, sys\nfrom sva_bench.safe_path import *\nimport multiprocessing\n"
+    script = ("import os, subprocess, sys\nfrom sva_bench.environment import *\nimport multiprocessing\n"
               "distrust_current_folder()\nprint(os.environ['PYTHONPATH'])\n"
               "child = [sys.executable, '-c', 'import trap']\n"
               "print(subprocess.run(child, stderr=subprocess.DEVNULL).returncode)\n"
@@ -87,7 +87,7 @@ def test_an_empty_entry_of_pythonpath_is_taken_out_for_us_and_our_children(tmp_p
 
 def test_a_folder_that_pythonpath_names_stays_where_modules_are_found(tmp_path: Path) -> None:
     (tmp_path / "ours.py").write_text("print('found')\n", encoding="utf-8")
-    script = "from sva_bench.safe_path import *\ndistrust_current_folder()\nimport ours\n"
+    script = "from sva_bench.environment import *\ndistrust_current_folder()\nimport ours\n"
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True,
                           env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}"})
     assert done.stdout == "found\n"
@@ -95,3 +95,15 @@ def test_a_folder_that_pythonpath_names_stays_where_modules_are_found(tmp_path: 
 
 def test_children_find_what_their_parent_finds() -> None:
     assert environment_of_children()["PYTHONPATH"].split(os.pathsep) == [entry for entry in sys.path if entry]
+
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def test_workers_have_one_thread_each_whatever_the_command_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in THREADS:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    limit_threads()
+    assert [os.environ[name] for name in THREADS] == ["4", "1", "1"]  # who sets one knows why
+    assert [environment_of_children()[name] for name in THREADS] == ["1", "1", "1"]

@@ -205,8 +205,7 @@ def totals(run: Executed) -> FloatArray:
 
 def _share(figure: Figure) -> Share:
     found = estimate(figure)
-    return Share(share=found.mean, ci95=None if found.ci95 is None else (
-        min(max(found.ci95[0], 0.0), 1.0), min(max(found.ci95[1], 0.0), 1.0)))
+    return Share(share=found.mean, ci95=found.ci95)
 
 
 def _percent(part: float, whole: float) -> float | None:

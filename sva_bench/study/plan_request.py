@@ -1,4 +1,4 @@
-"""One plan as it is asked for, checked before anything that takes long is loaded."""
+"""A request for one plan, checked before anything that takes long is loaded."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from sva_bench.errors import BadInput
 
 
 @dataclass(frozen=True, kw_only=True)
-class AskedPlan:
-    """What plan is wanted.
+class PlanRequest:
+    """A request for one plan.
 
     Attributes:
         objective: Plan for failures, or take every robot as available.
-        method: How it is to be proved.
+        method: Solution method, for the proof of optimality.
         cuts: Optimality cuts of ``lshaped``; ``None`` = single.
         risk: Measure of risk; ``None`` = the expected incentive.
         beta, weight, target: Of the measure; ``None`` = its default.
 
     Raises:
-        BadInput: If these don't go together.
+        BadInput: If some of these exclude each other.
     """
 
     objective: Objective = "stochastic"
