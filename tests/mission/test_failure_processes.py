@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -65,6 +66,17 @@ def test_a_process_goes_by_its_name(process: Process) -> None:
 def test_the_mean_reward_of_a_route_is_its_closed_form(process: Process) -> None:
     # Standard deviation of the earnings is at most 35 / 2; four of them over sqrt(20000): 0.5.
     assert np.mean(earned(drawn(process), 0)) == pytest.approx(process.route_value(ROUTE, RELIABILITY), abs=0.5)
+
+
+@every_process
+def test_the_cost_of_a_loss_is_charged_for_what_failed_along_the_route(process: Process) -> None:
+    priced = replace(RELIABILITY, loss_cost=10.0)
+    failed = drawn(process, reliability=priced)
+    before, lifetime = failed.before_poi[:, 0], failed.lifetime_s[:, 0]
+    lost = np.mean(((before > 0) & (before <= 3)) | (lifetime < 120.0))
+    # A share of 20000 trials, times 10: four standard deviations are 20 / sqrt(20000) = 0.15.
+    free = process.route_value(ROUTE, RELIABILITY)
+    assert free - process.route_value(ROUTE, priced) == pytest.approx(10.0 * lost, abs=0.15)
 
 
 @every_process
