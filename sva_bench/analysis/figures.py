@@ -21,7 +21,7 @@ def value_figure(run: Executed, *, noisy: bool) -> Figure:
     taken = mean_taken(run, run.margins, noisy=noisy)
     return figure_of(run.drawn_value.sum(axis=1), (sum(low), sum(high)),
                      (run.drawn_value - run.value).sum(axis=1), taken, run.rollout, noisy=noisy,
-                     certain=_certain(run, range(run.value.shape[1])))
+                     certain=_possible(run, range(run.value.shape[1])))
 
 
 def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
@@ -32,11 +32,11 @@ def difference_figure(a: Executed, b: Executed, *, noisy: bool) -> Figure:
     different = [m for m in robots if _routes_of(a, m) != _routes_of(b, m)]
     (least_a, most_a), (least_b, most_b) = (
         mean_taken(run, [r for r in run.margins if r.robot in different], noisy=noisy) for run in (a, b))
+    (low_a, high_a), (low_b, high_b) = (_possible(run, different) for run in (a, b))
     drawn = (a.drawn_value - b.drawn_value).sum(axis=1)
     return figure_of(drawn, (sum(low), sum(high)), drawn - (a.value - b.value).sum(axis=1),
                      (least_a - most_b, most_a - least_b), a.rollout, noisy=noisy,
-                     certain=(_certain(a, different)[0] - _certain(b, different)[1],
-                              _certain(a, different)[1] - _certain(b, different)[0]))
+                     certain=(low_a - high_b, high_a - low_b))
 
 
 def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
@@ -98,15 +98,18 @@ def _value(run: Executed, robot: int) -> Bounds:
     return _value_beyond(run, None, robot)
 
 
-def _certain(run: Executed, robots: Iterable[int]) -> Bounds:
-    """What some robots' mean value can't lie beyond: all lost with nothing, or all POIs of a route collected."""
+def _possible(run: Executed, robots: Iterable[int]) -> Bounds:
+    """Least and greatest value of some robots in a trial: all POIs of a route, and the cost of each robot's loss.
+
+    A robot that is never available collects nothing, and costs something only where it fails along its route.
+    """
     low = high = 0.0
     for robot in robots:
         routes = [route for route in run.margins if route.robot == robot]
-        if routes and run.terms.loss_cost is not None:
-            low -= float(run.terms.loss_cost[robot])
         if run.terms.most(robot) > 0:
             high += max((float(route.collected[-1]) for route in routes), default=0.0)
+        if run.terms.most(robot) > 0 or run.terms.loss_cost is not None:
+            low -= max((route.loss_cost for route in routes), default=0.0)
     return low, high
 
 

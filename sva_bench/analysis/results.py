@@ -132,8 +132,8 @@ class PlanFigures(Promise):
     """The results of a plan that follow from sums over its trials.
 
     Attributes:
-        executed: Mean incentive of the team.
-        by_robot: Mean incentive of each robot.
+        executed: Mean value of the team.
+        by_robot: Mean value of each robot.
         ends: Number of robot missions with each end.
         ledger: Decomposition of executed less promised value.
         statistics: Those of ``analysis.catalogue`` that are measured trial by trial, by their keys.
@@ -151,7 +151,7 @@ class PlanResult(PlanFigures):
     """The results of a plan from its single trials.
 
     Attributes:
-        executed_controlled: Variance-reduced mean incentive of the team.
+        executed_controlled: Variance-reduced mean value of the team.
         distribution: Distribution over trials.
         end_shares: Share of trials with each end, by robot.
     """
@@ -167,7 +167,7 @@ class GivenPlanResult(PlanResult):
 
     Attributes:
         feasible: Whether it keeps fuel capacities and mission limits.
-        lost: Number of robot missions that ended along the route.
+        lost: Number of robot missions that left the base and didn't come home.
     """
 
     feasible: bool
@@ -181,7 +181,7 @@ class VssFigures(Record):
     Attributes:
         modelled, modelled_pct: Difference of the plans' closed-form values; in per cent of the stochastic plan's.
         modelled_range: Least and greatest over all deterministic plans that tie; ``None`` if not known.
-        executed, executed_pct: Difference in incentive; in per cent of the stochastic plan's mean.
+        executed, executed_pct: Difference in value; in per cent of the stochastic plan's mean.
         distinguishable: Whether the executed interval excludes zero.
         same_plan: Whether both plans have the same routes.
         verdict: Which plan has the greater value, in words.
@@ -212,7 +212,7 @@ class Vss(VssFigures):
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison(Record):
-    """The incentive of plan ``a`` less that of ``b``, trial by trial; the verdict follows the simultaneous interval."""
+    """The value of plan ``a`` less that of ``b``, trial by trial; the verdict follows the simultaneous interval."""
 
     a: PlanName
     b: PlanName
@@ -235,7 +235,7 @@ class Ranked(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PerfectInformation(Estimate):
-    """The executed EVPI: incentive of the perfect-information plans less that of the stochastic plan."""
+    """The executed EVPI: value of the perfect-information plans less that of the stochastic plan."""
 
     distinguishable: bool
     verdict: Words
@@ -258,7 +258,7 @@ class AssumptionRow(Record):
         planner: ``stochastic`` or ``deterministic``.
         planned_for: The failure process that it was made for; ``None`` for the deterministic plan.
         expected: Its closed-form value under the process executed.
-        executed: Mean incentive of the team.
+        executed: Mean value of the team.
         loss_modelled, loss: Value of the plan for the process executed less its own, modelled and executed.
     """
 

@@ -10,7 +10,7 @@ from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput, UnknownName, nearest
 from sva_bench.files.printable import counted
-from sva_bench.mission.failures import JointState, Reliability
+from sva_bench.mission.failures import JointState, Reliability, undefined_under
 
 TOLERANCE_S = 1e-6
 """Feasibility tolerance of fuel and time [s]."""
@@ -109,7 +109,7 @@ class Instance:
 
         Raises:
             UnknownName: If the instance has no such vehicle.
-            BadInput: If an availability is no probability.
+            BadInput: If an availability is no probability, or says nothing of failures under the instance's process.
             ValueError: If it is no number.
         """
         for name, probability in availability.items():
@@ -120,4 +120,7 @@ class Instance:
                 raise BadInput(f"{self.name}: availability of {name}: {probability} is no probability; expected 0 to 1")
         vehicles = tuple(replace(v, availability=availability[v.name], mtbf_s=None) if v.name in availability else v
                          for v in self.vehicles)
+        for vehicle in vehicles:
+            if problem := undefined_under([self.failure], vehicle.reliability):
+                raise BadInput(f"{self.name}: availability of {vehicle.name}: {problem} of the vehicle")
         return replace(self, vehicles=vehicles, joint=None)

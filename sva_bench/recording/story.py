@@ -312,7 +312,8 @@ def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
         case "refuelled":
             return "INFO", f"{robot} refuelled at {site}"
         case "failed":
-            return "ERROR", f"{robot} failed at {site}, with {earned} collected"
+            where = "at" if site == _stood_at(trace, event) else "on the way to"
+            return "ERROR", f"{robot} failed {where} {site}, with {earned} collected"
         case "out_of_fuel":
             return "ERROR", f"{robot} ran out of fuel on the way to {site}, with {earned} collected"
         case "stuck":
@@ -323,6 +324,12 @@ def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
             return "WARN", f"{robot} passed its limit of {trace.orders.mission_limit_s:g} s at {site}: earns no more"
         case "home":
             return "INFO", f"{robot} came home, with {earned} collected"
+
+
+def _stood_at(trace: Trace, event: Event) -> str:
+    """Site that a robot stood at, or was last, when something happened."""
+    before = [e.site for e in trace.outcome.events if e.kind in ("departed", "arrived") and e is not event]
+    return before[-1] if before else trace.orders.route[0]
 
 
 def _eye(bounds_m: FloatArray) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

@@ -38,14 +38,16 @@ class StopsReached:
         return StopsReached(most=max(self.most, most), home=ends if home else self.home)
 
 
-def check_outcomes(path: Path, plans: Mapping[tuple[str, str], float], trials: int, robots: int,
-                   words: Mapping[str, frozenset[str]]) -> dict[tuple[str, str, str], StopsReached]:
+def check_outcomes(path: Path, plans: Mapping[tuple[str, str], float], trials: int,
+                   loss_cost: Mapping[str, float], words: Mapping[str, frozenset[str]]
+                   ) -> dict[tuple[str, str, str], StopsReached]:
     """Check that outcomes have a row for each trial and robot, and the means of the summary; the stops reached.
 
     Args:
         path: The table.
-        plans: Mean incentive by scenario and planner.
-        trials, robots: How many there are.
+        plans: Mean value by scenario and planner.
+        trials: How many there are.
+        loss_cost: Cost of each robot if it doesn't come home.
         words: What columns of words may hold.
 
     Returns:
@@ -54,24 +56,29 @@ def check_outcomes(path: Path, plans: Mapping[tuple[str, str], float], trials: i
     Raises:
         BadFile: If they don't.
     """
-    sums, counts = dict.fromkeys(plans, 0.0), dict.fromkeys(plans, 0)
+    robots = len(loss_cost)
+    sums = {column: dict.fromkeys(plans, 0.0) for column in ("incentive", "value")}
+    counts = dict.fromkeys(plans, 0)
     reached: dict[tuple[str, str, str], StopsReached] = {}
     for piece in pieces_of(path, OUTCOMES, rows=len(plans) * trials * robots, words=words):
         grouped = piece.group_by(["scenario", "planner", "robot", "end"]).aggregate([
-            ("incentive", "sum"), ("trial", "count"), ("stops_reached", "min"), ("stops_reached", "max")])
+            ("incentive", "sum"), ("lost", "sum"), ("value", "sum"), ("trial", "count"),
+            ("stops_reached", "min"), ("stops_reached", "max")])
         for row in grouped.to_pylist():
             key = row["scenario"], row["planner"]
-            sums[key] += row["incentive_sum"]
+            sums["incentive"][key] += row["incentive_sum"] - loss_cost[row["robot"]] * row["lost_sum"]
+            sums["value"][key] += row["value_sum"]
             counts[key] += row["trial_count"]
             whose = *key, row["robot"]
             reached[whose] = reached.get(whose, StopsReached()).also(
                 row["stops_reached_min"], row["stops_reached_max"], home=row["end"] == "home")
     for (scenario, name), mean in plans.items():
-        found = sums[scenario, name] / trials
-        if counts[scenario, name] != trials * robots or not np.isclose(found, mean, rtol=_AGREE, atol=_AGREE):
-            raise BadFile(path, None, "incentive", f"these aren't the trials of summary.json: {scenario}, {name} "
-                          f"collected {mean:.6g} there and {found:.6g} here, in "
-                          f"{counted(counts[scenario, name] // robots, 'trial')}; {_AGAIN}")
+        for column, by_plan in sums.items():
+            found = by_plan[scenario, name] / trials
+            if counts[scenario, name] != trials * robots or not np.isclose(found, mean, rtol=_AGREE, atol=_AGREE):
+                raise BadFile(path, None, column, f"these aren't the trials of summary.json: {scenario}, {name} "
+                              f"collected {mean:.6g} there and {found:.6g} here, in "
+                              f"{counted(counts[scenario, name] // robots, 'trial')}; {_AGAIN}")
     return reached
 
 

@@ -181,7 +181,8 @@ def _content(folder: Path) -> Content:
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
              "robot": frozenset(first.availability), "end": frozenset(ENDS), "policy": frozenset(POLICY_NAMES),
              "news": frozenset(NEWS), "fidelity": frozenset((summary.fidelity,))}
-    reached = check_outcomes(folder / "outcomes.parquet", plans, summary.trials, len(first.availability), words)
+    reached = check_outcomes(folder / "outcomes.parquet", plans, summary.trials,
+                             {robot.name: robot.loss_cost for robot in world.robots}, words)
     stems = {(scenario, name): stem_of(scenario, name, foreign=isinstance(summary, ComparisonSummary))
              for scenario, name in plans}
     routes, legs = _routes(folder, world, stems), _legs(folder / "legs.parquet", world, words)

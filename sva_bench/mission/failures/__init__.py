@@ -77,7 +77,7 @@ def undefined_under(names: Iterable[FailureProcess], reliability: Reliability) -
         try:
             process_of(name).terms([reliability])
         except ValueError as error:
-            return f"under {name} failures {error}"
+            return f"under {name}, {error}"
     return None
 
 
