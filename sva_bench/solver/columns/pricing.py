@@ -186,7 +186,8 @@ def _discounted_gains(graph: Graph, subgraph: PricingGraph, left_s: FloatArray) 
         left_s: Upper bound on the time left after a visit, by time steps left [s], shape (steps + 1,).
     """
     driven_s = graph.driving * np.maximum(graph.limit_s - left_s, 0.0)
-    chance = np.minimum(np.exp(-graph.discount.rate * driven_s)[:, None], subgraph.arrival[None, :])
+    rate = 0.0 if graph.discount.is_hopeless else graph.discount.rate
+    chance = np.minimum(np.exp(-rate * driven_s)[:, None], subgraph.arrival[None, :])
     reward, base = subgraph.reward.copy(), subgraph.base
     reward[base] = graph.discount.home
     behind = subgraph.arrival * reward - subgraph.dual
