@@ -66,13 +66,16 @@ def improve_order(order, length, base, fuel, time, first, last, hops, capacity, 
                 after = base if j == length - 1 else order[j + 1]
                 change = time[before, order[j]] + back[j + 1] - back[i + 1] + time[order[i], after] \
                     - (ahead[j + 2] - ahead[i])
-                if change >= -_EPSILON and not discounted and (length > _SHORT or not refuels):
+                longer = change >= -_EPSILON and (length > _SHORT or not refuels)
+                if longer and not discounted:
                     continue
                 spare[:length] = order[:length]
                 for k in range(i, j + 1):
                     spare[k] = order[i + j - k]
-                later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
                 gain = _gain(spare, length, base, weights, discounted, survival, departure, home, earned)
+                if gain < -_EPSILON or (longer and gain <= _EPSILON):
+                    continue
+                later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
                 if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
                     order[:length] = spare[:length]
                     _sums(order, length, base, time, ahead, back)
@@ -93,12 +96,15 @@ def improve_order(order, length, base, fuel, time, first, last, hops, capacity, 
                         else:
                             change = time[a, order[i + size - 1]] + back[i + size] - back[i + 1] + time[order[i], b]
                         change -= without + time[a, b]
-                        if change >= -_EPSILON and not discounted and (length > _SHORT or not refuels):
+                        longer = change >= -_EPSILON and (length > _SHORT or not refuels)
+                        if longer and not discounted:
                             continue
                         _move(order, length, i, size, position, backwards, spare)
+                        gain = _gain(spare, length, base, weights, discounted, survival, departure, home, earned)
+                        if gain < -_EPSILON or (longer and gain <= _EPSILON):
+                            continue
                         later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit,
                                            scratch)
-                        gain = _gain(spare, length, base, weights, discounted, survival, departure, home, earned)
                         if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
                             order[:length] = spare[:length]
                             _sums(order, length, base, time, ahead, back)

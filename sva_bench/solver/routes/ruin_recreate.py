@@ -234,16 +234,13 @@ def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, b
                 for position in range(begin, end + 1):
                     a = base if position == 0 else orders[m, position - 1]
                     b = base if position == lengths[m] else orders[m, position]
-                    if free:
-                        later = total[m] + time[k, a, j] + time[k, j, b] - (time[k, a, b] if lengths[m] > 0 else 0.0)
-                    elif ahead[m, position, 0, 0] + quickest[k, a, j] + quickest[k, j, b] \
-                            + behind[m, position + 1, 0, 0] >= \
-                            (limit[k] if discounted[m] else min(limit[k], total[m] + least[m, j])):
-                        later = np.inf  # a lower bound without refuels is too late, or later than another position
-                    else:
-                        later = time_with(j, a, b, fuel[k], time[k], first[k], last[k], hops, capacity[k],
-                                          limit[k], ahead[m, position], ahead_size[m, position],
-                                          behind[m, position + 1], behind_size[m, position + 1], scratch)
+                    soonest = 0.0  # a lower bound, without refuels
+                    if not free:
+                        soonest = ahead[m, position, 0, 0] + quickest[k, a, j] + quickest[k, j, b] \
+                            + behind[m, position + 1, 0, 0]
+                        if soonest >= (limit[k] if discounted[m] else min(limit[k], total[m] + least[m, j])):
+                            continue  # too late, or later than at another position
+                    gained = 0.0
                     if discounted[m]:
                         there = chance[position] * survival[m, a, j]
                         gain = there * weights[m, j] + (there * survival[m, j, b]
@@ -252,8 +249,20 @@ def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, b
                             gain = there * weights[m, j]
                             if alone:
                                 gain += there * survival[m, j, b] * home[m] - departure[m]
-                        if gain > _EPSILON and later <= limit[k]:
-                            merit = gain**power / (max(later - total[m], 0.0) + detour)
+                        if gain <= _EPSILON:
+                            continue
+                        gained = gain**power
+                        if not free and gained <= most * (max(soonest - total[m], 0.0) + detour):
+                            continue
+                    if free:
+                        later = total[m] + time[k, a, j] + time[k, j, b] - (time[k, a, b] if lengths[m] > 0 else 0.0)
+                    else:
+                        later = time_with(j, a, b, fuel[k], time[k], first[k], last[k], hops, capacity[k],
+                                          limit[k], ahead[m, position], ahead_size[m, position],
+                                          behind[m, position + 1], behind_size[m, position + 1], scratch)
+                    if discounted[m]:
+                        if later <= limit[k]:
+                            merit = gained / (max(later - total[m], 0.0) + detour)
                             if merit > most:
                                 least[m, j], place[m, j], most = later - total[m], position, merit
                     elif later - total[m] < least[m, j]:
