@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sva_bench.execution.outcome import Assignment, RobotFate
+from sva_bench.execution.outcome import Assignment, Driven, RobotFate
 from sva_bench.execution.rules import LegDriven, RobotMission, settle
 from sva_bench.mission.failures import NEVER
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.solver.discounts import Discount
 from sva_bench.solver.preprocess import SLACK_S, shortest_paths
 
 
@@ -23,6 +24,24 @@ class _Hop(NamedTuple):
 
     fuel_s: float
     time_s: float
+    burnt_s: float
+    stations: tuple[int, ...]
+
+
+class Passage(NamedTuple):
+    """A way from one stop to the next: a leg, or a chain of stations.
+
+    Attributes:
+        time_s: Time in all [s].
+        driven_s: Driving time in all [s].
+        fuel_s: Fuel to the first station, or to the end [s].
+        burnt_s: Fuel from the last station, or in all [s].
+        stations: The stations, in order.
+    """
+
+    time_s: float
+    driven_s: float
+    fuel_s: float
     burnt_s: float
     stations: tuple[int, ...]
 
@@ -53,6 +72,9 @@ class VehicleLegs:
         limit_s: Mission limit, half the feasibility tolerance included [s].
         hops: Nondominated chains of stations between two stops, by their ends.
         known: Quickest route of each order of POIs asked for so far; ``None`` = infeasible.
+        passages: Nondominated ways between two stops, driving time included, by their ends.
+        chains: Nondominated chains of stations by their first one: time, driving time and stations, by their last one.
+        ways: Value and sites of the most valuable route of each order, rewards and discount asked for so far.
     """
 
     base: int
@@ -64,6 +86,10 @@ class VehicleLegs:
     limit_s: float
     hops: dict[tuple[int, int], list[_Hop]] = field(default_factory=dict)
     known: dict[tuple[int, ...], TimedRoute | None] = field(default_factory=dict)
+    passages: dict[tuple[int, int], list[Passage]] = field(default_factory=dict)
+    chains: dict[int, dict[int, list[tuple[float, float, tuple[int, ...]]]]] = field(default_factory=dict)
+    ways: dict[tuple[tuple[int, ...], tuple[float, ...], Discount], tuple[float, tuple[int, ...]] | None] = field(
+        default_factory=dict)
 
 
 def vehicle_legs(instance: Instance, vehicle: Vehicle) -> VehicleLegs:
@@ -116,23 +142,6 @@ def _quickest(own_legs: VehicleLegs, pois: tuple[int, ...]) -> TimedRoute | None
             return None
         here = there
     return TimedRoute(front[0][0], front[0][2])
-
-
-def quickest_home(own_legs: VehicleLegs, site: int, burnt_s: float, left_s: float) -> TimedRoute | None:
-    """The quickest way to the base from another site; ``None`` if none keeps fuel capacity and time.
-
-    Args:
-        own_legs: The vehicle's legs.
-        site: Where it is.
-        burnt_s: Fuel burnt since it was filled last [s].
-        left_s: Time left [s].
-    """
-    base = own_legs.base
-    ways = [TimedRoute(own_legs.time_s[site][base], (site, base))] \
-        if burnt_s + own_legs.fuel_s[site][base] <= own_legs.capacity_s else []
-    ways += [TimedRoute(hop.time_s, (site, *hop.stations, base)) for hop in _hops(own_legs, site, base)
-             if burnt_s + hop.fuel_s <= own_legs.capacity_s]
-    return min((way for way in ways if way.time_s <= left_s + SLACK_S), default=None)
 
 
 def _hops(own_legs: VehicleLegs, here: int, there: int) -> list[_Hop]:
