@@ -210,5 +210,5 @@ def _share(figure: Figure) -> Share:
 
 def percent(part: float, whole: float) -> float | None:
     """A percentage; ``None`` of 0, or beyond ``MOST_AMOUNT``."""
-    percentage = 100.0 * part / whole + 0.0 if whole else np.inf
+    percentage = 100.0 * part / whole + 0.0 if whole > 0 else np.inf
     return percentage if abs(percentage) <= MOST_AMOUNT else None

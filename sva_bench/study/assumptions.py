@@ -79,5 +79,6 @@ def _row(process: FailureProcess, plans: PlansByProcess, made: _MadeFor, run: Ex
 
 def _all_of(plans: PlansByProcess) -> list[_MadeFor]:
     """All plans of a scenario."""
-    return [*(_MadeFor(process=process, plan=plan) for process, plan in plans.stochastic.items()),
+    made = plans.stochastic
+    return [*(_MadeFor(process=process, plan=made[process]) for process in PROCESSES if process in made),
             _MadeFor(process=None, plan=plans.deterministic)]

@@ -127,15 +127,13 @@ def test_lifetimes_and_costs_of_losses_are_read_and_written_where_given(tmp_path
 
 
 def test_a_mean_time_to_failure_says_the_availability_where_none_is_given(tmp_path: Path) -> None:
-    def only_mean(data: dict[str, Any]) -> None:
-        data["vehicles"][0].pop("availability")
-        data["vehicles"][0]["mtbf_s"] = 60
+    for limit, availability in ((None, 1.0), (30, math.exp(-0.5))):
+        def only_mean(data: dict[str, Any], limit_s: int | None = limit) -> None:
+            data["vehicles"][0].pop("availability")
+            data["vehicles"][0].update(mtbf_s=60, mission_limit_s=limit_s)
 
-    (unlimited,) = read_instance(written(tmp_path, changed(only_mean))).vehicles
-    assert unlimited.availability == 1.0
-    (limited,) = read_instance(written(tmp_path, changed(
-        lambda d: (only_mean(d), d["vehicles"][0].update(mission_limit_s=30))))).vehicles
-    assert limited.availability == pytest.approx(math.exp(-0.5))
+        (vehicle,) = read_instance(written(tmp_path, changed(only_mean))).vehicles
+        assert vehicle.availability == pytest.approx(availability)
 
 
 def test_another_availability_replaces_the_mean_time_to_failure(tmp_path: Path) -> None:
