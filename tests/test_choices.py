@@ -11,6 +11,7 @@ import pytest
 
 from sva_bench import choices
 from sva_bench.choices import Cuts, MapMode, Unknown
+from sva_bench.execution.policies.registry import POLICIES
 from sva_bench.generate import instances, terrain, worlds
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.failures import PROCESSES
@@ -38,7 +39,8 @@ REGISTRIES: list[tuple[str, Iterable[Any]]] = [
     ("SiteKind", drawing._KINDS),
     ("SiteKind", drawing._MARKERS),
     ("End", choices.ENDS),
-    ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"]]),
+    ("PolicyName", POLICIES),
+    ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"], "anticipative"]),
 ]
 
 

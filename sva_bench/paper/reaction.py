@@ -93,7 +93,7 @@ def reaction_page(rows: Sequence[ReactedWorld], settings: Settings) -> str:
         *_table(rows, lambda result: result.value_of_recourse["stochastic"].pct), "",
         "## The best plan for the reaction", "",
         "VSS with recourse: the best plan for the reaction less the deterministic one, in per cent of the best. It is "
-        "one of the stochastic, the deterministic and the anticipative plan, which is chosen by simulated reactions.", "",
+        "one of the stochastic, the deterministic and the anticipative plan, which is chosen by simulating it.", "",
         *_table(rows, lambda result: result.vss_with_recourse.pct), "",
         "Anticipation: the best plan less the stochastic one.", "",
         *_table(rows, lambda result: result.anticipation.pct), "",
