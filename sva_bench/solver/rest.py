@@ -61,12 +61,12 @@ def _solved(rest: Rest) -> dict[str, tuple[str, ...] | None]:
     own, _ = in_own_units(instance)
     limits = SolveLimits()
     exact = len(rest.open_pois) <= MOST_POIS
-    solution = solve(own, _goal(own, rest), known, limits.clock(), limits.gap if exact else math.inf)
+    solution = solve(own, _goal(own), known, limits.clock(), limits.gap if exact else math.inf)
     return {v.name: tuple(instance.sites[k] for k in route[1:])
             for v, route in zip(instance.vehicles, solution.routes, strict=True)}
 
 
-def _goal(own: Instance, rest: Rest) -> Goal:
+def _goal(own: Instance) -> Goal:
     terms = process_of(own.failure).terms([vehicle.reliability for vehicle in own.vehicles])
     weights = np.array([vehicle.incentives for vehicle in own.vehicles]) * terms.share[:, None]
     return Goal(weights=weights, survival=terms.survival)

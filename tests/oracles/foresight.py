@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import sys
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -47,7 +48,7 @@ def _most(ground: Ground, worth: list[Worth]) -> float:
 
 def _for_missions(ground: Ground) -> Iterator[tuple[float, list[Worth]]]:
     names = [v.name for v in ground.instance.vehicles]
-    able = [_worth(ground, k, lambda _: True, lambda _: True) for k in ground.robots]
+    able = [_worth(ground, k) for k in ground.robots]
     for there in itertools.product((True, False), repeat=len(names)):
         available = {name for name, t in zip(names, there, strict=True) if t}
         if ground.instance.joint is None:
@@ -62,9 +63,8 @@ def _along_pois(ground: Ground, robot: int) -> list[tuple[float, Worth]]:
     s, fates = ground.chance[robot], []
     for number in range(len(ground.pois) + 1):
         probability = s**number * (1 - s if number < len(ground.pois) else 1)
-        few = _worth(ground, robot, lambda r, n=number: r.mask.bit_count() <= n, lambda _: True)
         if probability > 0:
-            fates.append((probability, few))
+            fates.append((probability, _worth(ground, robot, pois=number)))
     return fates
 
 
@@ -72,7 +72,7 @@ def _in_driving(ground: Ground, robot: int) -> list[tuple[float, Worth]]:
     """Intervals of lifetimes within which it makes no difference when a robot fails."""
     rate, reached = ground.rate[robot], _reached(ground, robot)
     if rate == 0:
-        return [(1.0, _worth(ground, robot, lambda _: True, lambda _: True))]
+        return [(1.0, _worth(ground, robot))]
     edges = [0.0, *sorted({t for r in reached for t in (r.driven, r.home) if 0 < t < math.inf}), math.inf]
     fates = []
     for since, until in itertools.pairwise(edges):
@@ -80,19 +80,17 @@ def _in_driving(ground: Ground, robot: int) -> list[tuple[float, Worth]]:
         if math.isinf(rate):
             probability = 0.0 if since else 1.0
         if probability > 0:
-            fates.append((probability, _worth(ground, robot, lambda r, t=since: r.driven <= t,
-                                              lambda r, t=since: r.home <= t)))
+            fates.append((probability, _worth(ground, robot, lifetime=since)))
     return fates
 
 
-def _worth(ground: Ground, robot: int, visits: Callable[[Reached], bool], comes_home: Callable[[Reached], bool]
-           ) -> Worth:
-    """What a robot earns at most over a mask: it visits some POIs, and is lost unless it comes home."""
+def _worth(ground: Ground, robot: int, *, pois: int = sys.maxsize, lifetime: float = math.inf) -> Worth:
+    """What a robot earns at most over a mask if it can visit so many POIs, or drive for so long."""
     gains: dict[int, float] = {}
     for r in _reached(ground, robot):
         earned = sum(ground.reward[robot][j] for j, bit in ground.bit.items() if bit & r.mask)
-        gain = earned - (0.0 if comes_home(r) else ground.loss[robot])
-        if visits(r):
+        gain = earned - (0.0 if r.home <= lifetime else ground.loss[robot])
+        if r.driven <= lifetime and r.mask.bit_count() <= pois:
             gains[r.mask] = max(gains.get(r.mask, NOWHERE), gain)
     table = [max((gain for own, gain in gains.items() if not own & ~mask), default=0.0)
              for mask in range(ground.everything + 1)]

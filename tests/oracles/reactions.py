@@ -169,12 +169,12 @@ class Reactions:
             lost, after = self._fails(state, failed) if self._ground.process != "mission" else \
                 (0.0, self._fails(state, failed)[1])
             earned = sum(self._ground.reward[k][state.robots[k].site] for k in due if k not in failed)
-            after = after.change({k: self._arrived(k, state.robots[k]) for k in due if k not in failed})
+            after = after.change({k: self._arrived(state.robots[k]) for k in due if k not in failed})
             told = failed and self._news in ("instant", "report")
             value += probability * (earned + lost + (self._told(after) if told else self._value(after)))
         return value
 
-    def _arrived(self, number: int, robot: Robot) -> Robot:
+    def _arrived(self, robot: Robot) -> Robot:
         if robot.site == self._ground.base:
             return Robot("home", robot.site, heard=True)
         return robot._replace(kind="stop", time=robot.time + self._ground.stop[robot.site], heard=True,

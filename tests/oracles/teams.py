@@ -78,7 +78,8 @@ def random_plan(ground: Ground, seed: int, *, all_leave: bool = False) -> tuple[
     routes: list[tuple[int, ...]] = [()] * len(ground.robots)
     free = ground.everything
     for k in rng.permutation(len(ground.robots)).tolist():
-        here, ready, burnt, route = ground.base, 0.0, 0.0, []
+        here, ready, burnt = ground.base, 0.0, 0.0
+        route: list[int] = []
         while True:
             ways = [(j, arrival) for j in (*ground.pois, *ground.stations)
                     if (j in ground.stations and rng.random() < 0.4) or free & ground.bit.get(j, 0)
