@@ -181,6 +181,7 @@ class _Play:
             heapq.heappush(self._events, (now, _STOP, robot.number))
         else:
             robot.leg = _Leg(to=orders.route[1], departed_s=now, due_s=now + self._schedule(robot, orders.route[1]))
+            robot.remaining = orders.route[2:]
             self._report_missing(robot, now)
 
     def _schedule(self, robot: _Robot, to: str) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -59,8 +59,7 @@ def _solved(rest: Rest, home: Mapping[str, _Way]) -> dict[str, tuple[str, ...]]:
     """The best orders of vehicles that all have a safe way home; empty for those that do best to go home."""
     instance = instance_of_rest(rest)
     known = knowledge_of(instance)
-    known.orders[tuple(_visits(instance, afield, legs) for afield, legs in zip(
-        rest.vehicles, known.legs_by_vehicle, strict=True))] = None
+    known.orders[_visits(instance, rest, known.legs_by_vehicle)] = None
     own, unit = in_own_units(instance)
     limits = SolveLimits()
     exact = len(rest.open_pois) <= MOST_POIS
@@ -84,8 +83,12 @@ def _goal(own: Instance, rest: Rest, home: Mapping[str, _Way], unit: float) -> G
     return Goal(weights=weights, discounts=discounts)
 
 
-def _visits(instance: Instance, afield: Afield, legs: VehicleLegs) -> tuple[int, ...]:
-    """The POIs of its old orders that are still open, if it can visit them: a plan to start from."""
-    order = tuple(instance.sites.index(site) for site in afield.orders if site in instance.sites)
-    order = tuple(k for k in order if k != instance.base and k not in instance.stations)
-    return order if quickest_route(legs, order) is not None else ()
+def _visits(instance: Instance, rest: Rest, legs: Sequence[VehicleLegs]) -> tuple[tuple[int, ...], ...]:
+    """The POIs of the old orders that are still open, of vehicles that can visit them: a plan to start from."""
+    visits, taken = [], {instance.base, *instance.stations}
+    for afield, own_legs in zip(rest.vehicles, legs, strict=True):
+        order = tuple(instance.sites.index(site) for site in afield.orders if site in instance.sites)
+        order = tuple(k for k in order if k not in taken)
+        visits.append(order if quickest_route(own_legs, order) is not None else ())
+        taken.update(visits[-1])
+    return tuple(visits)

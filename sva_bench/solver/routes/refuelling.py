@@ -150,6 +150,8 @@ def _hops(own_legs: VehicleLegs, here: int, there: int) -> list[_Hop]:
         return own_legs.hops[here, there]
     found = []
     for k, first in enumerate(own_legs.stations):
+        if first == here:  # a robot that sets off from a station doesn't go there first
+            continue
         for last_number, last in enumerate(own_legs.stations):
             hop = _Hop(own_legs.fuel_s[here][first],
                        own_legs.time_s[here][first] + own_legs.chain_s[k][last_number] + own_legs.time_s[last][there],

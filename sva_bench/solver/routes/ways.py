@@ -144,7 +144,8 @@ def _ways(own_legs: VehicleLegs, here: int, there: int) -> list[Passage]:
     fuel, time = own_legs.fuel_s, own_legs.time_s
     found = [Passage(time[here][there], fuel[here][there], fuel[here][there], fuel[here][there], ())]
     for k, first in enumerate(own_legs.stations):
-        if not fuel[here][first] <= own_legs.capacity_s:
+        # A vehicle that sets off from a station doesn't go there first.
+        if first == here or not fuel[here][first] <= own_legs.capacity_s:
             continue
         for last, chains in _station_chains(own_legs, k).items():
             if fuel[own_legs.stations[last]][there] <= own_legs.capacity_s:
