@@ -22,8 +22,8 @@ ROOMS = (
 )
 # The same within the solver, whose rooms are many.
 SOLVER = (
-    "polling", "program", "highs", "outcomes", "risk", "discounts", "goal", "units", "preprocess", "routes", "knowledge", "problem",
-    "flow", "columns", "methods", "solve", "ties", "finished", "two_stage",
+    "polling", "program", "highs", "outcomes", "risk", "discounts", "goal", "units", "preprocess", "routes",
+    "knowledge", "problem", "flow", "columns", "methods", "solve", "ties", "finished", "two_stage",
 )
 ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet": ("execution/engines/bullet.py",), "pybullet_data": ("execution/engines/bullet.py",),

@@ -141,6 +141,46 @@ def test_the_best_discounted_route_is_the_one_that_listing_finds(seed: int) -> N
         assert reduced(graph, route, vehicle, reward, dual) == pytest.approx(found.best, abs=1e-8)
 
 
+def walks(graph: Graph, memory: np.ndarray, mask: int, route: tuple[int, ...], time: float) -> Iterator[
+        tuple[int, ...]]:
+    """All ng-routes of a pricing graph without stations, and without fuel."""
+    for j in range(len(graph.bit)):
+        later = time + graph.time_s[route[-1], j]
+        if graph.legs[route[-1], j] and later <= graph.limit_s:
+            if j == graph.base:
+                yield (*route, j)
+            elif not mask >> int(graph.bit[j]) & 1:
+                left = mask & int(memory[j, 0]) | 1 << int(graph.bit[j])
+                yield from walks(graph, memory, left, (*route, j), later)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_labels_that_forget_visits_find_the_best_route_that_may_repeat_them(seed: int) -> None:
+    # With few memories a label that has paid more duals can be the better one: only if the site is likely reached.
+    rng, n = np.random.default_rng((seed, 3)), 5
+    at = rng.uniform(0, 10, (n, 2))
+    fuel = np.hypot(*(at[:, None] - at[None]).transpose(2, 0, 1)) * rng.uniform(1, 1.3, (n, n)) + 1.0
+    np.fill_diagonal(fuel, 0.0)
+    reward, dual = np.append(0.0, rng.uniform(5, 40, n - 1)), np.append(0.0, rng.uniform(0, 8, n - 1))
+    vehicle = Vehicle(name="a", fuel_capacity_s=math.inf, mission_limit_s=32.0, availability=1.0, incentives=reward,
+                      fuel_s=fuel)
+    instance = Instance(name="x", sites=("b", "p", "q", "r", "s"), base=0, stations=(), stop_s=np.zeros(n),
+                        vehicles=(vehicle,))
+    home = float(rng.choice([0.0, 30.0]))
+    discount = Discount(survival=float(rng.choice([0.7, 1.0])), rate=float(rng.choice([0.02, 0.08])), home=home,
+                        departure=home)
+    graph = graph_of(instance, scope_of(instance, vehicle, reward > 0), discount)
+    memory = np.zeros((n, 1), dtype=np.uint64)
+    memory[1:, 0] = [np.uint64(1 << k | int(rng.integers(16)) & int(rng.integers(16))) for k in range(n - 1)]
+    usable = [j for j in range(n) if j == 0 or not graph.metric or graph.arrival[j] * reward[j] > dual[j]]
+    worth = [reduced(graph, route, vehicle, reward, dual) for route in walks(graph, memory, 0, (0,), 0.0)
+             if set(route) <= set(usable)]
+    found = price(graph, reward, dual, 0.0, memory, threshold=0.0, exact=True, most_routes=5, most_labels=10**6,
+                  cut_duals=cut_duals_of((), np.zeros(0), 0, n))
+    assert found.complete
+    assert found.best == pytest.approx(max([0.0, *worth]), abs=1e-8)
+
+
 def test_the_best_way_refuels_after_the_richest_poi_though_that_takes_longer() -> None:
     # base, station, p1, p2. The quickest way, base r p1 p2 base, takes 1 + 3 + 2 + 4 = 10 s and is at p1 after 4 s;
     # base p1 r p2 base takes 3.5 + 5 + 3.5 + 4 = 16 s and is there after 3.5 s. Without a refuel 9.5 s exceed 9 s.
