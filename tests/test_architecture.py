@@ -22,8 +22,8 @@ ROOMS = (
 )
 # The same within the solver, whose rooms are many.
 SOLVER = (
-    "polling", "program", "highs", "outcomes", "risk", "goal", "units", "preprocess", "routes", "knowledge", "problem",
-    "flow", "columns", "methods", "solve", "two_stage", "rest",
+    "polling", "program", "highs", "outcomes", "risk", "discounts", "goal", "units", "preprocess", "routes",
+    "knowledge", "problem", "flow", "columns", "methods", "solve", "ties", "finished", "two_stage", "rest",
 )
 ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet": ("execution/engines/bullet.py",), "pybullet_data": ("execution/engines/bullet.py",),

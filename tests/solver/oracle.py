@@ -224,7 +224,7 @@ def _chance(instance: Instance, vehicle: Vehicle, visits: int, driven: float) ->
 
 
 def _best_ways(instance: Instance, vehicle: Vehicle) -> dict[frozenset[int], float]:
-    """Greatest value of a route for every set of POIs, 0 for none: labels (site, visited, fuel, time, driven, value)."""
+    """Greatest value of a route for every set of POIs: labels (site, visited, fuel, time, driven, value)."""
     pois = set(instance.pois)
     found = {frozenset[int](): 0.0}
     front: dict[tuple[int, frozenset[int]], list[tuple[float, float, float, float]]] = {}

@@ -338,6 +338,8 @@ def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold
                 cut_state_b, of_site_b):
     """For each forward label the backward label that completes it to the best route above the threshold.
 
+    Long because compiled: nested loops over arrays that each part would need.
+
     Returns:
         Value, forward label, and backward label or -1 for a leg straight to the base; of each route found.
     """

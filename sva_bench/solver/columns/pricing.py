@@ -17,6 +17,9 @@ from sva_bench.solver.polling import stop_flag
 
 STEPS = 500  # of time, for completion bounds
 MOST_STEPS = 4000
+_MIDDLE = 0.6  # share of the limit up to which labels grow from the start under a discount: from the end, without
+# knowing their probability to be reached, more of them stay undominated
+_TYPICAL = 0.3  # share of the greatest worth of the rest, and probability of a site, at which heuristic runs compare
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,25 +69,29 @@ def price(
     if len(cut_duals.dual) and not plain:
         raise ValueError("discounted labels can't account for the duals of cuts")
     subgraph = pricing_graph(graph, reward, dual, cut_duals)
-    legs, time, fuel, base, half = subgraph.legs, subgraph.time_s, subgraph.fuel_s, subgraph.base, graph.limit_s / 2
+    legs, time, fuel, base = subgraph.legs, subgraph.time_s, subgraph.fuel_s, subgraph.base
+    half = graph.limit_s * (0.5 if plain else _MIDDLE)
     memory = memory[subgraph.sites] if exact else np.full((len(legs), subgraph.words), np.uint64(0xFFFFFFFFFFFFFFFF))
     none = np.zeros((0, len(legs)))
     step, ahead_bound, behind_bound = bounds_of(graph, subgraph, charge) if exact else (1.0, none, none)
     following, count = _adjacent(legs)
     stop, survival, arrival = stop_flag(), subgraph.survival, subgraph.arrival
-    # What the rest of a route is worth if it is reached, and the probability to reach it: both within a range.
-    least, rest = graph.least_survival, np.full(len(legs), home + float(np.maximum(subgraph.reward, 0.0).sum()))
+    # What the rest of a route is worth if it is reached, and the probability to reach it: both within a range, over
+    # which a label dominates; heuristic runs take one value of it.
+    rest = home + float(np.maximum(subgraph.reward, 0.0).sum())
+    low, high = (home * graph.least_survival, rest) if exact else (_TYPICAL * rest, _TYPICAL * rest)
+    least, most = (graph.least_survival, arrival) if exact else (_TYPICAL, np.full_like(arrival, _TYPICAL))
     ahead = behind = extend_labels(
         following, count, time, fuel, subgraph.bit, memory, subgraph.reward, subgraph.dual, charge, not plain, survival,
-        home * least, rest, 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s, ahead_bound, step,
-        threshold, exact, True, most_labels, subgraph.in_cut, subgraph.in_memory, cut_duals.at_first_visit,
-        cut_duals.dual, stop, left_s)
+        low, np.full(len(legs), high), 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s,
+        ahead_bound, step, threshold, exact, True, most_labels, subgraph.in_cut, subgraph.in_memory,
+        cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     if not graph.symmetric:
         following, count = _adjacent(legs.T)
         behind = extend_labels(
             following, count, time.T.copy(), fuel.T.copy(), subgraph.bit, memory, subgraph.reward, subgraph.dual,
-            charge, not plain, survival.T.copy(), least, arrival, 0.0 if plain else home, base, half, graph.capacity_s,
-            graph.limit_s, behind_bound, step, threshold, exact, plain, most_labels, subgraph.in_cut,
+            charge, not plain, survival.T.copy(), least, most, 0.0 if plain else home, base, graph.limit_s - half,
+            graph.capacity_s, graph.limit_s, behind_bound, step, threshold, exact, plain, most_labels, subgraph.in_cut,
             subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     value, left, right = join_labels(
         legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, not plain, survival, arrival,

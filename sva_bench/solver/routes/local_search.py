@@ -49,8 +49,10 @@ def improve_order(order, length, base, fuel, time, first, last, hops, capacity, 
                   departure, home, scratch, spare, sums, stop):
     """Improve a route in place by 2-opt (reversals) and Or-opt (moves of up to three POIs) to a local optimum.
 
-    On a long route only moves are tried that save time without refuels. Ends early, with a route that is as
-    good as before or better, once ``stop`` is not 0.
+    Long because compiled: moves share arrays that each part would need.
+
+    On a long route only moves are tried that save time without refuels, or under a discount gain value. Ends early,
+    with a route that is as good as before or better, once ``stop`` is not 0.
     """
     now = route_time(order, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
     earned = route_value(order, length, base, weights, discounted, survival, departure, home)
