@@ -59,6 +59,17 @@ class ScenarioSummary(ScenarioFigures):
 
 
 @dataclass(frozen=True, kw_only=True)
+class UnitScenario(ScenarioFigures):
+    """One scenario of one world, variant and seed of a batch.
+
+    Attributes:
+        reactions: Results of teams that react, by policy and news, where they do.
+    """
+
+    reactions: Annotated[tuple[ReactionResult, ...] | None, BeforeValidator(not_null)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class ComparedScenario(ScenarioPlans):
     """One scenario of ``execute``: the comparison of every pair of plans, and their ranking.
 

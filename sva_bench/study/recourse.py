@@ -13,8 +13,8 @@ from sva_bench.analysis.reactions import PlanReacted
 from sva_bench.analysis.results import Promise
 from sva_bench.choices import PolicyName
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.drives import Drives, drive_all
+from sva_bench.execution.execute import Executed, drives_ahead, execute, planned_legs, settle_trials
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import Reacted, modelled_values, react
@@ -66,7 +66,8 @@ class Stage:
     Attributes:
         world, costs: The world and its fuel costs.
         instances: What the plans of each scenario were made for.
-        executed: Their trials without reaction: of ``run`` both plans', of ``execute`` those of the plans given.
+        executed: Their trials without reaction, all or as of ``observed``: of ``run`` both plans', of ``execute`` those
+            of the plans given.
         settings: How they are executed.
         executor: Where drives run; ``None`` = here.
         drives: What was driven already; what is driven now is added.
@@ -143,8 +144,8 @@ def _react(
     anticipative = {pair: Case(scenario=scene.scenario, planner="anticipative", plan=plan, role="anticipative")
                     for pair, (plan, _) in made.items()}
     # Without reaction too: by that the noise draws that were not observed are judged.
-    also = execute(stage.world, stage.costs, list(anticipative.values()), stage.settings, stage.executor, None,
-                   stage.drives)
+    also = observed(stage.world, stage.costs, list(anticipative.values()), stage.settings, stage.executor,
+                    stage.drives)
     without = {id(case): run for case, run in zip([*ours, *anticipative.values()], [*executed, *also], strict=True)}
     cases = [(pair, case) for pair in pairs for case in [*ours, *(own for k, own in anticipative.items() if k == pair)]]
     reacting = [replace(case, policy=policy, news=news) for (policy, news), case in cases]
@@ -160,6 +161,29 @@ def _react(
             for (whose, case), run in zip(cases, everything, strict=False) if whose == pair}
         results.append(summed(plans, made[pair][1] if pair in made else (), noisy=not stage.world.noise.silent))
     return ScenarioReactions(results=tuple(results), reacted=tuple(everything[:len(reacting)]))
+
+
+def observed(
+    world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings,
+    executor: Executor | None, drives: Drives,
+) -> list[Executed]:
+    """A few trials of each case without reaction, with its margins under every noise draw.
+
+    Args:
+        world, costs: The world and its fuel costs.
+        cases: The cases.
+        settings: As of all trials.
+        executor: Where drives run; ``None`` = here.
+        drives: What was driven already; what is driven now is added.
+    """
+    few = replace(settings, trials=min(settings.trials, settings.rollouts), recorded=False)
+    if settings.fidelity == "physics":  # each trial has its own drives
+        return execute(world, costs, cases, few, executor, None, drives)
+    ahead = drives_ahead(world, costs, cases, settings)
+    wanted = dict.fromkeys(ahead.wanted, False)
+    drive_all(ahead.courses.chunks(wanted, drives), drives, executor, None)
+    ahead.courses.compose(wanted, drives)
+    return settle_trials(world, cases, few, drives.routes, planned_legs(world, costs, cases))
 
 
 Anticipated = tuple[Plan, tuple[Candidate, ...]]
