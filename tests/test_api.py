@@ -306,7 +306,7 @@ def test_given_plans_react_and_anticipate_nothing(world: sb.World) -> None:
         sb.execute(world, plan, policy="resolve", anticipate=True, **QUICK)
     with pytest.raises(BadInput, match="^news: no policy reacts"):
         sb.execute(world, plan, news="instant", **QUICK)
-    sb.execute(world, plan, policy=["none", "resolve"], news="report,instant", **QUICK)
+    sb.execute(world, plan, policy=["none", "resolve"], news=["report", "instant"], **QUICK)
 
 
 def test_inputs_of_a_wrong_type_are_value_errors(world: sb.World) -> None:

@@ -42,9 +42,13 @@ def _row(key: _Key, by_map: _ByMap, *, sure: bool) -> ReactionOverMaps:
 
     return ReactionOverMaps(
         variant=variant, scenario=scenario, policy=policy, news=news, maps=len(by_map), vss=gain(vss_of),
-        value_of_recourse={name: gain(lambda result, name=name: result.value_of_recourse[name]) for name in plans},
+        value_of_recourse={name: gain(_recourse_of(name)) for name in plans},
         vss_with_recourse=gain(lambda result: result.vss_with_recourse),
         anticipation=gain(lambda result: result.anticipation))
+
+
+def _recourse_of(plan: str) -> Callable[[ReactionResult], Gain]:
+    return lambda result: result.value_of_recourse[plan]
 
 
 def vss_of(result: ReactionResult) -> Gain:

@@ -12,22 +12,23 @@ from sva_bench.analysis.over_maps import BatchSummary
 from sva_bench.batch.folder import write
 from sva_bench.batch.reactions_over_maps import vss_of
 
-GainT = TypeVar("GainT", covariant=True)
+GainT = TypeVar("GainT")
+Gain_co = TypeVar("Gain_co", covariant=True)
 
 
-class _Reaction(Protocol[GainT]):
+class _Reaction(Protocol[Gain_co]):
     """Figures of a reaction, of one map and seed or over maps."""
 
     @property
-    def value_of_recourse(self) -> Mapping[str, GainT]:
+    def value_of_recourse(self) -> Mapping[str, Gain_co]:
         """What reacting adds to each plan."""
 
     @property
-    def vss_with_recourse(self) -> GainT:
+    def vss_with_recourse(self) -> Gain_co:
         """The best plan for the policy less the deterministic one."""
 
     @property
-    def anticipation(self) -> GainT:
+    def anticipation(self) -> Gain_co:
         """The best plan for the policy less the stochastic one."""
 
 
