@@ -139,7 +139,7 @@ def _react(
     executed = [run for run in stage.executed if run.case.scenario.name == scene.scenario.name]
     made: dict[Reaction, Anticipated] = {}
     if options.anticipate:
-        made = plan_for_reactions(scene, pairs, {run.case.planner: run.case.plan for run in executed}, options.limits)
+        made = plan_for_reactions(scene, pairs, [run.case for run in executed], options.limits)
     ours = [run.case for run in executed]
     anticipative = {pair: Case(scenario=scene.scenario, planner="anticipative", plan=plan, role="anticipative")
                     for pair, (plan, _) in made.items()}
@@ -191,21 +191,29 @@ Anticipated = tuple[Plan, tuple[Candidate, ...]]
 
 
 def plan_for_reactions(
-    scene: _Scene, pairs: Sequence[Reaction], plans: Mapping[str, Plan], limits: SolveLimits
+    scene: _Scene, pairs: Sequence[Reaction], ours: Sequence[Case], limits: SolveLimits
 ) -> dict[Reaction, Anticipated]:
     """The anticipative plan for each reaction: of plans that are optimal for more or less reliable robots the best.
+
+    What is solved already isn't solved again: the deterministic plan is the one for robots that never fail, and the
+    stochastic one that for robots as they are, if it was made for the failure process executed.
 
     Args:
         scene: The scenario.
         pairs: Policy and news of each reaction.
-        plans: Plans that are candidates too.
+        ours: Both plans, which are candidates too.
         limits: When each solve may stop.
     """
-    candidates: dict[str, tuple[float | None, Plan]] = {name: (None, plan) for name, plan in plans.items()}
-    known = knowledge_of(scene.instance)
+    known, world = knowledge_of(scene.instance), scene.stage.world
+    thetas = {"deterministic": 0.0, **({"stochastic": 1.0} if world.plan_failure == world.execute_failure else {})}
+    candidates = {case.planner: (thetas.get(case.role), case.plan) for case in ours}
+    solved = {_reliability(more_reliable(scene.instance, thetas[case.role])) for case in ours if case.role in thetas}
     for exponent in THETAS:
-        plan = unless_interrupted(plan_stochastic(more_reliable(scene.instance, exponent), limits, known=known))
-        candidates[f"survival^{exponent:g}"] = exponent, plan
+        instance = more_reliable(scene.instance, exponent)
+        if _reliability(instance) not in solved:
+            solved.add(_reliability(instance))
+            plan = unless_interrupted(plan_stochastic(instance, limits, known=known))
+            candidates[f"survival^{exponent:g}"] = exponent, plan
     distinct: dict[str, tuple[float | None, Plan]] = {}
     for name, (theta, plan) in candidates.items():
         if not any(plan.drives_like(other) for _, other in distinct.values()):
@@ -235,3 +243,8 @@ def more_reliable(instance: Instance, theta: float) -> Instance:
             vehicle.mtbf_s / theta if theta > 0 else float("inf"))
         vehicles.append(replace(vehicle, availability=vehicle.availability**theta, mtbf_s=mtbf_s))
     return replace(instance, vehicles=tuple(vehicles), joint=None)
+
+
+def _reliability(instance: Instance) -> tuple[tuple[float, float | None], ...]:
+    """By which instances that differ in reliability alone are told apart."""
+    return tuple((vehicle.availability, vehicle.mtbf_s) for vehicle in instance.vehicles)

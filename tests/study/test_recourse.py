@@ -22,6 +22,8 @@ from sva_bench.execution.react import Reacted, react
 from sva_bench.files.records import as_dict
 from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.solver.rest import plan_rest
+from sva_bench.solver.two_stage import plan_stochastic
+from sva_bench.study import recourse
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.given_plans import InfeasiblePlan
 from tests.worlds_for_tests import SMALL, world_of
@@ -178,3 +180,30 @@ def test_a_summary_with_reactions_is_read_as_it_was_written(world: sb.World) -> 
     data["scenarios"][0]["reactions"][0]["ranking"].pop()
     with pytest.raises(ValueError, match="ranking"):
         from_dict(ComparisonSummary, data)
+
+
+def test_the_plan_for_a_reaction_is_the_best_of_all_that_were_tried(ours: sb.Result[Summary]) -> None:
+    for scenario in ours.summary.scenarios:
+        for row in results_of(ours.summary, scenario.name):
+            best = max(candidate.modelled for candidate in row.candidates)
+            assert row.plans["anticipative"].modelled == best == max(plan.modelled for plan in row.plans.values())
+
+
+def test_only_what_isnt_solved_yet_is_solved_for_a_reaction(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solved: list[tuple[float, ...]] = []
+
+    def counted(instance: sb.Instance, *others: Any, **named: Any) -> sb.Plan:
+        solved.append(tuple(vehicle.availability for vehicle in instance.vehicles))
+        return plan_stochastic(instance, *others, **named)
+
+    monkeypatch.setattr(recourse, "plan_stochastic", counted)
+    wanted: dict[str, Any] = {"policy": "resolve", "anticipate": True, **QUICK, "trials": 4}
+    # Under "half" uv2 is there half of the time; theta 0 and 1 are those of both plans. Under "safe" nothing fails.
+    sb.run(world_of(tmp_path), **wanted)
+    assert solved == [(1.0, 0.5**theta) for theta in (0.25, 0.5, 0.75)]
+    # A plan for other failures than those executed is no plan for them.
+    solved.clear()
+    sb.run(world_of(tmp_path), scenario="half", plan_failure="mission", execute_failure="per_leg", **wanted)
+    assert solved == [(1.0, 0.5**theta) for theta in (0.25, 0.5, 0.75, 1.0)]
