@@ -302,9 +302,9 @@ def test_an_argument_of_a_wrong_type_is_a_value_error(world: sb.World, wrong: di
 
 def test_given_plans_react_and_anticipate_nothing(world: sb.World) -> None:
     plan = sb.Plan(routes={"uv1": ("base", "p1", "base")})
-    with pytest.raises(BadInput, match="^anticipate: execute makes no plans"):
+    with pytest.raises(BadInput, match=r"^anticipate: execute makes no plans"):
         sb.execute(world, plan, policy="resolve", anticipate=True, **QUICK)
-    with pytest.raises(BadInput, match="^news: no policy reacts"):
+    with pytest.raises(BadInput, match=r"^news: no policy reacts"):
         sb.execute(world, plan, news="instant", **QUICK)
     sb.execute(world, plan, policy=["none", "resolve"], news=["report", "instant"], **QUICK)
 

@@ -271,7 +271,7 @@ def test_a_reaction_of_an_option_is_complained_of_by_the_option_even_beside_a_fi
     sweep = tmp_path / "sweep.yaml"
     sweep.write_text(SWEEP + "policy: resolve\nnews: report\n", encoding="utf-8")
     grid_of(sweep_of([sweep], Sweep()))
-    with pytest.raises(BadInput, match="^--news: small has no station to hear it at"):
+    with pytest.raises(BadInput, match=r"^--news: small has no station to hear it at"):
         grid_of(sweep_of([sweep], Sweep(news=("station",))))
 
 
@@ -284,7 +284,7 @@ def test_varied_reactions_have_an_effect_unless_an_option_says_otherwise(
     assert caplog.messages == []
     grid_of(Sweep(worlds=(path,), vary=vary, policies=("none",)))
     assert "reaction.policy=\"resolve\" changes nothing" in caplog.text
-    with pytest.raises(BadInput, match='^--set reaction.news="soon": input should be'):
+    with pytest.raises(BadInput, match=r'^--set reaction.news="soon": input should be'):
         grid_of(Sweep(worlds=(path,), vary={"reaction.policy": ["resolve"], "reaction.news": ["soon"]}))
 
 

@@ -64,13 +64,14 @@ def test_news_at_stations_takes_a_station_whoever_asks_for_it(
     assert "bare.yaml:33: reaction.news: there is no station to hear it at" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(("world", "options", "asks_for"), [
     ("w.yaml", (), "the policy resolve, or a reaction"), ("w.yaml", ("--policy", "none"), "the policy resolve"),
     ("reacts.yaml", ("--policy", "none"), "the policy resolve"),
     ("w.yaml", ("--policy", "resolve", "--news", "never"), "news other than never"),
 ])
 def test_nothing_is_anticipated_where_nobody_reacts(
-    world: str, options: tuple[str, ...], asks_for: str, folder: Path, capsys: pytest.CaptureFixture[str]
+    world: str, options: tuple[str, ...], asks_for: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for command in (["run"], ["batch", "--dry-run"]):
         assert run_command_line([*command, world, "--anticipate", *options]) == 2
@@ -79,7 +80,8 @@ def test_nothing_is_anticipated_where_nobody_reacts(
         assert asks_for in said
 
 
-def test_execute_says_who_makes_plans_for_a_reaction(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("folder")
+def test_execute_says_who_makes_plans_for_a_reaction(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line(["execute", "w.yaml", "p.json", "--policy", "resolve", "--anticipate"]) == 2
     assert "execute makes no plans; run --anticipate does" in capsys.readouterr().err
 
@@ -111,7 +113,8 @@ def test_a_batch_takes_them_and_its_folder_keeps_them(folder: Path) -> None:
     assert run_command_line([*words, "--resume"]) == 0
 
 
-def test_a_batch_is_not_gone_on_with_under_another_reaction(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_batch_is_not_gone_on_with_under_another_reaction(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["batch", "w.yaml", *QUICK, "--cache", "cache", "--policy", "resolve", "--out", "b", "--resume"]
     assert run_command_line(words) == 0
     capsys.readouterr()
@@ -119,7 +122,8 @@ def test_a_batch_is_not_gone_on_with_under_another_reaction(folder: Path, capsys
     assert 'options.news (absent there, ["instant"] now)' in capsys.readouterr().err
 
 
-def test_a_check_says_how_the_team_reacts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_check_says_how_the_team_reacts(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line(["world", "check", "reacts.yaml"]) == 0
     assert "the team reacts to failures: policy resolve, news instant" in capsys.readouterr().out
     assert run_command_line(["world", "check", "w.yaml"]) == 0

@@ -45,7 +45,7 @@ def test_words_are_taken_in_the_order_given_with_commas_or_one_by_one(
 @pytest.mark.parametrize(("parse", "option", "known"), LISTS)
 @pytest.mark.parametrize("mistake", [
     lambda known: [f"{known[0]},"], lambda known: [f",{known[0]}"], lambda known: [f"{known[0]},,{known[1]}"],
-    lambda known: [" "], lambda known: [f"{known[0]},{known[0]}"], lambda known: [known[0], known[1], known[0]],
+    lambda _: [" "], lambda known: [f"{known[0]},{known[0]}"], lambda known: [known[0], known[1], known[0]],
     lambda known: [f"{known[0]}x"], lambda known: [known[0].upper()], lambda known: [f"{known[0]} {known[1]}"]])
 def test_a_word_that_is_missing_unknown_or_a_duplicate_is_refused_by_its_option(
     parse: Parse, option: str, known: tuple[str, ...], mistake: Callable[[tuple[str, ...]], list[str]]
@@ -82,7 +82,7 @@ def test_every_policy_that_reacts_meets_all_news_once_in_the_order_given(
     world = reacting(own)
     pairs = reactions_of(world, Options(policies=tuple(policies), news=tuple(news)))
     assert len(set(pairs)) == len(pairs)
-    asked = [name for name in policies or [own.policy] if name != "none"]
+    asked: list[PolicyName] = [name for name in policies or [own.policy] if name != "none"]
     heard = news or [own.news if own.policy != "none" else USUAL_NEWS]
     assert set(pairs) == set(product(asked, heard))
     places = [(asked.index(policy), heard.index(when)) for policy, when in pairs]
@@ -109,7 +109,7 @@ def test_what_passes_has_somebody_to_hear_it_somewhere_and_something_to_anticipa
     nowhere = not stations and "station" in {when for _, when in pairs}
     nothing = anticipate and not {when for _, when in pairs} - {"never"}
     if unheard or nowhere or nothing:
-        with pytest.raises(BadInput, match="^--(news|anticipate): ") as refused:
+        with pytest.raises(BadInput, match=r"^--(news|anticipate): ") as refused:
             check_reactions(world, policies, news, anticipate=anticipate)
         assert str(refused.value).startswith("--news" if unheard or nowhere else "--anticipate")
     else:

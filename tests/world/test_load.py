@@ -107,7 +107,7 @@ def test_a_world_file_gives_its_world(tmp_path: Path) -> None:
     ("name: small\n", "name: small\nfailure: sometimes\n", "failure", "'mission' or 'per_leg'"),
     ("name: small\n", "name: small\ninteraction: shared\n", None, "this version knows only"),
     ("name: small\n", "name: small\nreaction: {policy: resolv}\n", "reaction.policy", "'none' or 'resolve'"),
-    ("name: small\n", "name: small\nreaction: {policy: resolve, news: soon}\n", "reaction.news", "'report' or 'instant'"),
+    ("name: small\n", "name: small\nreaction: {policy: resolve, news: soon}\n", "reaction.news", "or 'instant'"),
     ("name: small\n", "name: small\nreaction: {polcy: resolve}\n", "reaction.polcy", "did you mean 'policy'"),
     ("name: small\n", "name: small\nreaction: resolve\n", "reaction", "expected a mapping"),
     ("name: small\n", "name: small\nreaction: {policy: none, news: report}\n", "reaction.news", "no use for news"),
