@@ -76,7 +76,7 @@ def population(world: World, draws: int) -> Population:
     ahead = drives_ahead(world, costs, tuple(cases), settings)
     return Population(world=world, cases=tuple(cases), expected=expected, draws=draws,
                       planned=planned_legs(world, costs, cases),
-                      drives=ahead.routes([drive_tasks(chunk.tasks) for chunk in ahead.chunks]))
+                      drives=ahead.drives([drive_tasks(chunk.tasks) for chunk in ahead.chunks]).routes)
 
 
 class Truths:

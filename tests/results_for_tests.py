@@ -11,11 +11,10 @@ from sva_bench.analysis.results import (
     Ledger,
     PlanFigures,
     PlanResult,
-    ScenarioFigures,
     Vss,
     VssFigures,
 )
-from sva_bench.analysis.scenarios import ScenarioSummary
+from sva_bench.analysis.scenarios import ScenarioSummary, UnitScenario
 from sva_bench.analysis.summaries import Failures, Reach, Summary, Travel
 
 Interval = tuple[float, float]
@@ -44,7 +43,7 @@ def vss(mean: float, ci95: Interval | None = None, pct: float | None = None) -> 
 
 def unit(world: str, mean: float, pct: float | None = None, availability: float = 0.5) -> UnitSummary:
     """A map under one seed."""
-    scenario = ScenarioFigures(
+    scenario = UnitScenario(
         name="S", availability={"uv1": availability}, plans={"stochastic": figures(mean), "deterministic": figures(0)},
         vss=vss(mean, pct=pct), vss_mean_value=None, vss_mean_value_executed=None, ws=None, evpi=None,
         value_of_process=None)

@@ -278,10 +278,9 @@ MISTYPED: list[tuple[dict[str, Any], str]] = [
     ({"trials": "many"}, "trials: expected an integer, found str 'many'"), ({"trials": 1.5}, "trials"),
     ({"trials": True}, "trials"), ({"fidelity": 3}, "fidelity: expected a word"), ({"out": 3}, "out: expected a path"),
     ({"scenario": 3}, "scenario"), ({"margin": "a"}, "margin"), ({"evpi": 1}, "evpi: expected True or False"),
-    ({"progress": 3}, "progress"), ({"out": b"x"}, "out: expected a path"),
-    ({"world": 3}, "world: expected a world or the path of its file, found int 3"),
-    ({"policy": 3}, "policy: expected a name"),
+    ({"progress": 3}, "progress"), ({"out": b"x"}, "out: expected a path"), ({"policy": 3}, "policy: expected a name"),
     ({"news": []}, "news: expected a name or a list"), ({"anticipate": "yes"}, "anticipate: expected True or False"),
+    ({"world": 3}, "world: expected a world or the path of its file, found int 3"),
 ]
 
 

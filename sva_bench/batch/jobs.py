@@ -10,7 +10,7 @@ import numpy as np
 
 from sva_bench.analysis.summaries import Facts
 from sva_bench.arrays import FloatArray
-from sva_bench.batch.shards import Shard, shard_of
+from sva_bench.batch.shards import Reactions, Shard, shard_of
 from sva_bench.choices import PathPlanner
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import DriveTask, RouteKey, drive_tasks
@@ -160,6 +160,7 @@ class TrialsJob:
         facts: What is known of the plans before any trial.
         drives: All routes driven, but for ``physics``, which needs ``costs`` to make its own.
         planned: What each leg of the routes takes as planned.
+        reactions: What came of its point and seed with reactions, of the first range of trials.
     """
 
     kind: ClassVar[str] = "trials"
@@ -176,6 +177,7 @@ class TrialsJob:
     drives: Mapping[RouteKey, Driven]
     planned: PlannedLegs
     costs: Mapping[str, FuelCosts]
+    reactions: Reactions
 
     @property
     def key(self) -> str:
@@ -194,7 +196,7 @@ class TrialsJob:
             executed = execute(self.world, self.costs, self.cases, settings)
         else:
             executed = settle_trials(self.world, self.cases, settings, self.drives, self.planned)
-        return shard_of(self.world, self.variant, executed, settings, self.facts)
+        return shard_of(self.world, self.variant, executed, settings, self.facts, self.reactions)
 
     def fits(self, result: Shard) -> bool:
         """The shard of its trials."""

@@ -173,7 +173,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
         from sva_bench.batch.aggregates import summary_of
         from sva_bench.batch.folder import at_work, failures_in, settings_in, units_in
         from sva_bench.batch.grid import grid_of
-        from sva_bench.cli.watching import over_maps, print_failed
+        from sva_bench.cli.watching import over_maps, print_failed, reactions_over_maps
         from sva_bench.files.records import as_dict
 
     refuse_closed_output()
@@ -187,6 +187,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     if as_json:
         print_json({"format": "sva-bench/batch-status@1", "at_work": running, "units": len(units), "done": len(done),
                     "aggregate": [as_dict(row) for row in summary.aggregate],
+                    **({"reactions": [as_dict(row) for row in summary.reactions]} if summary.reactions else {}),
                     "failed": [as_dict(unit) for unit in summary.failed]})
         return
     console = results()
@@ -196,6 +197,8 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
                   highlight=False)
     if done:
         console.print(over_maps(summary.aggregate, "VSS over maps, so far"))
+        if summary.reactions:
+            console.print(reactions_over_maps(summary.reactions))
     print_failed(summary.failed, console)
 
 

@@ -14,6 +14,7 @@ from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
+from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     answer,
@@ -37,6 +38,8 @@ def print_summary(summary: AnySummary) -> None:
         for scenario in summary.scenarios:
             if scenario.comparisons:
                 console.print(f"{scenario.name}: {ranked(scenario)}", highlight=False, markup=False)
+        for said in reaction_lines(summary):
+            console.print(said, highlight=False, markup=False)
     console.print(answer(summary), highlight=False)
     for said in remarks(summary):
         console.print(said, highlight=False)

@@ -135,13 +135,13 @@ class Ahead:
     wanted: tuple[RouteKey, ...]
     chunks: tuple[Chunk, ...]
 
-    def routes(self, driven: Sequence[Sequence[Driven]]) -> dict[RouteKey, Driven]:
-        """The routes, from what came of each chunk."""
+    def drives(self, driven: Sequence[Sequence[Driven]]) -> Drives:
+        """The routes and what they are composed of, from what came of each chunk."""
         drives = Drives()
         for chunk, results in zip(self.chunks, driven, strict=True):
             receive(drives, chunk, results)
         self.courses.compose(self.wanted, drives)
-        return drives.routes
+        return drives
 
 
 def drives_ahead(
