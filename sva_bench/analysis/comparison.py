@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from sva_bench.analysis.figures import difference_figure
+from sva_bench.analysis.moments import Figure
 from sva_bench.analysis.over_trials import Judged, plan_result, totals, verdict_of
 from sva_bench.analysis.results import Comparison, GivenPlanResult, Ranked
 from sva_bench.analysis.scenarios import ComparedScenario
@@ -33,10 +34,20 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
 
 
 def _comparison(a: Executed, b: Executed, pairs: int, *, noisy: bool) -> Comparison:
-    beyond = difference_figure(a, b, noisy=noisy)
-    single, simultaneous = estimate(beyond), estimate(beyond, comparisons=pairs)
-    names = a.case.planner, b.case.planner
-    same = a.case.plan.drives_like(b.case.plan)
+    return comparison_of(difference_figure(a, b, noisy=noisy), (a.case.planner, b.case.planner), pairs,
+                         same=a.case.plan.drives_like(b.case.plan))
+
+
+def comparison_of(difference: Figure, names: tuple[str, str], pairs: int, *, same: bool) -> Comparison:
+    """The comparison of two plans.
+
+    Args:
+        difference: Value of the first less that of the second.
+        names: What they go by.
+        pairs: Number of pairs whose intervals hold simultaneously.
+        same: Whether they have the same routes.
+    """
+    single, simultaneous = estimate(difference), estimate(difference, comparisons=pairs)
     return Comparison(a=names[0], b=names[1], mean=single.mean, ci95=single.ci95, ci95_adjusted=simultaneous.ci95,
                       distinguishable=simultaneous.excludes_zero, same_plan=same,
                       verdict=verdict_of(simultaneous, *names, same=same))

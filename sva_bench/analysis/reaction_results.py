@@ -10,12 +10,14 @@ from pydantic import Field
 
 from sva_bench.analysis.results import (
     Amount,
+    Comparison,
     Distribution,
     Estimate,
     Interval,
     Ledger,
     PlanFigures,
     PlanName,
+    Ranked,
     VssFigures,
     Words,
 )
@@ -88,33 +90,55 @@ class Candidate(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReactionResult(Record):
+class ReactionFigures(Record):
     """One scenario under one policy and one kind of news.
 
     Attributes:
         policy, news: What the team does, and when it learns of a failure.
         histories: Whether all histories were played or a sample.
         plans: Results of the plans.
-        vss: Stochastic less deterministic plan under the policy; of either sign.
         value_of_recourse: What reacting adds to each plan, in per cent of its value without.
-        vss_with_recourse: The best plan for the policy less the deterministic one, in per cent of the best.
-        anticipation: The best plan for the policy less the stochastic one, in per cent of the best.
-        best: Which plan is the best.
-        candidates: The plans that ``anticipative`` was chosen from; none without it.
     """
 
     policy: PolicyName
     news: News
     histories: HistoryMode
     plans: Annotated[Mapping[PlanName, ReactingPlan], Field(min_length=1)]
-    vss: VssFigures
     value_of_recourse: Mapping[PlanName, Gain]
-    vss_with_recourse: Gain
-    anticipation: Gain
-    best: BestPlan
-    candidates: tuple[Candidate, ...] = ()
 
     @property
     def name(self) -> str:
         """As shown to people."""
         return f"{self.policy} on {self.news} news"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReactionResult(ReactionFigures):
+    """The plans of ``run`` in one scenario under one policy and one kind of news.
+
+    Attributes:
+        vss: Stochastic less deterministic plan under the policy; of either sign.
+        vss_with_recourse: The best plan for the policy less the deterministic one, in per cent of the best.
+        anticipation: The best plan for the policy less the stochastic one, in per cent of the best.
+        best: Which plan is the best.
+        candidates: The plans that ``anticipative`` was chosen from; none without it.
+    """
+
+    vss: VssFigures = field(metadata=stands_after("plans"))
+    vss_with_recourse: Gain
+    anticipation: Gain
+    best: BestPlan
+    candidates: tuple[Candidate, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparedReaction(ReactionFigures):
+    """The plans of ``execute`` in one scenario under one policy and one kind of news, compared pair by pair.
+
+    Attributes:
+        comparisons: Every pair of plans under the policy, by the same histories or trials.
+        ranking: The plans from best to worst.
+    """
+
+    comparisons: tuple[Comparison, ...] = field(metadata=stands_after("plans"))
+    ranking: tuple[Ranked, ...] = field(metadata=stands_after("comparisons"))

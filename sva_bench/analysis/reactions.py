@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
+from sva_bench.analysis.comparison import comparison_of, ranking
 from sva_bench.analysis.figures import mean_taken
 from sva_bench.analysis.moments import Bounds, Clusters, Figure, Moments, figure_of
 from sva_bench.analysis.over_trials import percent, verdict_of
 from sva_bench.analysis.reaction_results import (
     BestPlan,
     Candidate,
+    ComparedReaction,
     Gain,
     ReactingPlan,
     ReactionLedger,
@@ -70,6 +73,23 @@ def reaction_result(
         value_of_recourse={name: _recourse(plan, noisy=noisy) for name, plan in plans.items()},
         vss_with_recourse=gain("deterministic"), anticipation=gain("stochastic"),
         best=_best(plans, ranked, noisy=noisy), candidates=tuple(candidates))
+
+
+def compared_reaction(
+    plans: Mapping[str, PlanReacted], candidates: Sequence[Candidate] = (), *, noisy: bool  # noqa: ARG001
+) -> ComparedReaction:
+    """The results of given plans under one policy and news; the arguments are those of ``reaction_result``."""
+    some = next(iter(plans.values())).reacted
+    results = {name: _plan(plan, noisy=noisy) for name, plan in plans.items()}
+    pairs = list(combinations(plans, 2))
+    comparisons = [comparison_of(
+        _difference(plans[a], plans[b], noisy=noisy), (a, b), len(pairs),
+        same=plans[a].reacted.case.plan.drives_like(plans[b].reacted.case.plan)) for a, b in pairs]
+    return ComparedReaction(
+        policy=some.case.policy, news=some.case.news, histories="enumerated" if some.enumerated else "sampled",
+        plans=results, comparisons=tuple(comparisons),
+        ranking=ranking({name: plan.executed.mean for name, plan in results.items()}, comparisons),
+        value_of_recourse={name: _recourse(plan, noisy=noisy) for name, plan in plans.items()})
 
 
 def _plan(plan: PlanReacted, *, noisy: bool) -> ReactingPlan:
@@ -179,4 +199,3 @@ def _modelled(run: Reacted) -> float:
 
 def _distribution(run: Reacted) -> Distribution:
     return weighted_distribution(run.value.sum(axis=1), run.weight)
-

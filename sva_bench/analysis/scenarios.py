@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.reaction_results import ComparedReaction, ReactionResult
 from sva_bench.analysis.results import (
     AssumptionRow,
     Comparison,
@@ -60,19 +60,29 @@ class ScenarioSummary(ScenarioFigures):
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedScenario(ScenarioPlans):
-    """One scenario of ``execute``: the comparison of every pair of plans, and their ranking."""
+    """One scenario of ``execute``: the comparison of every pair of plans, and their ranking.
+
+    Attributes:
+        reactions: The same of teams that react, by policy and news, where they do.
+    """
 
     plans: Annotated[Mapping[PlanName, GivenPlanResult], Field(min_length=1)]
     comparisons: tuple[Comparison, ...]
     ranking: tuple[Ranked, ...]
+    reactions: Annotated[tuple[ComparedReaction, ...] | None, BeforeValidator(not_null)] = None
 
     @model_validator(mode="after")
     def _is_consistent(self) -> ComparedScenario:
         _refuse_other_robots(self.plans, self.availability)
-        if sorted(row.plan for row in self.ranking) != sorted(self.plans):
-            raise ValueError("ranking: expected each of 'plans' once")
-        if not {name for pair in self.comparisons for name in (pair.a, pair.b)} <= set(self.plans):
-            raise ValueError("comparisons: expected pairs of 'plans'")
+        for number, reaction in enumerate(self.reactions or ()):
+            if list(reaction.plans) != list(self.plans) or list(reaction.value_of_recourse) != list(self.plans):
+                raise ValueError(f"reactions[{number}]: expected the plans of the scenario, in its order")
+        ranked: tuple[ComparedScenario | ComparedReaction, ...] = self, *(self.reactions or ())
+        for each in ranked:
+            if sorted(row.plan for row in each.ranking) != sorted(self.plans):
+                raise ValueError("ranking: expected each of 'plans' once")
+            if not {name for pair in each.comparisons for name in (pair.a, pair.b)} <= set(self.plans):
+                raise ValueError("comparisons: expected pairs of 'plans'")
         return self
 
 

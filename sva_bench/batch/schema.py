@@ -12,7 +12,7 @@ from sva_bench.analysis.over_maps import GivenUp
 from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, low_and_high
 from sva_bench.analysis.summaries import Facts
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
-from sva_bench.choices import ENDS, Fidelity, Objective, PathPlanner
+from sva_bench.choices import ENDS, Fidelity, News, Objective, PathPlanner, PolicyName
 from sva_bench.files.fields import Name, NonNegativeInt, Number, Seed
 from sva_bench.files.records import Record
 
@@ -36,6 +36,9 @@ class OptionsEntry(Record):
     time_limit_s: Annotated[Number, Field(ge=0)] | None
     gap: Annotated[Number, Field(ge=0)]
     evpi: bool
+    policies: tuple[PolicyName, ...] = field(default_factory=tuple)
+    news: tuple[News, ...] = field(default_factory=tuple)
+    anticipate: bool | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,15 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.chance import Drawn, Histories, History
-from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all
+from sva_bench.execution.chance import Chance, Drawn, Histories
+from sva_bench.execution.drives import Courses, Drives, drive_all
 from sva_bench.execution.execute import orders_of, planned_legs
 from sva_bench.execution.fate import draw_fate
-from sva_bench.execution.outcome import Assignment, RobotFate
+from sva_bench.execution.known_legs import KnownLegs, Stops, longest
+from sva_bench.execution.outcome import Assignment
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.rules import LegDriven
-from sva_bench.execution.settling import figures_of
+from sva_bench.execution.settling import FIGURES, figures_of
 from sva_bench.execution.team import Team, TeamOutcome, play
 from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.travel.fuel import FuelCosts
@@ -30,7 +32,10 @@ from sva_bench.world.model import World
 MOST_HISTORIES = 10_000
 """Histories of a plan under all noise draws up to which they are enumerated."""
 
-Stops = tuple[str, ...]
+MOST_TRIALS_HELD = 20_000_000
+"""Robots' missions of all cases that are sampled, at some 150 bytes each."""
+
+_FIGURES = ("end", *FIGURES, "left_over")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,7 +58,7 @@ class Reacted:
         nominal: Value of the team if each leg is driven as planned: of each trial, or of all histories together,
             shape (rows,) or ().
         bounds: Least and greatest value of a team: all robots lost, or every POI visited by the one that earns most.
-        played: The missions themselves, by row.
+        played: The missions themselves, by row; none unless recorded.
     """
 
     case: Case
@@ -86,63 +91,37 @@ class Reacted:
         return np.zeros(self.incentive.shape)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Row:
-    """A mission as it was played."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Mission:
+    """A mission as it was played.
 
-    rollout: int
-    weight: float
-    history: int
-    played: TeamOutcome
+    Attributes:
+        figures: Those of ``_FIGURES``, robot by robot, shape (figures, robots).
+        reacted, doubled: As of ``Reacted``.
+        played: The mission itself, where it is kept.
+    """
+
+    figures: FloatArray
+    reacted: bool
+    doubled: int
+    played: TeamOutcome | None
 
 
-class _Legs:
-    """Driving times of legs: as driven, or as planned where that is unknown yet."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Rows:
+    """All rows of a case; missions that are alike are there once.
 
-    def __init__(self, world: World, costs: Mapping[str, FuelCosts], settings: Settings) -> None:
-        self._world, self._composed = world, settings.fidelity == "rollout"
-        self._models = [robot.model.name for robot in world.robots]
-        self._names = [robot.name for robot in world.robots]
-        self._number = {site.name: k for k, site in enumerate(world.sites)}
-        self._planned = {model: (cost.repaired_ms / 1000).tolist() for model, cost in costs.items()}
-        self._scheduled = {model: cost.cost_s.tolist() for model, cost in costs.items()}
-        self._driven: dict[tuple[int, int, Stops], LegDriven] = {}
-        self.missing: dict[RouteKey, bool] = {}
+    Attributes:
+        missions: The missions.
+        which: Which of them each row is, shape (rows,).
+        rollout, history, weight: As of ``Reacted``.
+    """
 
-    def scheduled_s(self, robot: int, origin: str, destination: str) -> float:
-        """What the plan reckons with, margin included [s]."""
-        cost_s: float = self._scheduled[self._models[robot]][self._number[origin]][self._number[destination]]
-        return cost_s
-
-    def planned(self, robot: int, stops: Stops) -> LegDriven:
-        """The last leg as planned, without margin."""
-        row = self._planned[self._models[robot]][self._number[stops[-2]]]
-        return LegDriven(row[self._number[stops[-1]]])
-
-    def driven(self, rollout: int) -> Callable[[int, Stops], LegDriven]:
-        """The last leg as it was driven under a noise draw; what isn't known is noted in ``missing``.
-
-        Up to ``rollout`` a leg begins at rest in its origin's own pose; else it depends on all stops before it.
-        """
-        def leg(robot: int, stops: Stops) -> LegDriven:
-            key = stops[-2:] if self._composed else stops
-            found = self._driven.get((robot, rollout, key))
-            if found is None:
-                self.missing[self._names[robot], key, rollout, 0] = False
-                return self.planned(robot, stops)
-            return found
-
-        return leg
-
-    def learn(self, keys: Iterable[RouteKey], drives: Drives) -> None:
-        """Take in what was driven."""
-        for key in keys:
-            name, stops, rollout, _ = key
-            robot, driven = self._names.index(name), drives.routes[key]
-            last = len(driven.leg_s) - 1
-            for leg, (time_s, contacts) in enumerate(zip(driven.leg_s.tolist(), driven.contacts.tolist(), strict=True)):
-                self._driven[robot, rollout, stops[: leg + 2]] = LegDriven(
-                    time_s, driven.stuck and leg == last, contacts)
+    missions: Sequence[_Mission]
+    which: IntArray
+    rollout: IntArray
+    history: IntArray
+    weight: FloatArray
 
 
 def react(
@@ -151,7 +130,8 @@ def react(
 ) -> list[Reacted]:
     """Execute plans whose teams react, all histories or all trials of each.
 
-    Histories are enumerated for all cases or for none, so that they can be compared.
+    Histories are enumerated for all cases or for none, so that they can be compared. Missions are played again only as
+    long as legs of them are unknown.
 
     Args:
         world: The world.
@@ -162,19 +142,23 @@ def react(
         executor: Where drives run; ``None`` = here.
         progress: Called with the number of drives done and of all.
         drives: What was driven already; what is driven now is added.
+
+    Raises:
+        BadInput: If there are more trials to be sampled than fit in memory.
     """
     drives = Drives() if drives is None else drives
-    legs, courses = _Legs(world, costs, settings), Courses(world, costs, settings)
+    legs, courses = KnownLegs(world, costs, settings), Courses(world, costs, settings)
     teams = [_team(world, costs, case, policy, legs) for case, policy in zip(cases, policies, strict=True)]
     plays = _plays(world, cases, teams, settings, legs)
-    while True:
-        rows = [each.rows(legs) for each in plays]
-        if not legs.missing:
-            break
-        wanted, legs.missing = _longest(legs.missing), {}
+    for each in plays:
+        each.want(legs)
+    rows: list[_Rows] = []
+    while legs.missing or not rows:
+        wanted, legs.missing = longest(legs.missing), {}
         drive_all(courses.chunks(wanted, drives), drives, executor, progress)
         courses.compose(wanted, drives)
         legs.learn(wanted, drives)
+        rows = [each.rows(legs) for each in plays]
     return [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
 
 
@@ -182,32 +166,31 @@ def modelled_values(
     world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], policies: Sequence[Policy], settings: Settings,
 ) -> list[float]:
     """Mean value of each case if every leg is driven as planned: over all histories if they are few, or over trials."""
-    legs = _Legs(world, costs, settings)
+    legs = KnownLegs(world, costs, settings)
     teams = [_team(world, costs, case, policy, legs) for case, policy in zip(cases, policies, strict=True)]
     return [each.modelled for each in _plays(world, cases, teams, settings, legs)]
 
 
 def _plays(
-    world: World, cases: Sequence[Case], teams: Sequence[Team], settings: Settings, legs: _Legs
+    world: World, cases: Sequence[Case], teams: Sequence[Team], settings: Settings, legs: KnownLegs
 ) -> Sequence[_Enumerated | _Sampled]:
     """Cases played on planned times: all histories of each, or all trials of each."""
     enumerated = [_Enumerated(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
     if all(each.begin(legs) for each in enumerated):
         return enumerated
+    held = settings.trials * len(world.robots) * len(cases)
+    if held > MOST_TRIALS_HELD:
+        raise BadInput(f"{settings.trials} trials of {len(cases)} plans with and without reaction: the histories of "
+                       f"{world.name} are too many to go through all, and at most "
+                       f"{MOST_TRIALS_HELD // (len(world.robots) * len(cases))} trials can be sampled (--trials), or "
+                       "more of fewer reactions (--policy, --news)")
     sampled = [_Sampled(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
     for each in sampled:
         each.begin(legs)
     return sampled
 
 
-def _longest(missing: Mapping[RouteKey, bool]) -> dict[RouteKey, bool]:
-    """The routes of which no other is a longer version."""
-    shorter = {(name, stops[:k], rollout, trial) for name, stops, rollout, trial in missing
-               for k in range(2, len(stops))}
-    return {key: traced for key, traced in missing.items() if key not in shorter}
-
-
-def _team(world: World, costs: Mapping[str, FuelCosts], case: Case, policy: Policy, legs: _Legs) -> Team:
+def _team(world: World, costs: Mapping[str, FuelCosts], case: Case, policy: Policy, legs: KnownLegs) -> Team:
     return Team(orders=tuple(orders_of(world, case, planned_legs(world, costs, [case]))), base=world.sites[0].name,
                 pois=frozenset(site.name for site in world.pois), policy=policy, news=case.news,
                 scheduled_s=legs.scheduled_s)
@@ -219,6 +202,32 @@ class _Plays:
     def __init__(self, world: World, case: Case, team: Team, settings: Settings) -> None:
         self._world, self._case, self._team, self._settings = world, case, team, settings
         self._robots = tuple(robot.name for robot in world.robots)
+        self._used: dict[tuple[int, Stops], None] = {}
+
+    def _play(self, chance: Chance, driven: Callable[[int, Stops], LegDriven]) -> _Mission:
+        """Play one mission."""
+        played = play(self._team, chance, driven)
+        left = [_worth(own, pois) for own, pois in zip(self._team.orders, played.left_over, strict=True)]
+        return _Mission(figures=np.array([*figures_of(played.robots).values(), left]), doubled=played.doubled,
+                        reacted=any(reaction.after for reaction in played.reactions),
+                        played=played if self._settings.recorded else None)
+
+    def _reacted(self, rows: _Rows, trial: IntArray, nominal: FloatArray, *, enumerated: bool) -> Reacted:
+        """Rows as arrays."""
+        orders, which = self._team.orders, rows.which
+        columns = np.array([mission.figures for mission in rows.missions])
+        figures = {name: columns[which, k] for k, name in enumerate(_FIGURES)}
+        return Reacted(
+            case=self._case, robots=self._robots, enumerated=enumerated, trial=trial, rollout=rows.rollout,
+            history=rows.history, weight=rows.weight, nominal=nominal,
+            available=figures["available"].astype(np.bool_), lost=figures["lost"].astype(np.bool_),
+            **{name: figures[name] for name in ("incentive", "value", "end_time_s", "fuel_used_s", "left_over")},
+            **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
+            reacted=np.array([mission.reacted for mission in rows.missions])[which],
+            doubled=np.array([mission.doubled for mission in rows.missions], dtype=np.int64)[which],
+            played=tuple(m.played for m in (rows.missions[k] for k in which.tolist()) if m.played is not None),
+            bounds=(-sum(own.loss_cost for own in orders), sum(
+                max(own.incentives.get(poi, 0.0) for own in orders) for poi in sorted(self._team.pois))))
 
     @property
     def _terms(self) -> PlanningTerms:
@@ -229,18 +238,26 @@ class _Plays:
 class _Enumerated(_Plays):
     """All histories of a case under each noise draw."""
 
-    _nominal = 0.0
-
-    def begin(self, legs: _Legs) -> bool:
-        """Play all histories on planned times; whether they are few enough."""
-        most = MOST_HISTORIES // min(self._settings.rollouts, self._settings.trials)
+    def __init__(self, world: World, case: Case, team: Team, settings: Settings) -> None:
+        super().__init__(world, case, team, settings)
+        self._draws = min(settings.rollouts, settings.trials)
         self._nominal = 0.0
+        self._final: dict[int, list[tuple[float, _Mission]]] = {}
+
+    def begin(self, legs: KnownLegs) -> bool:
+        """Play all histories on planned times; whether they are few enough."""
+        most = MOST_HISTORIES // self._draws
+        self._nominal, driven = 0.0, legs.noting(self._used)
         for number, history in enumerate(self._histories()):
             if number >= most:
                 return False
-            played = play(self._team, history, legs.planned)
+            played = play(self._team, history, driven)
             self._nominal += history.weight * sum(robot.value for robot in played.robots)
         return True
+
+    def want(self, legs: KnownLegs) -> None:
+        """Ask for the legs that are driven if each takes as long as planned."""
+        legs.want(self._used, range(self._draws))
 
     @property
     def modelled(self) -> float:
@@ -250,20 +267,32 @@ class _Enumerated(_Plays):
     def _histories(self) -> Histories:
         return Histories(self._terms, self._case.scenario.joint, self._robots)
 
-    def rows(self, legs: _Legs) -> list[_Row]:
+    def rows(self, legs: KnownLegs) -> _Rows:
         """All histories under each noise draw."""
-        draws = min(self._settings.rollouts, self._settings.trials)
-        return [_Row(rollout=rollout, weight=history.weight / draws, history=number, played=played)
-                for rollout in range(draws) for number, (history, played) in enumerate(self._played(legs, rollout))]
+        found = [self._under(legs, rollout) for rollout in range(self._draws)]
+        missions = [mission for each in found for _, mission in each]
+        return _Rows(
+            missions=missions, which=np.arange(len(missions)),
+            rollout=np.repeat(np.arange(self._draws), [len(each) for each in found]),
+            history=np.concatenate([np.arange(len(each)) for each in found]),
+            weight=np.array([weight / self._draws for each in found for weight, _ in each]))
 
-    def _played(self, legs: _Legs, rollout: int) -> list[tuple[History, TeamOutcome]]:
-        driven = legs.driven(rollout)
-        return [(history, play(self._team, history, driven)) for history in self._histories()]
+    def _under(self, legs: KnownLegs, rollout: int) -> list[tuple[float, _Mission]]:
+        """Probability and mission of all histories under a noise draw."""
+        if rollout in self._final:
+            return self._final[rollout]
+        driven, misses = legs.driven(rollout), legs.misses
+        found = []
+        for history in self._histories():
+            mission = self._play(history, driven)
+            found.append((history.weight, mission))  # a history's weight is known once it is played
+        if legs.misses == misses:
+            self._final[rollout] = found
+        return found
 
-    def reacted(self, rows: Sequence[_Row]) -> Reacted:
+    def reacted(self, rows: _Rows) -> Reacted:
         """The rows as arrays."""
-        return _reacted(self._case, self._team, self._robots, rows, np.arange(len(rows)), np.array(self._nominal),
-                        enumerated=True)
+        return self._reacted(rows, np.arange(len(rows.which)), np.array(self._nominal), enumerated=True)
 
 
 class _Sampled(_Plays):
@@ -272,66 +301,59 @@ class _Sampled(_Plays):
     def __init__(self, world: World, case: Case, team: Team, settings: Settings) -> None:
         super().__init__(world, case, team, settings)
         self._fate = draw_fate(world, case.scenario, [len(world.pois)] * len(world.robots), settings)
+        drawn = np.column_stack([self._fate.fails, self._fate.lifetime_s])
+        _, self._first, self._fate_of = np.unique(drawn, axis=0, return_index=True, return_inverse=True)
+        pairs = self._fate_of.ravel() * settings.rollouts + self._fate.rollout
+        kinds, self._kind_of = np.unique(pairs, return_inverse=True)
+        self._kinds = [divmod(kind, settings.rollouts) for kind in kinds.tolist()]
         self._nominal = np.zeros(settings.trials)
+        self._used_by: list[dict[tuple[int, Stops], None]] = []
+        self._final: dict[int, _Mission] = {}
 
-    def _fates(self) -> list[tuple[RobotFate, ...]]:
-        return [tuple(self._fate.of(row, robot) for robot in range(len(self._robots)))
-                for row in range(self._settings.trials)]
+    def _drawn(self, fate: int) -> Drawn:
+        row = int(self._first[fate])
+        return Drawn([self._fate.of(row, robot) for robot in range(len(self._robots))])
 
-    def begin(self, legs: _Legs) -> bool:
+    def begin(self, legs: KnownLegs) -> bool:
         """Play all trials on planned times."""
-        known: dict[tuple[RobotFate, ...], float] = {}
-        for row, fates in enumerate(self._fates()):
-            if fates not in known:
-                played = play(self._team, Drawn(fates), legs.planned)
-                known[fates] = sum(robot.value for robot in played.robots)
-            self._nominal[row] = known[fates]
+        values = np.zeros(len(self._first))
+        for fate in range(len(values)):
+            used: dict[tuple[int, Stops], None] = {}
+            played = play(self._team, self._drawn(fate), legs.noting(used))
+            values[fate] = sum(robot.value for robot in played.robots)
+            self._used_by.append(used)
+        self._nominal = values[self._fate_of.ravel()]
         return True
+
+    def want(self, legs: KnownLegs) -> None:
+        """Ask for the legs that are driven if each takes as long as planned."""
+        for fate, rollout in self._kinds:
+            legs.want(self._used_by[fate], [rollout])
+        self._used_by = []
 
     @property
     def modelled(self) -> float:
         """Mean value on planned times."""
         return float(self._nominal.mean())
 
-    def rows(self, legs: _Legs) -> list[_Row]:
+    def rows(self, legs: KnownLegs) -> _Rows:
         """All trials, each under its noise draw."""
-        known: dict[tuple[tuple[RobotFate, ...], int], TeamOutcome] = {}
-        rows = []
-        for row, fates in enumerate(self._fates()):
-            rollout = int(self._fate.rollout[row])
-            if (fates, rollout) not in known:
-                known[fates, rollout] = play(self._team, Drawn(fates), legs.driven(rollout))
-            rows.append(_Row(rollout=rollout, weight=1 / self._settings.trials, history=-1,
-                             played=known[fates, rollout]))
-        return rows
+        missions = []
+        for kind, (fate, rollout) in enumerate(self._kinds):
+            mission, misses = self._final.get(kind), legs.misses
+            if mission is None:
+                mission = self._play(self._drawn(fate), legs.driven(rollout))
+                if legs.misses == misses:
+                    self._final[kind] = mission
+            missions.append(mission)
+        trials = self._settings.trials
+        return _Rows(missions=missions, which=self._kind_of, rollout=self._fate.rollout,
+                     history=np.full(trials, -1), weight=np.full(trials, 1 / trials))
 
-    def reacted(self, rows: Sequence[_Row]) -> Reacted:
+    def reacted(self, rows: _Rows) -> Reacted:
         """The rows as arrays."""
-        trials = self._settings.first + np.arange(len(rows))
-        return _reacted(self._case, self._team, self._robots, rows, trials, self._nominal, enumerated=False)
-
-
-def _reacted(
-    case: Case, team: Team, robots: tuple[str, ...], rows: Sequence[_Row], trial: IntArray, nominal: FloatArray, *,
-    enumerated: bool,
-) -> Reacted:
-    played = tuple(row.played for row in rows)
-    columns = [figures_of([mission.robots[number] for mission in played]) for number in range(len(robots))]
-    figures = {name: np.column_stack([column[name] for column in columns]) for name in columns[0]}
-    return Reacted(
-        case=case, robots=robots, enumerated=enumerated, trial=trial,
-        rollout=np.array([row.rollout for row in rows], dtype=np.int64),
-        history=np.array([row.history for row in rows], dtype=np.int64), weight=np.array([row.weight for row in rows]),
-        available=figures["available"].astype(np.bool_), lost=figures["lost"].astype(np.bool_),
-        incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],
-        fuel_used_s=figures["fuel_used_s"],
-        **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
-        left_over=np.array([[_worth(own, mission.left_over[number]) for number, own in enumerate(team.orders)]
-                            for mission in played]),
-        reacted=np.array([any(r.after for r in mission.reactions) for mission in played]),
-        doubled=np.array([mission.doubled for mission in played], dtype=np.int64), nominal=nominal, played=played,
-        bounds=(-sum(own.loss_cost for own in team.orders), sum(
-            max(own.incentives.get(poi, 0.0) for own in team.orders) for poi in sorted(team.pois))))
+        trials = self._settings.first + np.arange(len(rows.which))
+        return self._reacted(rows, trials, self._nominal, enumerated=False)
 
 
 def _worth(orders: Assignment, pois: Iterable[str]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from sva_bench.choices import NEWS, POLICY_NAMES, USUAL_NEWS, News, PolicyName
@@ -68,10 +69,18 @@ def pairs_of(world: World, policies: Sequence[PolicyName], news: Sequence[News])
                                for when in heard))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Misfit:
+    """An option that doesn't go with the world or with the others, and the problem with it."""
+
+    option: str
+    problem: str
+
+
 def misfit(
     world: World, policies: Sequence[PolicyName], news: Sequence[News], *, anticipate: bool
-) -> tuple[str, str] | None:
-    """Option that doesn't go with the world or the others, and the problem with it; ``None`` = all fit.
+) -> Misfit | None:
+    """What doesn't fit among these options and the world; ``None`` = they all do.
 
     Args:
         world: The world.
@@ -80,13 +89,14 @@ def misfit(
     """
     pairs = pairs_of(world, policies, news)
     if not pairs and any(when != "never" for when in news):
-        return "news", "no policy reacts to it; add the policy resolve, or leave the news out"
+        return Misfit(option="news", problem="no policy reacts to it; add the policy resolve, or leave the news out")
     if any(when == "station" for _, when in pairs) and not world.stations:
-        return "news", (f"{world.name} has no station to hear it at; place one under sites.stations, or choose report "
-                        "or instant")
+        return Misfit(option="news", problem=f"{world.name} has no station to hear it at; place one under "
+                                             "sites.stations, or choose report or instant")
     if anticipate and all(when == "never" for _, when in pairs):
         missing = "news other than never" if pairs else "the policy resolve, or a reaction to the world file"
-        return "anticipate", f"plans for a reaction to failures, and there is none; add {missing}"
+        return Misfit(option="anticipate", problem=f"plans for a reaction to failures, and {world.name} has none; add "
+                                                   f"{missing}")
     return None
 
 
@@ -99,7 +109,7 @@ def check_reactions(
         BadInput: If one doesn't.
     """
     if found := misfit(world, policies, news, anticipate=anticipate):
-        raise BadInput(f"--{found[0]}: {found[1]}")
+        raise BadInput(f"--{found.option}: {found.problem}")
 
 
 def refuse_to_anticipate(*, asked: bool) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
 
 from sva_bench.analysis.over_trials import promise_of
-from sva_bench.analysis.reaction_results import Candidate, ReactionResult
-from sva_bench.analysis.reactions import PlanReacted, reaction_result
+from sva_bench.analysis.reaction_results import Candidate
+from sva_bench.analysis.reactions import PlanReacted
+from sva_bench.analysis.results import Promise
 from sva_bench.choices import PolicyName
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
@@ -22,7 +24,7 @@ from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.solver.rest import plan_rest
 from sva_bench.solver.two_stage import SolveLimits, knowledge_of, plan_stochastic
 from sva_bench.study.options import Options, reactions_of
-from sva_bench.study.planning import Planned
+from sva_bench.study.planning import unlimited
 from sva_bench.study.reacting import Reaction
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -34,8 +36,18 @@ _ELSEWHERE = 1 << 40
 """First trial of those by which candidates are judged, so that the chosen one is measured on others."""
 
 
+ResultT = TypeVar("ResultT", covariant=True)
+
+
+class Summing(Protocol[ResultT]):
+    """What makes one result of a scenario's plans under one policy and news."""
+
+    def __call__(self, plans: Mapping[str, PlanReacted], candidates: Sequence[Candidate], *, noisy: bool) -> ResultT:
+        """The result; ``candidates`` are the plans that the anticipative one was chosen from."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ScenarioReactions:
+class ScenarioReactions(Generic[ResultT]):
     """What came of one scenario with reactions.
 
     Attributes:
@@ -43,118 +55,151 @@ class ScenarioReactions:
         reacted: Trials or histories of each plan with each of them.
     """
 
-    results: tuple[ReactionResult, ...]
+    results: tuple[ResultT, ...]
     reacted: tuple[Reacted, ...]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Stage:
-    """A scenario's world, with all that reactions need."""
+class Stage:
+    """A world's plans without reaction, and what they are executed with.
+
+    Attributes:
+        world, costs: The world and its fuel costs.
+        instances: What the plans of each scenario were made for.
+        executed: Their trials without reaction: of ``run`` both plans', of ``execute`` those of the plans given.
+        settings: How they are executed.
+        executor: Where drives run; ``None`` = here.
+        drives: What was driven already; what is driven now is added.
+    """
 
     world: World
     costs: Mapping[str, FuelCosts]
+    instances: Mapping[str, Instance]
+    executed: Sequence[Executed]
+    settings: Settings
+    executor: Executor | None
+    drives: Drives
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Scene:
+    """One scenario of a stage, with all that reactions need.
+
+    Attributes:
+        stage: The stage.
+        scenario: The scenario.
+        instance: Its instance under the failure process executed.
+        policies: The policies by name; all plans share what was decided before.
+    """
+
+    stage: Stage
     scenario: Scenario
     instance: Instance
-    settings: Settings
     policies: Mapping[PolicyName, Policy]
 
     def policies_of(self, cases: Iterable[Case]) -> list[Policy]:
-        """The policy of each case; all share what was decided before."""
+        """The policy of each case."""
         return [self.policies[case.policy] for case in cases]
+
+    def promise_of(self, plan: Plan) -> Promise:
+        """The values of a plan before any trial; one that breaks fuel or limit has them too."""
+        return promise_of(plan, expected_value(unlimited(self.instance), plan))
 
 
 def react_in_scenarios(
-    world: World, costs: Mapping[str, FuelCosts], planned: Mapping[str, Planned], executed: Sequence[Executed],
-    options: Options, settings: Settings, executor: Executor | None, drives: Drives, progress: OnProgress,
-) -> dict[str, ScenarioReactions]:
-    """Execute the plans of each scenario with every reaction asked for.
+    stage: Stage, options: Options, summed: Summing[ResultT], progress: OnProgress
+) -> dict[str, ScenarioReactions[ResultT]]:
+    """Execute the plans of each scenario with every reaction asked for; nothing where there is none.
 
     Args:
-        world, costs: The world and its fuel costs.
-        planned: The plans of each scenario.
-        executed: Their trials without reaction.
-        options, settings: As of the run.
-        executor: Where drives run; ``None`` = here.
-        drives: What was driven already; what is driven now is added.
+        stage: The plans and their trials without reaction.
+        options: The reactions, whether plans are made for them, and when solves may stop.
+        summed: Makes the result of each reaction.
         progress: Called as scenarios are done.
     """
-    pairs = reactions_of(world, options)
-    found: dict[str, ScenarioReactions] = {}
+    world, pairs = stage.world, reactions_of(stage.world, options)
+    found: dict[str, ScenarioReactions[ResultT]] = {}
     for number, scenario in enumerate(world.scenarios if pairs else ()):
         progress("reacting", number, len(world.scenarios))
-        instance = replace(planned[scenario.name].instance, failure=world.execute_failure)
+        instance = replace(stage.instances[scenario.name], failure=world.execute_failure)
         means = Means(instance=instance, plans_rest=plan_rest)
-        stage = _Stage(world=world, costs=costs, scenario=scenario, instance=instance, settings=settings,
+        scene = _Scene(stage=stage, scenario=scenario, instance=instance,
                        policies={name: POLICIES[name](means) for name in POLICIES})
-        mine = [run for run in executed if run.case.scenario.name == scenario.name
-                and run.case.role in ("stochastic", "deterministic")]
-        found[scenario.name] = _react(stage, pairs, mine, options, executor, drives)
+        found[scenario.name] = _react(scene, pairs, options, summed)
         progress("reacting", number + 1, len(world.scenarios))
     return found
 
 
-def _react(stage: _Stage, pairs: Sequence[Reaction], executed: Sequence[Executed], options: Options,
-           executor: Executor | None, drives: Drives) -> ScenarioReactions:
+def _react(
+    scene: _Scene, pairs: Sequence[Reaction], options: Options, summed: Summing[ResultT]
+) -> ScenarioReactions[ResultT]:
     """Execute a scenario's plans with each policy and news."""
-    made: dict[Reaction, tuple[Plan, tuple[Candidate, ...]]] = {}
+    stage = scene.stage
+    executed = [run for run in stage.executed if run.case.scenario.name == scene.scenario.name]
+    made: dict[Reaction, Anticipated] = {}
     if options.anticipate:
-        made = plan_for_reactions(stage, pairs, {run.case.planner: run.case.plan for run in executed}, options.limits)
+        made = plan_for_reactions(scene, pairs, {run.case.planner: run.case.plan for run in executed}, options.limits)
     ours = [run.case for run in executed]
-    anticipative = {pair: Case(scenario=stage.scenario, planner="anticipative", plan=plan, role="anticipative")
+    anticipative = {pair: Case(scenario=scene.scenario, planner="anticipative", plan=plan, role="anticipative")
                     for pair, (plan, _) in made.items()}
     # Without reaction too: by that the noise draws that were not observed are judged.
-    also = execute(stage.world, stage.costs, list(anticipative.values()), stage.settings, executor, None, drives)
+    also = execute(stage.world, stage.costs, list(anticipative.values()), stage.settings, stage.executor, None,
+                   stage.drives)
     without = {id(case): run for case, run in zip([*ours, *anticipative.values()], [*executed, *also], strict=True)}
     cases = [(pair, case) for pair in pairs for case in [*ours, *(own for k, own in anticipative.items() if k == pair)]]
     reacting = [replace(case, policy=policy, news=news) for (policy, news), case in cases]
     kept = list({id(case): case for _, case in cases}.values())
-    everything = react(stage.world, stage.costs, [*reacting, *kept], stage.policies_of([*reacting, *kept]),
-                       stage.settings, executor, None, drives)
+    everything = react(stage.world, stage.costs, [*reacting, *kept], scene.policies_of([*reacting, *kept]),
+                       stage.settings, stage.executor, None, stage.drives)
     idle = {id(case): run for case, run in zip(kept, everything[len(reacting):], strict=True)}
     results = []
     for pair in pairs:
         plans = {case.planner: PlanReacted(
-            promise=promise_of(case.plan, expected_value(stage.instance, case.plan)), reacted=run, kept=idle[id(case)],
-            executed=without[id(case)], trials=stage.settings.trials)
+            promise=scene.promise_of(case.plan), reacted=run, kept=idle[id(case)], executed=without[id(case)],
+            trials=stage.settings.trials)
             for (whose, case), run in zip(cases, everything, strict=False) if whose == pair}
-        results.append(reaction_result(plans, made[pair][1] if pair in made else (),
-                                       noisy=not stage.world.noise.silent))
+        results.append(summed(plans, made[pair][1] if pair in made else (), noisy=not stage.world.noise.silent))
     return ScenarioReactions(results=tuple(results), reacted=tuple(everything[:len(reacting)]))
 
 
+Anticipated = tuple[Plan, tuple[Candidate, ...]]
+"""The plan for a reaction, and all that were tried."""
+
+
 def plan_for_reactions(
-    stage: _Stage, pairs: Sequence[Reaction], plans: Mapping[str, Plan], limits: SolveLimits
-) -> dict[Reaction, tuple[Plan, tuple[Candidate, ...]]]:
+    scene: _Scene, pairs: Sequence[Reaction], plans: Mapping[str, Plan], limits: SolveLimits
+) -> dict[Reaction, Anticipated]:
     """The anticipative plan for each reaction: of plans that are optimal for more or less reliable robots the best.
 
     Args:
-        stage: The scenario.
+        scene: The scenario.
         pairs: Policy and news of each reaction.
         plans: Plans that are candidates too.
         limits: When each solve may stop.
     """
     candidates: dict[str, tuple[float | None, Plan]] = {name: (None, plan) for name, plan in plans.items()}
-    known = knowledge_of(stage.instance)
+    known = knowledge_of(scene.instance)
     for exponent in THETAS:
-        plan = unless_interrupted(plan_stochastic(more_reliable(stage.instance, exponent), limits, known=known))
+        plan = unless_interrupted(plan_stochastic(more_reliable(scene.instance, exponent), limits, known=known))
         candidates[f"survival^{exponent:g}"] = exponent, plan
     distinct: dict[str, tuple[float | None, Plan]] = {}
     for name, (theta, plan) in candidates.items():
         if not any(plan.drives_like(other) for _, other in distinct.values()):
             distinct[name] = theta, plan
+    stage = scene.stage
     elsewhere = replace(stage.settings, first=_ELSEWHERE, recorded=False)
-    found: dict[Reaction, tuple[Plan, tuple[Candidate, ...]]] = {}
+    found: dict[Reaction, Anticipated] = {}
     for pair in pairs:
         policy, news = pair
-        cases = [Case(scenario=stage.scenario, planner=name, plan=plan, policy=policy, news=news)
+        cases = [Case(scenario=scene.scenario, planner=name, plan=plan, policy=policy, news=news)
                  for name, (_, plan) in distinct.items()]
-        values = modelled_values(stage.world, stage.costs, cases, stage.policies_of(cases), elsewhere)
+        values = modelled_values(stage.world, stage.costs, cases, scene.policies_of(cases), elsewhere)
         tried = tuple(Candidate(plan=name, theta=theta, modelled=value)
                       for (name, (theta, _)), value in zip(distinct.items(), values, strict=True))
         best = max(tried, key=lambda candidate: candidate.modelled)  # of equals the first
-        made = replace(distinct[best.plan][1], objective="anticipative", value=best.modelled, bound=None,
-                       status="feasible", details={"made_for": f"{policy} on {news} news", "candidate": best.plan})
-        found[pair] = made, tried
+        chosen = replace(distinct[best.plan][1], objective="anticipative", value=best.modelled, bound=None,
+                         status="feasible", details={"made_for": f"{policy} on {news} news", "candidate": best.plan})
+        found[pair] = chosen, tried
     return found
 
 

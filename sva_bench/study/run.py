@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sva_bench.analysis.reactions import reaction_result
 from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case
@@ -20,7 +21,7 @@ from sva_bench.study.informed import cases_of, combined_trials
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, plan_scenarios, two_cases
 from sva_bench.study.publish import Run, Stopwatch, publish
-from sva_bench.study.recourse import react_in_scenarios
+from sva_bench.study.recourse import Stage, react_in_scenarios
 from sva_bench.study.summing import head_of, proved, summarise
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -95,7 +96,10 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
         summary = replace(summary, scenarios=tuple(
             replace(scenario, assumptions=tuple(rows[scenario.name])) for scenario in summary.scenarios))
     with clock.phase("reactions"):
-        reactions = react_in_scenarios(world, costs, planned, executed, options, settings, executor, drives, progress)
+        reactions = react_in_scenarios(Stage(
+            world=world, costs=costs, instances={name: p.instance for name, p in planned.items()}, settings=settings,
+            executed=[run for run in executed if run.case.role in ("stochastic", "deterministic")], executor=executor,
+            drives=drives), options, reaction_result, progress)
     if reactions:
         summary = replace(summary, scenarios=tuple(
             replace(scenario, reactions=reactions[scenario.name].results) for scenario in summary.scenarios))

@@ -11,13 +11,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from ruamel.yaml import YAML
 
+from sva_bench.choices import NEWS, POLICY_NAMES
 from sva_bench.errors import BadFile
 from sva_bench.mission.failures import mtbf_s
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.world.load import draw_incentives, load_world, world_as_dict
-from sva_bench.world.model import World, nominal_of
-from sva_bench.world.schema import Drawn
+from sva_bench.world.model import World, WorldReaction, nominal_of
+from sva_bench.world.schema import Drawn, WorldFile
 from tests.worlds_for_tests import SMALL, world_of
 
 SHIPPED = sorted((Path(__file__).parents[2] / "worlds").glob("*.yaml"))
@@ -111,6 +112,12 @@ def test_a_world_file_gives_its_world(tmp_path: Path) -> None:
     ("    availability: 0.75\n", "    availability: 0.75\n    loss_cost: -1\n", "robots.uv2.loss_cost",
      "expected at least 0"),
     ("name: small\n", "name: small\ninteraction: shared\n", None, "this version knows only"),
+    ("name: small\n", "name: small\nreaction: {policy: resolv}\n", "reaction.policy", "'none' or 'resolve'"),
+    ("name: small\n", "name: small\nreaction: {policy: resolve, news: soon}\n", "reaction.news", "'report' or 'instant'"),
+    ("name: small\n", "name: small\nreaction: {polcy: resolve}\n", "reaction.polcy", "did you mean 'policy'"),
+    ("name: small\n", "name: small\nreaction: resolve\n", "reaction", "expected a mapping"),
+    ("name: small\n", "name: small\nreaction: {policy: none, news: report}\n", "reaction.news", "no use for news"),
+    ("name: small\n", "name: small\nreaction: {news: instant}\n", "reaction.news", "choose 'policy: resolve'"),
     ("name: small\n", "name: small\nmargin: -0.1\n", "margin", "expected at least 0"),
 ])
 def test_each_complaint_names_line_and_key(tmp_path: Path, old: str, new: str, key: str | None, says: str) -> None:
@@ -302,6 +309,40 @@ def test_what_is_not_set_is_not_written(tmp_path: Path) -> None:
     assert "loss_cost" not in text
 
 
+# Reactions
+
+
+@pytest.mark.parametrize(("section", "reaction"), [
+    ("", WorldReaction()), ("reaction:\n", WorldReaction()), ("reaction: {}\n", WorldReaction()),
+    ("reaction: {policy: none}\n", WorldReaction()), ("reaction: {policy: none, news: never}\n", WorldReaction()),
+    ("reaction: {policy: resolve}\n", WorldReaction(policy="resolve", news="report")),
+    ("reaction: {policy: resolve, news: }\n", WorldReaction(policy="resolve", news="report")),
+    *((f"reaction: {{policy: resolve, news: {news}}}\n", WorldReaction(policy="resolve", news=news)) for news in NEWS),
+])
+def test_a_team_reacts_as_the_world_says_and_not_at_all_where_it_says_nothing(
+    tmp_path: Path, section: str, reaction: WorldReaction
+) -> None:
+    world = world_of(tmp_path, SMALL + section)
+    assert world.reaction == reaction
+    # Names of runs depend on the resolved world: one in which nobody reacts is as it was before anybody could.
+    assert ("reaction" in world_as_dict(world)) == (reaction.policy != "none")
+
+
+def test_news_at_stations_takes_a_station(tmp_path: Path) -> None:
+    text = SMALL.replace("  stations:\n    r1: {at_m: [3.2, 5.2], stop_s: 4}\n", "")
+    assert world_of(tmp_path, text + "reaction: {policy: resolve}\n").stations == ()
+    text += "reaction:\n  policy: resolve\n  news: station\n"
+    found = complaint(tmp_path, text)
+    assert (found.key, found.line) == ("reaction.news", line_of(text, "news: station"))
+    assert "place one under sites.stations" in found.problem
+
+
+def test_the_schema_of_worlds_knows_every_policy_and_all_news() -> None:
+    entry = WorldFile.model_json_schema()["$defs"]["ReactionEntry"]
+    assert entry["properties"]["policy"]["enum"] == list(POLICY_NAMES)
+    assert entry["properties"]["news"]["anyOf"][0]["enum"] == list(NEWS)
+
+
 # Drawn incentives
 
 
@@ -336,7 +377,7 @@ def assert_same_world(a: World, b: World, *, exactly: bool) -> None:
     close([s.heading_rad for s in a.sites], [s.heading_rad for s in b.sites])
     assert [vars(r) for r in a.robots] == [vars(r) for r in b.robots]
     assert [vars(s) for s in a.scenarios] == [vars(s) for s in b.scenarios]
-    for name in ("name", "plan_failure", "execute_failure", "margin", "noise"):
+    for name in ("name", "plan_failure", "execute_failure", "margin", "noise", "reaction"):
         assert getattr(a, name) == getattr(b, name)
 
 
@@ -361,6 +402,7 @@ VARIANTS = {
                            "incentives: {uniform: [0, 150], zero_share: 0.5, seed: 1}"),
     "joint": SMALL.replace("half: {uv2: 0.5}", "half: {joint: [{probability: 0.6, available: [uv1, uv2]}, "
                                                "{probability: 0.4, available: [uv1]}]}"),
+    "reacting": SMALL + "reaction: {policy: resolve, news: station}\n",
     "no limits": SMALL.replace("fuel_capacity_s: 60\n    mission_limit_s: 120\n    incentives", "incentives"),
 }
 
