@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.chance import Chance, Drawn, Histories
 from sva_bench.execution.drives import Courses, Drives, drive_all
-from sva_bench.execution.execute import orders_of, planned_legs
+from sva_bench.execution.execute import LegTime, orders_of, planned_legs
 from sva_bench.execution.fate import draw_fate
 from sva_bench.execution.known_legs import KnownLegs, Stops, longest
 from sva_bench.execution.outcome import Assignment
@@ -25,6 +25,7 @@ from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.rules import LegDriven
 from sva_bench.execution.settling import FIGURES, figures_of
 from sva_bench.execution.team import Team, TeamOutcome, play
+from sva_bench.execution.team_trace import Played, TeamTrace, legs_used, trace_teams, typical
 from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
@@ -59,6 +60,8 @@ class Reacted:
             shape (rows,) or ().
         bounds: Least and greatest value of a team: all robots lost, or every POI visited by the one that earns most.
         played: The missions themselves, by row; none unless recorded.
+        legs: Every leg that was driven, once under each noise draw; none unless recorded.
+        shown: A typical mission with changed orders, over time; ``None`` without any, or unless recorded.
     """
 
     case: Case
@@ -84,6 +87,8 @@ class Reacted:
     nominal: FloatArray
     bounds: tuple[float, float]
     played: tuple[TeamOutcome, ...]
+    legs: tuple[LegTime, ...] = ()
+    shown: TeamTrace | None = None
 
     @property
     def waited_s(self) -> FloatArray:
@@ -159,7 +164,32 @@ def react(
         courses.compose(wanted, drives)
         legs.learn(wanted, drives)
         rows = [each.rows(legs) for each in plays]
-    return [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
+    reacted = [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
+    return _recorded(world, costs, settings, reacted, legs, executor, drives) if settings.recorded else reacted
+
+
+def _recorded(
+    world: World, costs: Mapping[str, FuelCosts], settings: Settings, reacted: Sequence[Reacted], legs: KnownLegs,
+    executor: Executor | None, drives: Drives,
+) -> list[Reacted]:
+    """What came of cases, with the legs driven, and with a typical mission over time where one reacts."""
+    missions = [_missions_of(run) for run in reacted]
+    chosen = [typical(mine) for mine in missions]
+    traced = iter(trace_teams(world, costs, settings, [one for one in chosen if one is not None], executor, drives))
+    return [replace(run, legs=tuple(legs_used(run.robots, mine, legs)), shown=None if one is None else next(traced))
+            for run, mine, one in zip(reacted, missions, chosen, strict=True)]
+
+
+def _missions_of(run: Reacted) -> list[Played]:
+    """The missions of a case that reacts, each once, by its first trial and with the weight of all."""
+    first: dict[int, int] = {}
+    weights: dict[int, float] = {}
+    for row, (played, weight) in enumerate(zip(run.played, run.weight.tolist(), strict=True)):
+        first.setdefault(id(played), row)
+        weights[id(played)] = weights.get(id(played), 0.0) + weight
+    return [] if run.case.policy == "none" else [
+        Played(case=run.case, trial=int(run.trial[row]), rollout=int(run.rollout[row]), weight=weights[number],
+               outcome=run.played[row]) for number, row in first.items()]
 
 
 def modelled_values(
