@@ -253,8 +253,8 @@ def _write_change(recording: rr.RecordingStream, change: Change) -> None:
 def _write_lanes(recording: rr.RecordingStream, story: Story) -> None:
     """A lane for each robot: a cross where it was lost, and a mark each time that it learned of a failure."""
     for lane in story.lanes:
-        for name, times, marker, color in (("lost", lane.lost_s, rr.MarkerShape.Cross, ALARM),
-                                           ("learned", lane.learned_s, rr.MarkerShape.Diamond, lane.color)):
+        for name, times, marker, color in (("lost", lane.lost_s, rr.components.MarkerShape.Cross, ALARM),
+                                           ("learned", lane.learned_s, rr.components.MarkerShape.Diamond, lane.color)):
             if len(times):
                 entity = f"news/{lane.robot}/{name}"
                 _constant(recording, entity, rr.SeriesPoints(

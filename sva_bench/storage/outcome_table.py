@@ -11,7 +11,7 @@ import pyarrow as pa
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed, Settings
-from sva_bench.execution.react import Reacted
+from sva_bench.execution.reacted import Reacted
 from sva_bench.storage.tables import OUTCOMES
 
 

@@ -17,7 +17,7 @@ import pyarrow as pa
 from sva_bench import __version__
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.execute import Executed, Settings
-from sva_bench.execution.react import Reacted
+from sva_bench.execution.reacted import Reacted
 from sva_bench.files.atomic import draft_folder, remove_left_behind
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.records import Record, as_dict
@@ -71,14 +71,22 @@ def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
     return f"{scenario}{'+' if foreign else '-'}{planner}"
 
 
-def reaction_stem(scenario: str, planner: str, policy: str, news: str, *, foreign: bool) -> str:
-    """The unique name of a recording of a team that reacts.
+def recording_stem(key: tuple[str, str, str, str], trial: int | None = None, *, foreign: bool) -> str:
+    """The unique name of a recording.
 
     ``+`` ends the planner's name, as planners' own names have none. Given plans may have any name, which therefore
     stands last, after what no name of a scenario has: ``@``.
+
+    Args:
+        key: Scenario, planner, policy and news.
+        trial: The trial that was replayed; ``None``: the one that the run recorded.
+        foreign: Whether the plan is from elsewhere.
     """
-    reaction = f"{policy}-{news}"
-    return f"{scenario}@{reaction}+{planner}" if foreign else f"{scenario}-{planner}+{reaction}"
+    scenario, planner, policy, news = key
+    which = "-".join([*([] if policy == "none" else [policy, news]), *([] if trial is None else [f"trial{trial}"])])
+    if not which:
+        return stem_of(scenario, planner, foreign=foreign)
+    return f"{scenario}@{which}+{planner}" if foreign else f"{scenario}-{planner}+{which}"
 
 
 def made_for(planner: str, news: str) -> str:

@@ -27,7 +27,7 @@ from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
 from sva_bench.storage.agreement import Claim, Key, check_outcomes, check_routes
 from sva_bench.storage.manifest import MANIFEST, Manifest
-from sva_bench.storage.run_folder import MAP, Legs, made_for, reaction_stem, stem_of
+from sva_bench.storage.run_folder import MAP, Legs, made_for, recording_stem, stem_of
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
 from sva_bench.storage.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
@@ -197,7 +197,7 @@ def _content(folder: Path) -> Content:
              if foreign or key[1] != "informed"}
     check_routes(paths, {key: routes[plan] for key, plan in files.items()}, legs, driven)
     told: dict[Key, str] = {
-        (s.name, name, r.policy, r.news): reaction_stem(s.name, name, r.policy, r.news, foreign=foreign)
+        (s.name, name, r.policy, r.news): recording_stem((s.name, name, r.policy, r.news), foreign=foreign)
         for s in summary.scenarios for r in s.reactions or () for name, plan in r.plans.items() if plan.reacted > 0}
     return Content(summary=summary, routes=routes, stems=stems, manifest=manifest, world=world, legs=legs,
                    reaction_stems=told, lacking=_lacking(
@@ -220,6 +220,22 @@ def _claims(summary: AnySummary, world: World) -> dict[Key, Claim]:
                     mean=reacting.executed.mean, trials=None if all_of_them else summary.trials,
                     begins_whole=all_of_them and safe)
     return claims
+
+
+def find_row(path: Path, key: Key, trial: int) -> tuple[int, int] | None:
+    """Noise draw and history of one trial of outcomes; ``None`` where there is no such trial.
+
+    Raises:
+        BadFile: If they can't be read.
+    """
+    for piece in pieces_of(path, OUTCOMES):
+        mask = pc.equal(piece.column("trial"), trial)
+        for column, word in zip(("scenario", "planner", "policy", "news"), key, strict=True):
+            mask = pc.and_(mask, pc.equal(pc.cast(piece.column(column), pa.string()), word))
+        found = piece.filter(mask)
+        if found.num_rows:
+            return int(found.column("rollout")[0].as_py()), int(found.column("history")[0].as_py())
+    return None
 
 
 def _lacking(folder: Path, scenarios: Iterable[str], stems: Iterable[str]) -> tuple[str, ...]:

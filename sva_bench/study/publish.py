@@ -14,7 +14,7 @@ from typing import Any
 from sva_bench.analysis.summaries import AnySummary
 from sva_bench.execution.case import Case
 from sva_bench.execution.execute import Executed
-from sva_bench.execution.react import Reacted
+from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.team_trace import TeamTrace
 from sva_bench.files.atomic import draft_file
 from sva_bench.mission.instance import Instance
@@ -27,7 +27,7 @@ from sva_bench.storage.manifest import manifest_of
 from sva_bench.storage.run_folder import (
     legs_of,
     made_for,
-    reaction_stem,
+    recording_stem,
     run_folder,
     run_name,
     stem_of,
@@ -101,8 +101,8 @@ def publish(
                     routes[plan] = case.plan.routes
                     write_plan(folder / "plans" / f"{stem_of(*plan, foreign=foreign)}.json", case.plan)
                 if team.shown is not None:
-                    told[case.key] = stem = reaction_stem(*case.key, foreign=foreign)
-                    _record_team(folder / "recordings" / f"{stem}.rrd", world, case, team.shown)
+                    told[case.key] = stem = recording_stem(case.key, foreign=foreign)
+                    record_team(folder / "recordings" / f"{stem}.rrd", world, case, team.shown)
                 progress("recording", len(executed) + number + 1, len(executed) + len(reacted))
         legs = legs_of([*executed, *reacted])
         write_legs(folder / "legs.parquet", legs)
@@ -117,7 +117,7 @@ def publish(
     return Run(folder=out / name, summary=summary)
 
 
-def _record_team(path: Path, world: World, case: Case, team: TeamTrace) -> None:
+def record_team(path: Path, world: World, case: Case, team: TeamTrace) -> None:
     """Write the recording of a mission in which a team reacts."""
     record(path, world, team.traces, news=team.news, title=f"{world.name}, {case.title}, trial {team.trial}")
 
