@@ -159,7 +159,7 @@ def _check_sums(path: Path, key: Key, claim: Claim, found: _Sums, robots: int) -
         if not np.isclose(mean, claim.mean, rtol=_AGREE, atol=_AGREE):
             raise BadFile(path, None, column, f"these aren't the trials of summary.json: {_named(key)} collected "
                           f"{claim.mean:.6g} there and {mean:.6g} here, in "
-                          f"{counted(found.rows // robots, 'trial')}; {_AGAIN}")
+                          f"{counted(found.rows // robots, 'trial' if claim.trials else 'row')}; {_AGAIN}")
 
 
 def _named(key: Key) -> str:
