@@ -15,7 +15,7 @@ from sva_bench.execution.policies.registry import POLICIES
 from sva_bench.generate import instances, terrain, worlds
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.failures import PROCESSES
-from sva_bench.recording.story import SITE_COLORS
+from sva_bench.recording.colors import SITE_COLORS
 from sva_bench.report import drawing
 from sva_bench.solver.methods import METHODS
 from sva_bench.solver.two_stage import plan_stochastic

@@ -29,8 +29,14 @@ PlannedLegs = Mapping[tuple[str, Route], tuple[float, ...]]
 
 @dataclass(frozen=True, kw_only=True)
 class LegTime:
-    """A leg as planned (the repaired twin time, without margin) and as driven [s]; waits on the way are apart."""
+    """A leg as planned (the repaired twin time, without margin) and as driven [s]; waits on the way are apart.
 
+    Attributes:
+        trial: The first trial that it belongs to.
+        leg: Its place on the robot's route in that trial.
+    """
+
+    trial: int
     rollout: int
     robot: str
     leg: int
@@ -249,7 +255,7 @@ def _settle_all(
 ) -> Executed:
     columns: list[dict[str, FloatArray]] = []
     traces = []
-    mine: dict[RouteKey, Driven] = {}
+    mine: dict[RouteKey, tuple[int, Driven]] = {}
     for number, order in enumerate(orders):
         failed = fate.fails[:, number]
         parts = []
@@ -259,7 +265,7 @@ def _settle_all(
             driven = _drive_of(drives, key)
             parts.append(settle_alike(order, driven, int(failed[rows[0]]), fate.lifetime_s[rows, number]))
             if key is not None:
-                mine[key] = driven
+                mine.setdefault(key, (settings.first + int(rows[0]), driven))
         back = np.argsort(np.concatenate(kinds))
         columns.append({name: np.concatenate([part[name] for part in parts])[back] for name in parts[0]})
         if settings.recorded:
@@ -282,12 +288,13 @@ def _settle_all(
         legs=tuple(_leg_times(world, costs, mine)) if settings.recorded else (), traces=tuple(traces))
 
 
-_NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
+NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
+"""The drive of a robot that never leaves."""
 
 
 def _drive_of(drives: Mapping[RouteKey, Driven], key: RouteKey | None) -> Driven:
     """The drive of a robot; nothing where it never leaves."""
-    return _NOTHING if key is None else drives[key]
+    return NOTHING if key is None else drives[key]
 
 
 def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, outcome: Outcome) -> Trace:
@@ -297,15 +304,17 @@ def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, ou
                     np.concatenate(planned) if planned else np.empty((0, 2)))
 
 
-def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[RouteKey, Driven]) -> list[LegTime]:
-    """Every leg of the drives given; of trials that share a drive, once."""
+def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[RouteKey, tuple[int, Driven]]
+               ) -> list[LegTime]:
+    """Every leg of the drives given, each with its first trial; of trials that share a drive, once."""
     models = {robot.name: robot.model.name for robot in world.robots}
     rows = []
-    for (robot, route, rollout, _), driven in drives.items():
+    for (robot, route, rollout, _), (trial, driven) in drives.items():
         fuel = costs[models[robot]]
         for leg, (driven_s, (origin, destination)) in enumerate(
                 zip(driven.leg_s.tolist(), pairwise(route), strict=False)):  # a stuck robot drives fewer
             planned_ms = fuel.repaired_ms[fuel.times.sites.index(origin), fuel.times.sites.index(destination)]
-            rows.append(LegTime(rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
-                                planned_s=int(planned_ms) / 1000, driven_s=driven_s))
+            rows.append(LegTime(
+                trial=trial, rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
+                planned_s=int(planned_ms) / 1000, driven_s=driven_s))
     return rows

@@ -29,6 +29,8 @@ class KnownLegs:
         self._planned = {model: (cost.repaired_ms / 1000).tolist() for model, cost in costs.items()}
         self._scheduled = {model: cost.cost_s.tolist() for model, cost in costs.items()}
         self._driven: dict[tuple[int, int, Stops], LegDriven] = {}
+        # A typical mission is mostly one of the first noise draw: so its hops needn't be driven twice.
+        self._traced = self._composed and settings.recorded
         self.missing: dict[RouteKey, bool] = {}
         self.misses = 0
 
@@ -54,7 +56,7 @@ class KnownLegs:
         """Ask for legs under some noise draws before they are missed."""
         for rollout in rollouts:
             for robot, key in used:
-                self.missing[self._names[robot], key, rollout, 0] = False
+                self.missing[self._names[robot], key, rollout, 0] = self._traced and rollout == 0
 
     def _key(self, stops: Stops) -> Stops:
         """What a leg depends on: up to ``rollout`` it begins at rest in its origin's own pose, else on all before."""
@@ -67,7 +69,7 @@ class KnownLegs:
             found = self._driven.get((robot, rollout, key))
             if found is None:
                 self.misses += 1
-                self.missing[self._names[robot], key, rollout, 0] = False
+                self.missing[self._names[robot], key, rollout, 0] = self._traced and rollout == 0
                 return self.planned(robot, stops)
             return found
 

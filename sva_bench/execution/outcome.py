@@ -160,11 +160,23 @@ class Trace:
 
 
 def trace_of(
-    orders: Assignment, driven: Driven, outcome: Outcome, start: tuple[float, float, float], planned: FloatArray
+    orders: Assignment, driven: Driven, outcome: Outcome, start: tuple[float, float, float], planned: FloatArray,
+    start_s: float = 0.0,
 ) -> Trace:
-    """Lay a traced drive on the mission clock: stops put in, cut off where the mission ended."""
+    """Lay a traced drive on the mission clock: stops put in, cut off where the mission ended.
+
+    Args:
+        orders: Its orders; the route is the one driven.
+        driven: The drive.
+        outcome: What came of it.
+        start: Where it stands at rest: x, y [m], yaw [rad].
+        planned: The path that was planned [m], shape (k, 2).
+        start_s: When it leaves the base [s].
+    """
     times, poses, fuels = [np.zeros(1)], [np.array([start])], [np.array([orders.fuel_capacity_s])]
-    clock, tank = 0.0, orders.fuel_capacity_s
+    clock, tank = start_s, orders.fuel_capacity_s
+    if start_s > 0:
+        times, poses, fuels = [np.array([0.0, start_s])], [np.array([start] * 2)], [np.full(2, tank)]
     for leg, leg_s in enumerate(driven.leg_s.tolist()):
         mine = driven.leg_of == leg
         times.append(clock + driven.clock_s[mine])

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.chance import Chance, Drawn, Histories
@@ -22,9 +22,11 @@ from sva_bench.execution.fate import draw_fate
 from sva_bench.execution.known_legs import KnownLegs, Stops, longest
 from sva_bench.execution.outcome import Assignment
 from sva_bench.execution.policies.policy import Policy
+from sva_bench.execution.reacted import Reacted as Reacted
 from sva_bench.execution.rules import LegDriven
 from sva_bench.execution.settling import FIGURES, figures_of
 from sva_bench.execution.team import Team, TeamOutcome, play
+from sva_bench.execution.team_trace import Played, legs_used, trace_teams, typical
 from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
@@ -36,59 +38,6 @@ MOST_TRIALS_HELD = 20_000_000
 """Robots' missions of all cases that are sampled, at some 150 bytes each."""
 
 _FIGURES = ("end", *FIGURES, "left_over")
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Reacted:
-    """What came of one case with a policy. Arrays have a row for each history or trial, and a column for each robot.
-
-    Attributes:
-        case: Plan, scenario, policy and news.
-        robots: Names of the robots, in order.
-        enumerated: Whether the rows are all histories under each noise draw; else they are trials.
-        trial: Number of each row, shape (rows,).
-        rollout: Its noise draw, shape (rows,).
-        history: Number of its history under that noise draw, -1 where they are sampled, shape (rows,).
-        weight: Its probability; the rows' add up to 1, shape (rows,).
-        available, incentive, lost, value, pois_reached, stops_reached, end, end_time_s, fuel_used_s, contacts: As of
-            ``Executed``.
-        left_over: Incentive of the POIs that a robot was still to visit when it ended, and nobody else collected.
-        reacted: Whether orders changed, shape (rows,).
-        doubled: POIs that two robots visited, shape (rows,).
-        nominal: Value of the team if each leg is driven as planned: of each trial, or of all histories together,
-            shape (rows,) or ().
-        bounds: Least and greatest value of a team: all robots lost, or every POI visited by the one that earns most.
-        played: The missions themselves, by row; none unless recorded.
-    """
-
-    case: Case
-    robots: tuple[str, ...]
-    enumerated: bool
-    trial: IntArray
-    rollout: IntArray
-    history: IntArray
-    weight: FloatArray
-    available: BoolArray
-    incentive: FloatArray
-    lost: BoolArray
-    value: FloatArray
-    pois_reached: IntArray
-    stops_reached: IntArray
-    end: IntArray
-    end_time_s: FloatArray
-    fuel_used_s: FloatArray
-    contacts: IntArray
-    left_over: FloatArray
-    reacted: BoolArray
-    doubled: IntArray
-    nominal: FloatArray
-    bounds: tuple[float, float]
-    played: tuple[TeamOutcome, ...]
-
-    @property
-    def waited_s(self) -> FloatArray:
-        """How long each robot waited beside its stops [s]: nobody does."""
-        return np.zeros(self.incentive.shape)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -147,9 +96,50 @@ def react(
         BadInput: If there are more trials to be sampled than fit in memory.
     """
     drives = Drives() if drives is None else drives
-    legs, courses = KnownLegs(world, costs, settings), Courses(world, costs, settings)
+    legs = KnownLegs(world, costs, settings)
     teams = [_team(world, costs, case, policy, legs) for case, policy in zip(cases, policies, strict=True)]
     plays = _plays(world, cases, teams, settings, legs)
+    rows = _driven(plays, legs, Courses(world, costs, settings), executor, progress, drives)
+    reacted = [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
+    return _recorded(world, costs, settings, reacted, legs, executor, drives) if settings.recorded else reacted
+
+
+def react_again(
+    world: World, costs: Mapping[str, FuelCosts], case: Case, policy: Policy, settings: Settings, trial: int,
+    history: tuple[int, int] | None, executor: Executor | None = None,
+) -> Reacted:
+    """One row of what ``react`` gave for a case, played again, and over time.
+
+    Args:
+        world, costs, case, policy, settings: As for ``react``.
+        trial: Number of the row.
+        history: Its noise draw and the number of its history there; ``None`` = it was sampled.
+        executor: Where drives run; ``None`` = here.
+
+    Raises:
+        IndexError: If there is no such history.
+    """
+    legs = KnownLegs(world, costs, settings)
+    team = _team(world, costs, case, policy, legs)
+    play_again: _Enumerated | _Sampled
+    if history is None:
+        play_again = _Sampled(world, case, team, replace(settings, first=trial, trials=1))
+    else:
+        play_again = _Enumerated(world, case, team, settings, [history[0]])
+    play_again.begin(legs)
+    drives = Drives()
+    (rows,) = _driven([play_again], legs, Courses(world, costs, settings), executor, None, drives)
+    row = replace(play_again.reacted(rows).row(0 if history is None else history[1]), trial=np.array([trial]))
+    (mission,) = _missions_of(row)
+    (shown,) = trace_teams(world, costs, settings, [mission], executor, drives)
+    return replace(row, legs=tuple(legs_used(row.robots, [mission], legs)), shown=shown)
+
+
+def _driven(
+    plays: Sequence[_Enumerated | _Sampled], legs: KnownLegs, courses: Courses, executor: Executor | None,
+    progress: Callable[[int, int], None] | None, drives: Drives,
+) -> list[_Rows]:
+    """All rows of some plays, once each leg in them was driven."""
     for each in plays:
         each.want(legs)
     rows: list[_Rows] = []
@@ -159,7 +149,31 @@ def react(
         courses.compose(wanted, drives)
         legs.learn(wanted, drives)
         rows = [each.rows(legs) for each in plays]
-    return [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
+    return rows
+
+
+def _recorded(
+    world: World, costs: Mapping[str, FuelCosts], settings: Settings, reacted: Sequence[Reacted], legs: KnownLegs,
+    executor: Executor | None, drives: Drives,
+) -> list[Reacted]:
+    """What came of cases, with the legs driven, and with a typical mission over time where one reacts."""
+    missions = [_missions_of(run) for run in reacted]
+    chosen = [typical(mine) for mine in missions]
+    traced = iter(trace_teams(world, costs, settings, [one for one in chosen if one is not None], executor, drives))
+    return [replace(run, legs=tuple(legs_used(run.robots, mine, legs)), shown=None if one is None else next(traced))
+            for run, mine, one in zip(reacted, missions, chosen, strict=True)]
+
+
+def _missions_of(run: Reacted) -> list[Played]:
+    """The missions of a case that reacts, each once, by its first trial and with the weight of all."""
+    first: dict[int, int] = {}
+    weights: dict[int, float] = {}
+    for row, (played, weight) in enumerate(zip(run.played, run.weight.tolist(), strict=True)):
+        first.setdefault(id(played), row)
+        weights[id(played)] = weights.get(id(played), 0.0) + weight
+    return [] if run.case.policy == "none" else [
+        Played(case=run.case, trial=int(run.trial[row]), rollout=int(run.rollout[row]), weight=weights[number],
+               outcome=run.played[row]) for number, row in first.items()]
 
 
 def modelled_values(
@@ -238,9 +252,11 @@ class _Plays:
 class _Enumerated(_Plays):
     """All histories of a case under each noise draw."""
 
-    def __init__(self, world: World, case: Case, team: Team, settings: Settings) -> None:
+    def __init__(self, world: World, case: Case, team: Team, settings: Settings,
+                 rollouts: Sequence[int] | None = None) -> None:
         super().__init__(world, case, team, settings)
         self._draws = min(settings.rollouts, settings.trials)
+        self._rollouts = range(self._draws) if rollouts is None else rollouts
         self._nominal = 0.0
         self._final: dict[int, list[tuple[float, _Mission]]] = {}
 
@@ -257,7 +273,7 @@ class _Enumerated(_Plays):
 
     def want(self, legs: KnownLegs) -> None:
         """Ask for the legs that are driven if each takes as long as planned."""
-        legs.want(self._used, range(self._draws))
+        legs.want(self._used, self._rollouts)
 
     @property
     def modelled(self) -> float:
@@ -269,11 +285,11 @@ class _Enumerated(_Plays):
 
     def rows(self, legs: KnownLegs) -> _Rows:
         """All histories under each noise draw."""
-        found = [self._under(legs, rollout) for rollout in range(self._draws)]
+        found = [self._under(legs, rollout) for rollout in self._rollouts]
         missions = [mission for each in found for _, mission in each]
         return _Rows(
             missions=missions, which=np.arange(len(missions)),
-            rollout=np.repeat(np.arange(self._draws), [len(each) for each in found]),
+            rollout=np.repeat(self._rollouts, [len(each) for each in found]),
             history=np.concatenate([np.arange(len(each)) for each in found]),
             weight=np.array([weight / self._draws for each in found for weight, _ in each]))
 

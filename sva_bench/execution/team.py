@@ -51,6 +51,7 @@ class Reaction:
         failed: Robots that are known to be dead from now on.
         learned: Robots that it reached.
         before, after: Remaining orders of the robots whose orders changed.
+        since: Site from which these go on: where the robot stands or is going.
     """
 
     time_s: float
@@ -58,6 +59,7 @@ class Reaction:
     learned: tuple[str, ...]
     before: Mapping[str, tuple[str, ...]]
     after: Mapping[str, tuple[str, ...]]
+    since: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -320,15 +322,17 @@ class _Play:
         for robot in reached:
             robot.learned |= set(failed)
         names = [own.robot for own in self._team.orders]
-        orders = self._team.policy(self._state(now, {robot.number for robot in reached})) if reached else {}
-        before, after = {}, {}
+        state = self._state(now, {robot.number for robot in reached})
+        orders = self._team.policy(state) if reached else {}
+        before, after, since = {}, {}, {}
         for robot in reached:
             new = orders.get(names[robot.number], robot.remaining)
             if new != robot.remaining:
                 before[names[robot.number]], after[names[robot.number]] = robot.remaining, new
+                since[names[robot.number]] = state.robots[robot.number].site
                 self._give(robot, new, now)
         self._reactions.append(Reaction(
-            time_s=now, failed=tuple(names[k] for k in sorted(failed)), before=before, after=after,
+            time_s=now, failed=tuple(names[k] for k in sorted(failed)), before=before, after=after, since=since,
             learned=tuple(names[robot.number] for robot in reached)))
 
     def _state(self, now: float, reached: set[int]) -> TeamState:

@@ -63,7 +63,7 @@ def write_report(path: Path, content: Content) -> None:
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
         *_measured(scenarios),
-        *_legs(content.legs),
+        *_legs(content.legs.without_reaction()),
         *_routes(content.routes),
         *_recordings(content.stems, content.lacking),
         *_again(summary, content.manifest),

@@ -96,7 +96,8 @@ def publish_plans(
     """Write the run folder of plans that were compared; ``command``: as for ``publish``."""
     return publish(world, options, costs, done.instances, done.executed, done.summary, out, done.clock, progress,
                    identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
-                                       for name, plan in plans.items()}}, command=command)
+                                       for name, plan in plans.items()}}, command=command,
+                   reacted=done.reacted)
 
 
 def _judged(world: World, instance: Instance, plan: Plan, run: Executed) -> Judged:

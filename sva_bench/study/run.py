@@ -59,7 +59,7 @@ def publish_run(
 ) -> Run:
     """Write the run folder of what was measured; ``command``: as for ``publish``."""
     return publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
-                   done.summary, out, done.clock, progress, command=command)
+                   done.summary, out, done.clock, progress, command=command, reacted=done.reacted)
 
 
 def measure(world: World, options: Options, executor: Executor | None, progress: OnProgress) -> Measured:

@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from rerun.chunk import RrdReader
 
+from sva_bench.recording.colors import BLUE, DISABLED, ROBOT_COLORS, YELLOW
 from sva_bench.recording.rerun import TIMELINE, end_s, record
-from sva_bench.recording.story import BLUE, DISABLED, ROBOT_COLORS, YELLOW
 from sva_bench.recording.viewer import program, verify
 from tests.recording.missions import WORLD, trace
 

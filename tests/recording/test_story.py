@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sva_bench.recording.story import BLUE, ROBOT_COLORS, VERMILLION, YELLOW, Level, Story, corners, dashes, story_of
+from sva_bench.recording.colors import BLUE, ROBOT_COLORS, VERMILLION, YELLOW
+from sva_bench.recording.story import Level, Story, corners, dashes, story_of
 from tests.recording.missions import WORLD, trace
 
 

@@ -120,7 +120,7 @@ def run(
         done = measure(read, options, executor, told)
         folder = None if place is None else publish_run(read, options, done, place, told, _command()).folder
     return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
-                  executed=tuple(done.executed))
+                  executed=tuple(done.executed), reacted=tuple(done.reacted))
 
 
 @called_from_python()
@@ -175,7 +175,7 @@ def execute(
             folder = None if place is None else publish_plans(
                 read, given, options, done, place, told, costs, _command()).folder
     return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
-                  executed=tuple(done.executed))
+                  executed=tuple(done.executed), reacted=tuple(done.reacted))
 
 
 @called_from_python()
