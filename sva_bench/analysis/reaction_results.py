@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from sva_bench.analysis.results import (
+    MOST_TRIALS,
     Amount,
     Distribution,
     Estimate,
@@ -43,6 +44,7 @@ class ReactingPlan(PlanFigures):
             histories are enumerated.
         distribution: Distribution over histories, weighted, or over trials.
         end_shares: Probability of each end, by robot.
+        missions: Number of missions played: all histories under each noise draw, or trials.
         reacted: Probability that orders change in a mission.
         doubled: Expected number of POIs that two robots visit.
     """
@@ -51,6 +53,7 @@ class ReactingPlan(PlanFigures):
     modelled: Amount = field(metadata=stands_after("expected"))
     distribution: Distribution = field(metadata=stands_after("executed"))
     end_shares: Mapping[Name, Mapping[End, Probability]] = field(metadata=stands_after("ends"))
+    missions: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
     reacted: Probability
     doubled: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 

@@ -1,0 +1,142 @@
+"""What reacting is worth, on the page of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.summaries import Summary
+from sva_bench.files.printable import counted
+from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.page import figure, heading, note, sentence, table, text
+from sva_bench.report.reaction_wording import (
+    DOUBTED,
+    Reacting,
+    definitions,
+    doubles,
+    doubted,
+    lead_pct,
+    of_best_pct,
+    reacting,
+    reaction_answers,
+    reaction_assumptions,
+    recourse_pct,
+    vss_pct,
+)
+from sva_bench.report.wording import with_interval
+
+
+def reactions_answered(summary: Summary) -> list[str]:
+    """The answers that belong on top of the page; none where nobody reacts."""
+    answers = reaction_answers(summary)
+    if not answers:
+        return []
+    return ["<div class=answer><p>What if the robots re-plan?</p>",
+            f"<ul>{''.join(f'<li>{sentence(said)}</li>' for said in answers)}</ul>",
+            *(note(said) for said in reaction_assumptions(summary)), "</div>"]
+
+
+def reaction_section(summary: Summary) -> list[str]:
+    """Charts, tables and the meaning of their figures; none where nobody reacts."""
+    rows = reacting(summary)
+    if not rows:
+        return []
+    return [heading("What reacting is worth"), *_charts(rows), _values(rows), _plans(rows),
+            note(f"In the world file's units, 95 % intervals in brackets; {DOUBTED}: not distinguishable from zero. "
+                 "Without reaction: the trials of the table on top; with it: the missions counted here, and for the "
+                 "value of recourse the same missions without reaction."),
+            *_candidates(rows), _meanings(rows)]
+
+
+def reaction_ledgers(summary: Summary) -> list[str]:
+    """The way from promise to execution of each plan whose team reacts; none where nobody does."""
+    rows = reacting(summary)
+    if not rows:
+        return []
+    head = ["scenario", "news", "plan", "promised", "assumption", "reaction", "draws", "out of fuel", "late", "stuck",
+            "executed"]
+    cells = [[scenario.name, reaction.news, name, f"{plan.ledger.promised:.1f}", *(f"{entry + 0.0:+.1f}" for entry in (
+        plan.ledger.assumption, plan.ledger.reaction, plan.ledger.draws, plan.ledger.out_of_fuel, plan.ledger.late,
+        plan.ledger.stuck)), with_interval(plan.executed)]
+        for scenario, reaction in rows for name, plan in reaction.plans.items()]
+    return [table(head, cells, words=(0, 1, 2), caption=f"With the reaction ({_policies(rows)})"),
+            note("Reaction: what re-planning gained or lost. No draws where all histories were played. The promise of "
+                 "an anticipative plan has the reaction in it, which the assumption takes out again.")]
+
+
+def _policies(rows: Sequence[Reacting]) -> str:
+    return "policy " + ", ".join(dict.fromkeys(row.reaction.policy for row in rows))
+
+
+def _charts(rows: Sequence[Reacting]) -> list[str]:
+    with holding_back_ctrl_c():
+        from sva_bench.report import reaction_charts
+
+    parts = []
+    scenarios = len({row.scenario.name for row in rows})
+    cut = f" The first {reaction_charts.MOST_SCENARIOS} of {counted(scenarios, 'scenario')}." \
+        if scenarios > reaction_charts.MOST_SCENARIOS else ""
+    for policy in dict.fromkeys(row.reaction.policy for row in rows):
+        mine = [row for row in rows if row.reaction.policy == policy]
+        parts += ["<div class=pair>", figure(
+            reaction_charts.vss_against_news(mine), "Above zero the stochastic plan is worth more, below it the "
+            f"deterministic one. The news comes earlier from left to right.{cut}"), figure(
+            reaction_charts.recourse_by_plan(mine), "Right of zero the plan gains by the reaction. A plan that loses "
+            f"much by failures has much to gain.{cut}"), "</div>"]
+    return parts
+
+
+def _values(rows: Sequence[Reacting]) -> str:
+    """VSS against news, and what the best plan adds."""
+    head = ["scenario", "news", "VSS", "VSS [%]", "VSS with recourse", "[%]", "anticipation", "[%]", "best plan",
+            "next best", "lead", "lead [%]"]
+    cells, seen = [], ""
+    for scenario, reaction in rows:
+        if scenario.name != seen:
+            seen, plain = scenario.name, vss_pct(scenario.vss, scenario.stochastic.executed.mean)
+            cells.append([seen, "no reaction", *_difference(scenario.vss.executed, plain, same=scenario.vss.same_plan),
+                          *[""] * 8])
+        best = Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
+        told = reaction.best.over is not None
+        cells.append([
+            "", reaction.news, *_difference(
+                reaction.vss.executed, vss_pct(reaction.vss, reaction.plans["stochastic"].executed.mean),
+                same=reaction.vss.same_plan),
+            *_difference(reaction.vss_with_recourse, of_best_pct(reaction, reaction.vss_with_recourse)),
+            *_difference(reaction.anticipation, of_best_pct(reaction, reaction.anticipation)),
+            reaction.best.plan if told else "all the same", reaction.best.over or "",
+            *(_difference(best, lead_pct(reaction)) if told else ("", ""))])
+    return table(head, cells, words=(0, 1, 8, 9), caption="Value of planning for failures by when the team hears of "
+                                                          f"one ({_policies(rows)})")
+
+
+def _difference(found: Estimate, pct: Estimate | None, *, same: bool = False) -> tuple[str, str]:
+    return ("the same plan", "") if same else (doubted(found), doubted(pct))
+
+
+def _plans(rows: Sequence[Reacting]) -> str:
+    """Each plan with the reaction and without."""
+    twice = bool(doubles(rows))
+    head = ["scenario", "news", "plan", "without reaction", "with it", "value of recourse", "value of recourse [%]",
+            "orders changed [% of missions]", *(["doubled visits [per mission]"] if twice else []), "missions played",
+            "histories"]
+    cells = [[scenario.name, reaction.news, name,
+              f"{plan.executed.mean - reaction.value_of_recourse[name].mean:.1f}", with_interval(plan.executed),
+              doubted(reaction.value_of_recourse[name]), doubted(recourse_pct(reaction, name)),
+              f"{100 * plan.reacted:.1f}", *([f"{plan.doubled:.3g}"] if twice else []), str(plan.missions),
+              reaction.histories]
+             for scenario, reaction in rows for name, plan in reaction.plans.items()]
+    return table(head, cells, words=(0, 1, 2), caption="Each plan with the reaction")
+
+
+def _candidates(rows: Sequence[Reacting]) -> list[str]:
+    cells = [[scenario.name, reaction.news, tried.plan, "" if tried.theta is None else f"{tried.theta:g}",
+              f"{tried.modelled:.1f}"] for scenario, reaction in rows for tried in reaction.candidates]
+    return [table(["scenario", "news", "candidate", "exponent", "V, modelled"], cells, words=(0, 1, 2),
+                  caption="Plans that the anticipative one was chosen from: the two plans, and those optimal for "
+                          "survival to the power of an exponent; V if all legs are driven as planned")] if cells else []
+
+
+def _meanings(rows: Sequence[Reacting]) -> str:
+    items = "".join(f"<li><b>{text(name)}</b>: {sentence(meaning)}</li>" for name, meaning in definitions(rows))
+    return f"<p>What each figure is:</p><ul>{items}</ul>"
