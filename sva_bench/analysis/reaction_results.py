@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sva_bench.analysis.results import (
     MOST_TRIALS,
@@ -116,6 +116,17 @@ class ReactionResult(Record):
     anticipation: Gain
     best: BestPlan
     candidates: tuple[Candidate, ...] = ()
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> ReactionResult:
+        if not {"stochastic", "deterministic"} <= set(self.plans):
+            raise ValueError("plans: expected 'stochastic' and 'deterministic' among them")
+        if set(self.value_of_recourse) != set(self.plans):
+            raise ValueError("value_of_recourse: expected that of each of 'plans'")
+        for key, name in (("plan", self.best.plan), ("over", self.best.over)):
+            if name is not None and name not in self.plans:
+                raise ValueError(f"best.{key}: expected one of 'plans'")
+        return self
 
     @property
     def name(self) -> str:

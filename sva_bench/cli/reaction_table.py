@@ -32,9 +32,10 @@ def print_reactions(summary: Summary, console: Console) -> None:
         return
     for policy in dict.fromkeys(row.reaction.policy for row in rows):
         console.print(reaction_table([row for row in rows if row.reaction.policy == policy]))
-    console.print("Adds: value of recourse, in per cent of the plan's value without reaction. Lead: of the best plan "
-                  f"tried over the next. {DOUBTED}: not distinguishable from zero.", highlight=False)
-    for said in (*reaction_answers(summary), *reaction_assumptions(summary)):
+    console.print("Adds: value of recourse of the stochastic and the deterministic plan, in per cent of its value "
+                  "without reaction. Lead: of the best plan tried over the next. Orders change: in so many missions. "
+                  f"{DOUBTED}: not distinguishable from zero.", highlight=False)
+    for said in (*map(str, reaction_answers(summary)), *reaction_assumptions(summary)):
         console.print(said, highlight=False)
     if twice := doubles(rows):
         more = [f"{len(twice) - _MOST_NAMED} more in report.html"] if len(twice) > _MOST_NAMED else []
@@ -43,10 +44,11 @@ def print_reactions(summary: Summary, console: Console) -> None:
 
 def reaction_table(rows: list[Reacting]) -> Table:
     """VSS against news, what re-planning adds to each of the two plans, and the best plan."""
-    table = Table(title=f"If the team re-plans (policy {rows[0].reaction.policy})", title_justify="left")
-    for heading in ("scenario", "news", "VSS [%], [95 %]", "adds to stoch. [%]", "adds to determ. [%]", "best plan",
-                    "lead [%]", "orders change [%]"):
-        table.add_column(heading, justify="left" if heading in ("scenario", "news", "best plan") else "right")
+    table = Table(title=f"If the team re-plans (policy {rows[0].reaction.policy}), in per cent", title_justify="left")
+    for heading in ("scenario", "news", "VSS [95 %]", "adds to\nsto.", "adds to\ndet.", "best plan", "lead",
+                    "orders\nchange"):
+        words = heading in ("scenario", "news", "best plan")
+        table.add_column(heading, justify="left" if words else "right", no_wrap=True)
     for number, (scenario, reaction) in enumerate(rows):
         first = not number or rows[number - 1].scenario is not scenario
         if first:
@@ -56,11 +58,11 @@ def reaction_table(rows: list[Reacting]) -> Table:
             "", reaction.news, _vss(reaction.vss, reaction.plans["stochastic"].executed.mean),
             *(doubted(recourse_pct(reaction, name), lambda found: f"{found.mean:.1f}")
               for name in ("stochastic", "deterministic")),
-            reaction.best.plan if told else "all the same",
+            reaction.best.plan if told else "all alike",
             doubted(lead_pct(reaction), lambda found: f"{found.mean:.1f}") if told else "", changed(reaction),
             end_section=number == len(rows) - 1 or rows[number + 1].scenario is not scenario)
     return table
 
 
 def _vss(vss: VssFigures, stochastic: float) -> str:
-    return "the same plan" if vss.same_plan else doubted(vss_pct(vss, stochastic))
+    return "same plan" if vss.same_plan else doubted(vss_pct(vss, stochastic))

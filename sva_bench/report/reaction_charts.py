@@ -57,7 +57,7 @@ def recourse_by_plan(rows: Sequence[Reacting]) -> str:
         for number, plan in enumerate(plans):
             known = [(k, value) for k, row in enumerate(kept)
                      if plan in row.reaction.plans and (value := recourse_pct(row.reaction, plan)) is not None]
-            beside = 0.5 * ((number + 0.5) / len(plans) - 0.5)
+            beside = 0.64 * ((number + 0.5) / len(plans) - 0.5)
             _points(axes, [k + beside for k, _ in known], [value for _, value in known], number, plan, across=True)
         for k in range(1, len(kept)):
             if kept[k].scenario is not kept[k - 1].scenario:
@@ -70,7 +70,7 @@ def recourse_by_plan(rows: Sequence[Reacting]) -> str:
         _legend(axes)
 
     return chart(f"recourse-{policy}", "Value of recourse of each plan in per cent of its value without reaction, by "
-                 "scenario and kind of news, with 95 % intervals", (_WIDTH_IN, 1.5 + 0.3 * len(kept)), draw)
+                 "scenario and kind of news, with 95 % intervals", (_WIDTH_IN, 1.5 + 0.36 * len(kept)), draw)
 
 
 def _first(rows: Sequence[Reacting]) -> dict[str, ScenarioSummary]:
@@ -93,4 +93,4 @@ def _points(axes: Axes, at: Sequence[float], found: Sequence[Estimate], number: 
 
 
 def _legend(axes: Axes) -> None:
-    axes.figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9, handlelength=1.8)
+    axes.figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9, handlelength=1.8)

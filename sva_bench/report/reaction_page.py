@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.results import Estimate, VssFigures
 from sva_bench.analysis.summaries import Summary
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, text
 from sva_bench.report.reaction_wording import (
     DOUBTED,
+    Answer,
     Reacting,
     definitions,
     doubles,
@@ -32,8 +33,14 @@ def reactions_answered(summary: Summary) -> list[str]:
     if not answers:
         return []
     return ["<div class=answer><p>What if the robots re-plan?</p>",
-            f"<ul>{''.join(f'<li>{sentence(said)}</li>' for said in answers)}</ul>",
+            f"<ul>{''.join(map(_answered, answers))}</ul>",
             *(note(said) for said in reaction_assumptions(summary)), "</div>"]
+
+
+def _answered(answer: Answer) -> str:
+    first, *more = answer.sentences
+    below = f"<ul>{''.join(f'<li>{sentence(said)}</li>' for said in more)}</ul>" if more else ""
+    return f"<li><b>{sentence(answer.condition)}</b> {sentence(first)}{below}</li>"
 
 
 def reaction_section(summary: Summary) -> list[str]:
@@ -88,45 +95,49 @@ def _charts(rows: Sequence[Reacting]) -> list[str]:
 
 def _values(rows: Sequence[Reacting]) -> str:
     """VSS against news, and what the best plan adds."""
-    head = ["scenario", "news", "VSS", "VSS [%]", "VSS with recourse", "[%]", "anticipation", "[%]", "best plan",
-            "next best", "lead", "lead [%]"]
-    cells, seen = [], ""
-    for scenario, reaction in rows:
-        if scenario.name != seen:
-            seen, plain = scenario.name, vss_pct(scenario.vss, scenario.stochastic.executed.mean)
-            cells.append([seen, "no reaction", *_difference(scenario.vss.executed, plain, same=scenario.vss.same_plan),
-                          *[""] * 8])
-        best = Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
-        told = reaction.best.over is not None
+    head = ["news", "VSS", "VSS [%]", "VSS with recourse", "VSS with recourse [%]", "anticipation", "anticipation [%]",
+            "best plan", "lead", "lead [%]", "next best"]
+    cells: list[list[str]] = []
+    sections: list[str] = []
+    for number, (scenario, reaction) in enumerate(rows):
+        if not number or rows[number - 1].scenario is not scenario:
+            plain = scenario.stochastic.executed.mean
+            cells.append(["no reaction", *_vss(scenario.vss, plain), *[""] * 8])
+        ahead = Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
+        best = [reaction.best.plan, *_difference(ahead, lead_pct(reaction)), reaction.best.over]
         cells.append([
-            "", reaction.news, *_difference(
-                reaction.vss.executed, vss_pct(reaction.vss, reaction.plans["stochastic"].executed.mean),
-                same=reaction.vss.same_plan),
+            reaction.news, *_vss(reaction.vss, reaction.plans["stochastic"].executed.mean),
             *_difference(reaction.vss_with_recourse, of_best_pct(reaction, reaction.vss_with_recourse)),
             *_difference(reaction.anticipation, of_best_pct(reaction, reaction.anticipation)),
-            reaction.best.plan if told else "all the same", reaction.best.over or "",
-            *(_difference(best, lead_pct(reaction)) if told else ("", ""))])
-    return table(head, cells, words=(0, 1, 8, 9), caption="Value of planning for failures by when the team hears of "
-                                                          f"one ({_policies(rows)})")
+            *(["all the same", "", "", ""] if reaction.best.over is None else [str(word) for word in best])])
+        sections += [scenario.name] * (len(cells) - len(sections))
+    return table(head, cells, words=(0, 7, 10), sections=sections, caption="Value of planning for failures by when the "
+                                                                          f"team hears of one ({_policies(rows)})")
 
 
-def _difference(found: Estimate, pct: Estimate | None, *, same: bool = False) -> tuple[str, str]:
-    return ("the same plan", "") if same else (doubted(found), doubted(pct))
+def _vss(vss: VssFigures, stochastic: float) -> tuple[str, str]:
+    return ("the same plan", "") if vss.same_plan else _difference(vss.executed, vss_pct(vss, stochastic))
+
+
+def _difference(found: Estimate, pct: Estimate | None) -> tuple[str, str]:
+    """A difference with its interval, and in per cent."""
+    return doubted(found), doubted(pct, lambda shown: f"{shown.mean:.1f}")
 
 
 def _plans(rows: Sequence[Reacting]) -> str:
     """Each plan with the reaction and without."""
     twice = bool(doubles(rows))
-    head = ["scenario", "news", "plan", "without reaction", "with it", "value of recourse", "value of recourse [%]",
+    head = ["news", "plan", "without reaction", "with it", "value of recourse", "value of recourse [%]",
             "orders changed [% of missions]", *(["doubled visits [per mission]"] if twice else []), "missions played",
             "histories"]
-    cells = [[scenario.name, reaction.news, name,
-              f"{plan.executed.mean - reaction.value_of_recourse[name].mean:.1f}", with_interval(plan.executed),
-              doubted(reaction.value_of_recourse[name]), doubted(recourse_pct(reaction, name)),
+    cells = [[reaction.news, name, f"{plan.executed.mean - reaction.value_of_recourse[name].mean:.1f}",
+              with_interval(plan.executed),
+              *_difference(reaction.value_of_recourse[name], recourse_pct(reaction, name)),
               f"{100 * plan.reacted:.1f}", *([f"{plan.doubled:.3g}"] if twice else []), str(plan.missions),
               reaction.histories]
-             for scenario, reaction in rows for name, plan in reaction.plans.items()]
-    return table(head, cells, words=(0, 1, 2), caption="Each plan with the reaction")
+             for _, reaction in rows for name, plan in reaction.plans.items()]
+    return table(head, cells, words=(0, 1, len(head) - 1), caption="Each plan with the reaction",
+                 sections=[scenario.name for scenario, reaction in rows for _ in reaction.plans])
 
 
 def _candidates(rows: Sequence[Reacting]) -> list[str]:

@@ -17,7 +17,7 @@ _MOST_NAMED = 6
 
 _DOES: dict[PolicyName, str] = {"resolve": "re-plans", "none": "keeps its orders"}
 _HEARS: dict[News, str] = {
-    "never": "but never hears of a failure", "station": "as robots hear of a failure at stations",
+    "never": "but never hears of a failure", "station": "at the stations where robots hear of a failure",
     "report": "when a robot misses a report", "instant": "the moment a robot fails"}
 KNOWS: dict[News, str] = {
     "never": "nobody ever learns of a failure",
@@ -25,8 +25,21 @@ KNOWS: dict[News, str] = {
                "and stations share what robots decided",
     "report": "all robots learn of a failure at the planned arrival that the robot misses, or at the failure if that "
               "is later",
-    "instant": "all robots learn of a failure at once"}
+    "instant": "all robots learn of a failure the moment it happens"}
 """Who knows what when, by the kind of news."""
+
+
+class Answer(NamedTuple):
+    """What a policy and news come to: the condition, and what holds under it, sentence by sentence.
+
+    Joined by spaces, all of it reads as a text.
+    """
+
+    condition: str
+    sentences: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return " ".join((self.condition, *self.sentences))
 
 
 class Reacting(NamedTuple):
@@ -41,17 +54,18 @@ def reacting(summary: Summary) -> list[Reacting]:
     return [Reacting(scenario, reaction) for scenario in summary.scenarios for reaction in scenario.reactions or ()]
 
 
-def reaction_answers(summary: Summary) -> list[str]:
+def reaction_answers(summary: Summary) -> list[Answer]:
     """What planning for failures is worth to a team that re-plans: an answer for each policy and news.
 
     News that come to the same, in the digits shown, share an answer.
     """
-    found: dict[tuple[PolicyName, str], list[News]] = {}
+    found: dict[tuple[PolicyName, tuple[str, ...]], list[News]] = {}
     for policy, news in dict.fromkeys((row.reaction.policy, row.reaction.news) for row in reacting(summary)):
         rows = [row for row in reacting(summary) if (row.reaction.policy, row.reaction.news) == (policy, news)]
-        found.setdefault((policy, _worth(rows) + _recourse(rows) + _best(rows)), []).append(news)
-    return [f"If the team {_DOES[policy]} {' or '.join(_HEARS[own] for own in news)}, {body}"
-            for (policy, body), news in found.items()]
+        said = tuple(part for part in (_worth(rows), _recourse(rows), _best(rows)) if part)
+        found.setdefault((policy, said), []).append(news)
+    return [Answer(f"If the team {_DOES[policy]} {', or '.join(_HEARS[own] for own in news)},", said)
+            for (policy, said), news in found.items()]
 
 
 def reaction_assumptions(summary: Summary) -> list[str]:
@@ -139,13 +153,13 @@ def _recourse(rows: Sequence[Reacting]) -> str:
     gains = [(s.name, r.value_of_recourse["deterministic"], r.value_of_recourse["stochastic"]) for s, r in rows]
     telling = [row for row in gains if row[1].excludes_zero or row[2].excludes_zero]
     if not telling:
-        return " Re-planning changes no plan's value distinguishably."
+        return "Re-planning changes no plan's value distinguishably."
     falls = any(gain.excludes_zero and gain.mean < 0 for _, *both in telling for gain in both)
     (name, det, sto), *more = telling
     first = f"the deterministic plan by {_gained(det)} and the stochastic one by {_gained(sto)} in {name}" if falls \
         else f"{_gained(det)} to the deterministic plan and {_gained(sto)} to the stochastic one in {name}"
     others = [f"{_gained(det)} and {_gained(sto)} in {name}" for name, det, sto in more]
-    return f" Re-planning {'changes' if falls else 'adds'} {_some([first, *others], '; ')}."
+    return f"Re-planning {'changes' if falls else 'adds'} {_some([first, *others], '; ')}."
 
 
 def _gained(gain: Gain) -> str:
@@ -157,7 +171,7 @@ def _gained(gain: Gain) -> str:
 def _best(rows: Sequence[Reacting]) -> str:
     """Which of the plans tried is the best for the reaction, and by how much."""
     said = [f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over})" for s, r in rows if r.best.over is not None]
-    return f" The best plan for it, of those tried: {_some(said)}." if said else ""
+    return f"The best plan for it, of those tried: {_some(said)}." if said else ""
 
 
 def lead(reaction: ReactionResult) -> str:
@@ -208,11 +222,6 @@ def lead_pct(reaction: ReactionResult) -> Estimate | None:
     return of_best_pct(reaction, Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95))
 
 
-def shown(found: Estimate | None) -> str:
-    """A percentage with its interval, with a digit; nothing where there is none."""
-    return "" if found is None else with_interval(found)
-
-
 DOUBTED = "°"
 """Behind figures whose interval holds zero."""
 
@@ -221,7 +230,8 @@ def doubted(found: Estimate | None, show: Callable[[Estimate], str] = with_inter
     """A difference as tables show it: marked where it is not distinguishable from zero."""
     if found is None:
         return ""
-    return show(found) + ("" if found.excludes_zero or found.ci95 in (None, (0.0, 0.0)) else DOUBTED)
+    mean, bracket, ends = show(found).partition(" [")  # behind the mean, where no line breaks before it
+    return mean + ("" if found.excludes_zero or found.ci95 in (None, (0.0, 0.0)) else DOUBTED) + bracket + ends
 
 
 def doubles(rows: Iterable[Reacting]) -> list[str]:
@@ -234,7 +244,7 @@ def changed(reaction: ReactionResult) -> str:
     """Share of missions in which orders change, over the plans [%]."""
     shares = [100 * plan.reacted for plan in reaction.plans.values()]
     least, most = f"{min(shares):.0f}", f"{max(shares):.0f}"
-    return least if least == most else f"{least} to {most}"
+    return least if least == most else f"{least}–{most}"
 
 
 DEFINITIONS: tuple[tuple[str, str], ...] = (
