@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from sva_bench.analysis.over_trials import percent
 from sva_bench.analysis.reaction_results import Gain, ReactionResult
 from sva_bench.analysis.results import Estimate, VssFigures
 from sva_bench.analysis.scenarios import ScenarioSummary
@@ -194,11 +195,12 @@ def _some(words: Sequence[str], comma: str = ", ") -> str:
 
 
 def in_per_cent(found: Estimate, of: float) -> Estimate | None:
-    """A difference and its interval in per cent of a value; ``None`` of a value of nothing or less."""
-    if of <= 0:
+    """A difference and its interval in per cent of a value; ``None`` of a value of nothing, or less, or next to it."""
+    low, mean, high = (percent(figure, of) for figure in (
+        (found.ci95 or (found.mean,))[0], found.mean, (found.ci95 or (found.mean,))[-1]))
+    if of <= 0 or low is None or mean is None or high is None:
         return None
-    ends = found.ci95
-    return Estimate(mean=100 * found.mean / of, ci95=ends and (100 * ends[0] / of, 100 * ends[1] / of))
+    return Estimate(mean=mean, ci95=found.ci95 and (low, high))
 
 
 def vss_pct(vss: VssFigures, stochastic: float) -> Estimate | None:
