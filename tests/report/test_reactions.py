@@ -5,18 +5,24 @@ from __future__ import annotations
 import csv
 import html
 import io
+import json
+import random
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
 
 from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.reaction_table import REACTION_COLUMNS
+from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import Summary
 from sva_bench.choices import NEWS
 from sva_bench.cli.reaction_table import print_reactions
+from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.reaction_charts import MOST_SCENARIOS
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.reaction_wording import (
@@ -34,7 +40,7 @@ from sva_bench.storage.stored_run import write_csv
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run
 from sva_bench.study.run import run
-from tests.results_for_tests import Estimate, reaction, summary
+from tests.results_for_tests import reaction, summary
 from tests.worlds_for_tests import world_of
 
 # The stochastic plan keeps 100 and gains 1 by reacting, the deterministic one 80 and gains 20.
@@ -69,9 +75,9 @@ def test_an_answer_says_what_planning_and_re_planning_are_worth_and_which_plan_i
     # VSS 101 - 100 = 1, of 101; recourse 20 of 80 and 1 of 100; the best plan leads by 104 - 101 = 3, of 104.
     found = summary_of(reaction("report", PAYS, half=0.5, best="anticipative", over="stochastic"))
     assert said(found) == (
-        "If the team re-plans when a robot misses a report, planning for failures is worth 1.0 % in S in place of 20 %. "
-        "Re-planning adds 25 % to the deterministic plan and 1.0 % to the stochastic one in S. The best plan for it, of "
-        "those tried: the anticipative in S (+2.9 % over the stochastic).")
+        "If the team re-plans when a robot misses a report, planning for failures is worth 1.0 % in S in place of "
+        "20 %. Re-planning adds 25 % to the deterministic plan and 1.0 % to the stochastic one in S. The best plan for "
+        "it, of those tried: the anticipative in S (+2.9 % over the stochastic).")
 
 
 def test_a_vss_below_zero_is_told_as_the_deterministic_plan_being_worth_more() -> None:
@@ -203,12 +209,48 @@ def test_plans_whose_orders_change_in_other_shares_of_missions_are_told_as_a_ran
     assert changed(replace(one, plans={**one.plans, "stochastic": never})) == "0–50"
 
 
-def test_reactions_that_do_not_fit_together_are_refused() -> None:
-    one = reaction("report", LOSES)
-    with pytest.raises(ValueError, match="best.plan: expected one of 'plans'"):
-        replace(one, best=replace(one.best, plan="anticipative"))
-    with pytest.raises(ValueError, match="value_of_recourse"):
-        replace(one, value_of_recourse={})
+@pytest.mark.parametrize(("key", "value", "message"), [
+    (("best", "plan"), "anticipative", "best.plan: expected one of 'plans'"),
+    (("best", "over"), "anticipative", "best.over: expected one of 'plans'"),
+    (("value_of_recourse",), {}, "value_of_recourse: expected that of each of 'plans'"),
+    (("plans",), {}, "plans"),
+])
+def test_reactions_that_do_not_fit_together_are_refused(key: tuple[str, ...], value: Any, message: str) -> None:
+    data = as_dict(reaction("report", LOSES))
+    held = data
+    for part in key[:-1]:
+        held = held[part]
+    held[key[-1]] = value
+    with pytest.raises(ValueError, match=message):
+        from_dict(ReactionResult, json.loads(json.dumps(data)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_terminal_and_page_hold_with_every_figure_that_a_reaction_may_have(seed: int) -> None:
+    valid = as_dict(reaction("report", PAYS, best="anticipative", over="stochastic", doubled=0.1))
+    rng, tried = random.Random(seed), 0
+    while tried < 3:
+        data = json.loads(json.dumps(valid))
+        for at in rng.sample(list(numbers(data)), 8):
+            held = data
+            for key in at[:-1]:
+                held = held[key]
+            held[at[-1]] = rng.choice((0.0, 1e15, -1e15, 1e-300, None))
+        try:
+            found = summary_of(from_dict(ReactionResult, data))
+        except ValueError:
+            continue
+        tried += 1
+        assert "What reacting is worth" in page_of(found)
+        assert "\n" in printed(found)
+
+
+def numbers(data: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Where numbers stand in JSON data."""
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
+        if isinstance(value, float):
+            yield (*at, key)
+        yield from numbers(value, (*at, key))
 
 
 @pytest.fixture(scope="module")
@@ -245,7 +287,7 @@ def test_a_run_without_failures_reacts_to_nothing(finished: Run) -> None:
 def test_a_summary_shows_its_reactions_in_a_line_each_and_as_rows(finished: Run) -> None:
     found = summary_in(finished)
     assert repr(found).count("resolve on report news: VSS") == len(found.scenarios)
-    assert "anticipative, resolve on instant news" in found._repr_html_()  # type: ignore[operator]
+    assert "anticipative, resolve on instant news" in found._repr_html_()
 
 
 def test_csv_has_a_row_for_each_scenario_policy_news_and_plan(finished: Run) -> None:
