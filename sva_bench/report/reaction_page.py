@@ -50,8 +50,8 @@ def reaction_section(summary: Summary) -> list[str]:
         return []
     return [heading("What reacting is worth"), *_charts(rows), _values(rows), _plans(rows),
             note(f"In the world file's units, 95 % intervals in brackets; {DOUBTED}: not distinguishable from zero. "
-                 "Without reaction: the trials of the table on top; with it: the missions counted here, and for the "
-                 "value of recourse the same missions without reaction."),
+                 "No reaction: the trials of the table on top. All else: the missions counted here, played with the "
+                 "reaction and without."),
             *_candidates(rows), _meanings(rows)]
 
 
@@ -141,9 +141,14 @@ def _plans(rows: Sequence[Reacting]) -> str:
 
 
 def _candidates(rows: Sequence[Reacting]) -> list[str]:
-    cells = [[scenario.name, reaction.news, tried.plan, "" if tried.theta is None else f"{tried.theta:g}",
-              f"{tried.modelled:.1f}"] for scenario, reaction in rows for tried in reaction.candidates]
-    return [table(["scenario", "news", "candidate", "exponent", "V, modelled"], cells, words=(0, 1, 2),
+    columns = list(dict.fromkeys(reaction.name for _, reaction in rows if reaction.candidates))
+    found: dict[tuple[str, str, str], dict[str, str]] = {}
+    for scenario, reaction in rows:
+        for tried in reaction.candidates:
+            exponent = "" if tried.theta is None else f"{tried.theta:g}"
+            found.setdefault((scenario.name, tried.plan, exponent), {})[reaction.name] = f"{tried.modelled:.1f}"
+    cells = [[*key, *(values.get(name, "") for name in columns)] for key, values in found.items()]
+    return [table(["scenario", "candidate", "exponent", *(f"V, {name}" for name in columns)], cells, words=(0, 1),
                   caption="Plans that the anticipative one was chosen from: the two plans, and those optimal for "
                           "survival to the power of an exponent; V if all legs are driven as planned")] if cells else []
 

@@ -278,6 +278,16 @@ def test_page_and_terminal_of_a_run_answer_alike(finished: Run) -> None:
     assert text.index("What if the robots re-plan?") < text.index("<table")
 
 
+def test_the_page_lists_what_the_anticipative_plan_was_chosen_from(finished: Run) -> None:
+    text = html.unescape((finished.folder / "report.html").read_text())
+    listed = text[text.index("Plans that the anticipative one was chosen from"):].split("</table>")[0]
+    for scenario, found in reacting(summary_in(finished)):
+        assert f"V, {found.name}" in listed
+        for tried in found.candidates:
+            row = rf">{scenario.name}</td><td[^>]*>{re.escape(tried.plan)}</td>.*>{tried.modelled:.1f}<"
+            assert re.search(row, listed)
+
+
 def test_a_run_without_failures_reacts_to_nothing(finished: Run) -> None:
     safe = next(row for row in reacting(summary_in(finished)) if row.scenario.name == "safe")
     assert {plan.reacted for plan in safe.reaction.plans.values()} == {0.0}
