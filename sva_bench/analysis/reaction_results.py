@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sva_bench.analysis.results import (
+    MOST_TRIALS,
     Amount,
     Comparison,
     Distribution,
@@ -45,6 +46,7 @@ class ReactingPlan(PlanFigures):
             histories are enumerated.
         distribution: Distribution over histories, weighted, or over trials.
         end_shares: Probability of each end, by robot.
+        missions: Number of missions played: all histories under each noise draw, or trials.
         reacted: Probability that orders change in a mission.
         doubled: Expected number of POIs that two robots visit.
     """
@@ -53,6 +55,7 @@ class ReactingPlan(PlanFigures):
     modelled: Amount = field(metadata=stands_after("expected"))
     distribution: Distribution = field(metadata=stands_after("executed"))
     end_shares: Mapping[Name, Mapping[End, Probability]] = field(metadata=stands_after("ends"))
+    missions: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
     reacted: Probability
     doubled: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 
@@ -105,6 +108,17 @@ class ReactionFigures(Record):
     histories: HistoryMode
     plans: Annotated[Mapping[PlanName, ReactingPlan], Field(min_length=1)]
     value_of_recourse: Mapping[PlanName, Gain]
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> ReactionResult:
+        if not {"stochastic", "deterministic"} <= set(self.plans):
+            raise ValueError("plans: expected 'stochastic' and 'deterministic' among them")
+        if set(self.value_of_recourse) != set(self.plans):
+            raise ValueError("value_of_recourse: expected that of each of 'plans'")
+        for key, name in (("plan", self.best.plan), ("over", self.best.over)):
+            if name is not None and name not in self.plans:
+                raise ValueError(f"best.{key}: expected one of 'plans'")
+        return self
 
     @property
     def name(self) -> str:

@@ -103,7 +103,8 @@ def _plan(plan: PlanReacted, *, noisy: bool) -> ReactingPlan:
         by_robot={name: float(run.weight @ run.value[:, number]) + 0.0 for number, name in enumerate(run.robots)},
         ends={end: count for end in ENDS if (count := round(plan.trials * sum(
             own.get(end, 0.0) for own in shares.values())))},
-        end_shares=shares, ledger=_ledger(plan, executed.mean), reacted=min(float(run.weight @ run.reacted), 1.0),
+        end_shares=shares, ledger=_ledger(plan, executed.mean), missions=len(run.weight),
+        reacted=min(float(run.weight @ run.reacted), 1.0),
         doubled=float(run.weight @ run.doubled))
 
 

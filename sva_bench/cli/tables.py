@@ -12,6 +12,7 @@ from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
+from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.compared_reactions import reaction_lines
@@ -44,6 +45,7 @@ def print_summary(summary: AnySummary) -> None:
     for said in remarks(summary):
         console.print(said, highlight=False)
     if not isinstance(summary, ComparisonSummary):
+        print_reactions(summary, console)
         _print_assumptions(summary, console)
     if not summary.reproducible:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

@@ -181,6 +181,11 @@ def _offset(number: int, of: int) -> float:
     return 0.8 * ((number + 0.5) / of - 0.5)
 
 
+def mark(number: int) -> tuple[str, str]:
+    """Colour and shape of the points of a series."""
+    return _colour(number), _MARKERS[number % len(_MARKERS)]
+
+
 def _colour(number: int) -> str:
     return _COLOURS[number % len(_COLOURS)]
 

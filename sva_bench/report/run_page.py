@@ -18,6 +18,7 @@ from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
+from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
@@ -51,15 +52,18 @@ def write_report(path: Path, content: Content) -> None:
     parts = [
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
         *_answer(summary),
+        *(reactions_answered(summary) if isinstance(summary, Summary) else ()),
         *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
              f"{assumed(summary)}. "
              "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
         *_charts(summary),
+        *(reaction_section(summary) if isinstance(summary, Summary) else ()),
         *_world(content.world),
         *_over_trials(scenarios),
         *_from_promise(scenarios),
+        *(reaction_ledgers(summary) if isinstance(summary, Summary) else ()),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
         *_measured(scenarios),

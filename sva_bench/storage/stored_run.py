@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
+from sva_bench.analysis.reaction_table import REACTION_COLUMNS, reaction_rows
 from sva_bench.analysis.results import SUMMARY
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, summary_form
@@ -127,7 +128,7 @@ def is_batch(folder: Path) -> bool:
 
 
 def write_csv(folder: Path) -> list[Path]:
-    """Write each table of a run folder, and the statistics of its plans, as CSV: the files written.
+    """Write each table of a run folder, and the statistics of its plans and reactions, as CSV: the files written.
 
     Raises:
         BadFile: If one can't be read.
@@ -140,13 +141,20 @@ def write_csv(folder: Path) -> list[Path]:
             write_table_as_csv(folder / f"{name}.parquet", draft, schema)
         written.append(path)
     _, summary = _summary_in(folder)
-    path = folder / "statistics.csv"
+    plans = [[scenario.name, name, *csv_cells(plan)]
+             for scenario in summary.scenarios for name, plan in scenario.plans.items()]
+    written.append(_write_rows(folder / "statistics.csv", ["scenario", "planner", *csv_columns()], plans))
+    if reactions := reaction_rows(summary):
+        written.append(_write_rows(folder / "reactions.csv", REACTION_COLUMNS, reactions))
+    return written
+
+
+def _write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Path:
     with draft_file(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["scenario", "planner", *csv_columns()])
-        table.writerows([scenario.name, name, *csv_cells(plan)]
-                        for scenario in summary.scenarios for name, plan in scenario.plans.items())
-    return [*written, path]
+        table.writerow(columns)
+        table.writerows(rows)
+    return path
 
 
 def _summary_in(folder: Path) -> tuple[Document, AnySummary]:
