@@ -110,14 +110,9 @@ class ReactionFigures(Record):
     value_of_recourse: Mapping[PlanName, Gain]
 
     @model_validator(mode="after")
-    def _is_consistent(self) -> ReactionResult:
-        if not {"stochastic", "deterministic"} <= set(self.plans):
-            raise ValueError("plans: expected 'stochastic' and 'deterministic' among them")
+    def _has_all(self) -> ReactionFigures:
         if set(self.value_of_recourse) != set(self.plans):
             raise ValueError("value_of_recourse: expected that of each of 'plans'")
-        for key, name in (("plan", self.best.plan), ("over", self.best.over)):
-            if name is not None and name not in self.plans:
-                raise ValueError(f"best.{key}: expected one of 'plans'")
         return self
 
     @property
@@ -143,6 +138,15 @@ class ReactionResult(ReactionFigures):
     anticipation: Gain
     best: BestPlan
     candidates: tuple[Candidate, ...] = ()
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> ReactionResult:
+        if not {"stochastic", "deterministic"} <= set(self.plans):
+            raise ValueError("plans: expected 'stochastic' and 'deterministic' among them")
+        for key, name in (("plan", self.best.plan), ("over", self.best.over)):
+            if name is not None and name not in self.plans:
+                raise ValueError(f"best.{key}: expected one of 'plans'")
+        return self
 
 
 @dataclass(frozen=True, kw_only=True)

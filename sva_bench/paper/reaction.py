@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.reactions import reaction_result
 from sva_bench.analysis.statistics import sample_mean
 from sva_bench.choices import NEWS, FailureProcess, News
 from sva_bench.execution.case import Settings
@@ -18,7 +19,7 @@ from sva_bench.report.wording import with_interval
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios, two_cases
-from sva_bench.study.recourse import react_in_scenarios
+from sva_bench.study.recourse import Stage, react_in_scenarios
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import Scenario, World
 
@@ -53,7 +54,9 @@ def reaction(
             cases = [case for scenario in here.scenarios for case in two_cases(scenario, planned[scenario.name])]
             executed = execute(here, costs, cases, own, executor,
                                lambda done, of: progress("driving routes", done, of), drives)
-            found = react_in_scenarios(here, costs, planned, executed, options, own, executor, drives, progress)
+            found = react_in_scenarios(Stage(
+                world=here, costs=costs, instances={name: p.instance for name, p in planned.items()}, settings=own,
+                executed=executed, executor=executor, drives=drives), options, reaction_result, progress)
             rows += [ReactedWorld(world=world.name, process=process, availability=availability,
                                   by_news={result.news: result for result in found[scenario.name].results})
                      for scenario, availability in zip(here.scenarios, AVAILABILITIES, strict=True)]
