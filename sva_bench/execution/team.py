@@ -193,7 +193,8 @@ class _Play:
         """A robot's stop is over: it may learn of failures there, and goes on."""
         mission = robot.mission
         assert mission is not None
-        self._hear_of_open(now, robot)
+        if found := self._found_failed(now, robot):
+            self._hear(now, found)
         if mission.end is not None:  # told to stay at the base
             return
         if self._team.news == "station" and robot.stops[-1] in mission.orders.stations and \
@@ -263,8 +264,8 @@ class _Play:
         leg.window = None
         self._fail_at(robot, leg.driven, self._chance.middle_s(robot.number, window))
 
-    def _hear_of_open(self, now: float, leaving: _Robot | None = None) -> None:
-        """Ask of robots whose failure is open whether it would be known by now.
+    def _found_failed(self, now: float, leaving: _Robot | None = None) -> list[_Robot]:
+        """Robots whose failure was open and is known by now.
 
         Args:
             now: When [s].
@@ -285,8 +286,7 @@ class _Play:
                 else:
                     self._close(robot, found)
                     heard.append(robot)
-        if heard:
-            self._hear(now, heard)
+        return heard
 
     def _report_missing(self, robot: _Robot, failed_s: float) -> None:
         """A robot has failed: when news of it comes."""
@@ -304,8 +304,8 @@ class _Play:
         new = {robot.number for robot in robots} - self._dead
         if not new:
             return
+        new |= {robot.number for robot in self._found_failed(now)}  # what comes at once is answered at once
         self._dead |= new
-        self._hear_of_open(now)
         if self._team.news != "station":
             self._react(now, new, [r for r in self._robots if self._takes_orders(r, now)])
 

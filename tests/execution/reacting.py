@@ -43,8 +43,8 @@ class Enumerated:
     def reached(self, state: TeamState) -> list[Here]:
         """The robots that are reached, each at its next epoch."""
         sites = self._ground.instance.sites
-        return [Here(self._number[r.robot], sites.index(r.site), r.ready_s, r.burnt_s, self._alive(r.robot, state))
-                for r in state.robots if r.reached]
+        return [Here(self._number[r.robot], sites.index(r.site), r.ready_s, r.burnt_s, self._alive(r.robot, state),
+                     tuple(sites.index(site) for site in r.remaining)) for r in state.robots if r.reached]
 
     def _alive(self, robot: str, state: TeamState) -> float:
         """Probability that a robot is alive, given what is known of all."""

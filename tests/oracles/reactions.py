@@ -248,7 +248,7 @@ class Reactions:
         ready = {"waits": state.now, "stop": own.time, "leg": own.time + self._ground.stop[own.site]}[own.kind]
         burnt = 0.0 if own.site in self._ground.stations else own.burnt
         alive = 1.0 if self._ground.process != "mission" or own.heard else self._leaves(state, number)
-        return Here(number, own.site, ready, burnt, alive)
+        return Here(number, own.site, ready, burnt, alive, own.orders or ())
 
     def _ordered(self, state: State, reached: list[int]) -> State:
         """The state after the policy has given orders to those that are reached."""

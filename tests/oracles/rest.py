@@ -22,6 +22,7 @@ class Here(NamedTuple):
         ready: When it leaves.
         burnt: What it has burnt since it was filled last.
         alive: Probability that it is alive, where failures are drawn for a whole mission.
+        orders: Sites that it is to go to from there, as things are.
     """
 
     robot: int
@@ -29,6 +30,7 @@ class Here(NamedTuple):
     ready: float
     burnt: float
     alive: float = 1.0
+    orders: tuple[int, ...] = ()
 
 
 class Best(NamedTuple):
