@@ -69,7 +69,7 @@ def write_report(path: Path, content: Content) -> None:
         *_measured(scenarios),
         *_legs(content.legs.without_reaction()),
         *_routes(content.routes),
-        *_recordings(content.stems, content.lacking),
+        *_recordings(content),
         *_again(summary, content.manifest),
     ]
     write_page(path, summary.world, parts)
@@ -240,13 +240,22 @@ def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> li
     return [heading("Routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
 
 
-def _recordings(stems: Mapping[tuple[str, str], str], lacking: Sequence[str]) -> list[str]:
-    links = [f'<a href="recordings/{quote(stem)}.rrd">{text(f"{scenario}, {planner}")}</a>'
-             for (scenario, planner), stem in stems.items() if f"recordings/{stem}.rrd" not in lacking]
+def _recordings(content: Content) -> list[str]:
+    lacking = content.lacking
+
+    def linked(stems: Mapping[str, str]) -> list[str]:
+        return [f'<a href="recordings/{quote(stem)}.rrd">{text(what)}</a>' for what, stem in stems.items()
+                if f"recordings/{stem}.rrd" not in lacking]
+
+    links = linked({f"{scenario}, {planner}": stem for (scenario, planner), stem in content.stems.items()})
+    reacting = linked({f"{scenario}, {planner}, {policy} on {news} news": stem
+                       for (scenario, planner, policy, news), stem in content.reaction_stems.items()})
     parts = [heading("Recordings")]
     if links:
         parts.append(f"<p>Trial 0 of each plan, for the Rerun viewer: {', '.join(links)}. Open them all with "
                      "<code>sva-bench view</code> and this folder.</p>")
+    if reacting:
+        parts.append(f"<p>The most probable course of events in which orders change: {', '.join(reacting)}.</p>")
     if lacking:
         parts.append(note(f"Missing in this run folder: {', '.join(lacking)}. This page doesn't rest on them."))
     return parts

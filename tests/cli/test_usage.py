@@ -29,6 +29,7 @@ SWEEP = "format: sva-bench/sweep@1\nworlds: [small.yaml]\n"
     (("plan",), "plan [OPTIONS] WORLD-or-INSTANCE"), (("certify",), "certify [OPTIONS] INSTANCE PLAN"),
     (("batch",), "batch [OPTIONS] WORLD..."), (("batch", "status"), "batch status [OPTIONS] DIR"),
     (("batch", "retry"), "batch retry [OPTIONS] DIR"), (("report",), "report [OPTIONS] RUN"),
+    (("replay",), "replay [OPTIONS] RUN"),
     (("reproduce",), "reproduce [OPTIONS] PART [ARGS]..."),
     (("reproduce", "simulation"), "reproduce simulation [OPTIONS] [WORLD...]"),
     (("view",), "view [OPTIONS] RUN-or-RRD"),
@@ -184,7 +185,7 @@ def test_an_empty_value_is_refused_by_the_name_of_its_option(
     parameter.param_type_name == "argument" for parameter in command.params)], ids=" ".join)
 def test_an_empty_argument_is_refused(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line([*words, "", ""]) == 2
-    assert "its value is empty" in capsys.readouterr().err or words in (("view",), ("report",))
+    assert "its value is empty" in capsys.readouterr().err or words in (("view",), ("report",), ("replay",))
 
 
 SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
