@@ -6,7 +6,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from sva_bench.analysis.over_maps import OverMaps, Percentage, UnitSummary
-from sva_bench.analysis.reaction_results import BestPlan, Gain, ReactingPlan, ReactionLedger, ReactionResult
+from sva_bench.analysis.reaction_results import (
+    BestPlan,
+    DrivenWhole,
+    Gain,
+    ReactingPlan,
+    ReactionLedger,
+    ReactionResult,
+)
 from sva_bench.analysis.results import (
     Distribution,
     Estimate,
@@ -91,6 +98,7 @@ def reaction(news: News, values: Mapping[str, tuple[float, float]], half: float 
     return ReactionResult(
         policy="resolve", news=news, histories=histories, plans=plans,
         vss=replace(vss(gap, around(gap).ci95, 100 * gap / of if of else None), same_plan=same_plan),
+        driven_whole=DrivenWhole(missions=1, differing=0),
         value_of_recourse={name: gain(after[name] - kept[name], kept[name]) for name in after},
         vss_with_recourse=gain(after[best] - after["deterministic"], after[best]),
         anticipation=gain(after[best] - after["stochastic"], after[best]),

@@ -23,7 +23,7 @@ from sva_bench.analysis.results import (
     Words,
 )
 from sva_bench.choices import End, HistoryMode, News, PolicyName
-from sva_bench.files.fields import Name, Probability
+from sva_bench.files.fields import Name, NonNegativeInt, Probability
 from sva_bench.files.records import Record, stands_after
 
 
@@ -93,6 +93,19 @@ class Candidate(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class DrivenWhole(Record):
+    """Missions driven whole in physics, as a check of those put together from legs.
+
+    Attributes:
+        missions: How many were.
+        differing: Of how many a stop, an end or an incentive is another.
+    """
+
+    missions: NonNegativeInt
+    differing: NonNegativeInt
+
+
+@dataclass(frozen=True, kw_only=True)
 class ReactionFigures(Record):
     """One scenario under one policy and one kind of news.
 
@@ -101,6 +114,7 @@ class ReactionFigures(Record):
         histories: Whether all histories were played or a sample.
         plans: Results of the plans.
         value_of_recourse: What reacting adds to each plan, in per cent of its value without.
+        driven_whole: Missions driven whole in physics, beside those put together from legs.
     """
 
     policy: PolicyName
@@ -108,6 +122,7 @@ class ReactionFigures(Record):
     histories: HistoryMode
     plans: Annotated[Mapping[PlanName, ReactingPlan], Field(min_length=1)]
     value_of_recourse: Mapping[PlanName, Gain]
+    driven_whole: DrivenWhole
 
     @model_validator(mode="after")
     def _has_all(self) -> ReactionFigures:

@@ -16,6 +16,7 @@ from sva_bench.analysis.reaction_results import (
     BestPlan,
     Candidate,
     ComparedReaction,
+    DrivenWhole,
     Gain,
     ReactingPlan,
     ReactionLedger,
@@ -71,6 +72,7 @@ def reaction_result(
         policy=some.case.policy, news=some.case.news, histories="enumerated" if some.enumerated else "sampled",
         plans=results, vss=_vss(plans, results, noisy=noisy),
         value_of_recourse={name: _recourse(plan, noisy=noisy) for name, plan in plans.items()},
+        driven_whole=_whole(plans),
         vss_with_recourse=gain("deterministic"), anticipation=gain("stochastic"),
         best=_best(plans, ranked, noisy=noisy), candidates=tuple(candidates))
 
@@ -89,7 +91,8 @@ def compared_reaction(
         policy=some.case.policy, news=some.case.news, histories="enumerated" if some.enumerated else "sampled",
         plans=results, comparisons=tuple(comparisons),
         ranking=ranking({name: plan.executed.mean for name, plan in results.items()}, comparisons),
-        value_of_recourse={name: _recourse(plan, noisy=noisy) for name, plan in plans.items()})
+        value_of_recourse={name: _recourse(plan, noisy=noisy) for name, plan in plans.items()},
+        driven_whole=_whole(plans))
 
 
 def _plan(plan: PlanReacted, *, noisy: bool) -> ReactingPlan:
@@ -122,6 +125,11 @@ def _ledger(plan: PlanReacted, executed: float) -> ReactionLedger:
     return ReactionLedger(promised=promise.promised, assumption=assumption, reaction=reaction, draws=draws,
                           out_of_fuel=charged["out_of_fuel"], late=charged["late"], stuck=charged["stuck"],
                           executed=executed)
+
+
+def _whole(plans: Mapping[str, PlanReacted]) -> DrivenWhole:
+    checked = [plan.reacted.whole for plan in plans.values() if plan.reacted.whole is not None]
+    return DrivenWhole(missions=len(checked), differing=checked.count(False))
 
 
 def _vss(plans: Mapping[str, PlanReacted], results: Mapping[str, ReactingPlan], *, noisy: bool) -> VssFigures:

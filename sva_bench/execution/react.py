@@ -27,6 +27,7 @@ from sva_bench.execution.rules import LegDriven
 from sva_bench.execution.settling import FIGURES, figures_of
 from sva_bench.execution.team import Team, TeamOutcome, play
 from sva_bench.execution.team_trace import Played, legs_used, trace_teams, typical
+from sva_bench.execution.whole import WholeDrives
 from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
@@ -101,7 +102,11 @@ def react(
     plays = _plays(world, cases, teams, settings, legs)
     rows = _driven(plays, legs, Courses(world, costs, settings), executor, progress, drives)
     reacted = [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
-    return _recorded(world, costs, settings, reacted, legs, executor, drives) if settings.recorded else reacted
+    if not settings.recorded:
+        return reacted
+    if settings.fidelity == "rollout":
+        reacted = _driven_whole(reacted, teams, WholeDrives(world, costs, settings, executor))
+    return _recorded(world, costs, settings, reacted, legs, executor, drives)
 
 
 def react_again(
@@ -162,6 +167,18 @@ def _recorded(
     traced = iter(trace_teams(world, costs, settings, [one for one in chosen if one is not None], executor, drives))
     return [replace(run, legs=tuple(legs_used(run.robots, mine, legs)), shown=None if one is None else next(traced))
             for run, mine, one in zip(reacted, missions, chosen, strict=True)]
+
+
+def _driven_whole(reacted: Sequence[Reacted], teams: Sequence[Team], drives: WholeDrives) -> list[Reacted]:
+    """Drive the most probable mission with changed orders under each policy and news whole, and compare."""
+    chosen: dict[tuple[str, str], tuple[int, Played]] = {}
+    for number, run in enumerate(reacted):
+        mission, pair = typical(_missions_of(run)), (run.case.policy, run.case.news)
+        if mission is not None and (pair not in chosen or mission.weight > chosen[pair][1].weight):
+            chosen[pair] = number, mission
+    alike = {number: drives.ends_alike(teams[number], mission.outcome, mission.rollout)
+             for number, mission in chosen.values()}
+    return [replace(run, whole=alike.get(number)) for number, run in enumerate(reacted)]
 
 
 def _missions_of(run: Reacted) -> list[Played]:

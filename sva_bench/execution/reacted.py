@@ -36,6 +36,7 @@ class Reacted:
         bounds: Least and greatest value of a team: all robots lost, or every POI visited by the one that earns most.
         played: The missions themselves, by row; none unless recorded.
         legs: Every leg that was driven, once under each noise draw; none unless recorded.
+        whole: Whether a typical mission ends alike if it is driven whole in physics; ``None`` where none was.
         shown: A typical mission with changed orders, over time; ``None`` without any, or unless recorded.
     """
 
@@ -63,6 +64,7 @@ class Reacted:
     bounds: tuple[float, float]
     played: tuple[TeamOutcome, ...]
     legs: tuple[LegTime, ...] = ()
+    whole: bool | None = None
     shown: TeamTrace | None = None
 
     def row(self, number: int) -> Reacted:
@@ -76,7 +78,7 @@ class Reacted:
         alone: dict[str, Any] = {
             field.name: value[number:number + 1] for field in fields(self)
             if isinstance(value := getattr(self, field.name), np.ndarray) and value.ndim}
-        return replace(self, **alone, played=self.played[number:number + 1], legs=(), shown=None)
+        return replace(self, **alone, played=self.played[number:number + 1], legs=(), whole=None, shown=None)
 
     @property
     def waited_s(self) -> FloatArray:

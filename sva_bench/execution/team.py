@@ -71,6 +71,7 @@ class TeamOutcome:
         stops: Stops that each robot was sent to one after the other, the base first, up to the one at which it ended or
             which it was on its way to.
         reactions: News that came, in order.
+        fates: When each robot failed, in this mission.
         left_over: POIs that each robot had yet to visit when it ended, or visited too late, and that nobody collected.
         doubled: POIs that two robots visited.
     """
@@ -78,6 +79,7 @@ class TeamOutcome:
     robots: tuple[Outcome, ...]
     stops: tuple[tuple[str, ...], ...]
     reactions: tuple[Reaction, ...]
+    fates: tuple[RobotFate, ...]
     left_over: tuple[tuple[str, ...], ...]
     doubled: int
 
@@ -393,6 +395,7 @@ class _Play:
                                 if site in self._team.pois - collected)
                           for robot, mission in zip(self._robots, missions, strict=True))
         return TeamOutcome(
-            robots=robots, reactions=tuple(self._reactions), left_over=left_over,
+            robots=robots, reactions=tuple(self._reactions), fates=tuple(mission.fate for mission in missions),
+            left_over=left_over,
             stops=tuple(tuple(robot.stops) if robot.mission is not None else () for robot in self._robots),
             doubled=len(visits) - len(set(visits)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sva_bench.execution.case import Case
-from sva_bench.execution.outcome import Outcome
+from sva_bench.execution.outcome import Outcome, RobotFate
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.team import Reaction, TeamOutcome
 from sva_bench.execution.team_trace import Played, typical
@@ -86,7 +86,7 @@ def mission(course: str, weight: float, trial: int, *, reacts: bool = True) -> P
     return Played(case=Case(scenario=None, planner="p", plan=Plan(routes={})),  # type: ignore[arg-type]
                   trial=trial, rollout=0, weight=weight,
                   outcome=TeamOutcome(robots=(outcome,), stops=(("base", course),), reactions=(reaction,),
-                                      left_over=((),), doubled=0))
+                                      fates=(RobotFate(),), left_over=((),), doubled=0))
 
 
 def test_the_typical_mission_is_the_first_of_the_most_probable_course_with_changed_orders() -> None:
