@@ -5,10 +5,10 @@ that its site remembers (its ng-set). Labels grow up to half the mission limit f
 the leg that crosses the middle. A label is dominated by another one at its site that is nowhere worse. A label that
 can't exceed a threshold even with the completion bound is dropped, so a run without results proves that no route does.
 
-Under discounts a forward label also carries the probability ``D`` to get so far; a backward label carries what the
-rest is worth once its site is reached, ``W``, and apart minus its duals. A route's value is linear in ``W`` and in ``D``,
-so a label is nowhere worse than another if it isn't at either end of their range. The return is a reward within ``W``:
-a cost of losses paid bit by bit would let a label's value fall with ``D``.
+Under discounts a forward label also carries the probability ``D`` to get so far; a backward label what the rest is
+worth once its site is reached, ``W``, and apart minus its duals. A route's value is linear in ``W`` and in ``D``, so a
+label is nowhere worse than another if it isn't at either end of their range. The return is a reward within ``W``: a
+cost of losses paid bit by bit would let a label's value fall with ``D``.
 
 Source:
     Baldacci, Mingozzi, Roberti (2011), "New route relaxation and pricing strategies for the vehicle routing problem";
@@ -108,8 +108,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
     c_x, c_y = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
     c_mask, c_cut_state = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
     c_least_fuel, c_most_value = np.zeros(chunks), np.zeros(chunks)
-    used, overflow = 0, False
-    polled, end_s = 0, now_s() + left_s
+    used, overflow, polled, end_s = 0, False, 0, now_s() + left_s
     bounded = len(bound) > 0
     new = np.zeros(words, np.uint64)
     for bucket in range(BUCKETS + 1):
