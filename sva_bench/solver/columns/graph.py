@@ -15,6 +15,7 @@ from sva_bench.solver.discounts import NO_DISCOUNT, Discount, greatest_survival,
 from sva_bench.solver.preprocess import SLACK_S, Scope, is_metric
 
 NG_START, NG_MOST = 7, 14  # POIs that a site remembers at first, and at most
+_MOST_VISITS = 1_000_000  # counted on a route whose legs may take no time
 _WITHIN = 0.9  # share of the feasibility tolerance used here: sums in another order differ by rounding
 
 
@@ -33,6 +34,7 @@ class Graph:
         discount: The vehicle's discount.
         survival: Probability to survive a leg, of use or not, shape (n, n).
         arrival: Greatest probability to get to a site, of the base: back to it, shape (n,).
+        most_visits: Upper bound on the visits of POIs of a route, repeated ones included.
         least_survival: Least probability to survive a whole route.
         driving: Least share of driving in the time of a leg, half the stops at its ends included.
         symmetric: Whether costs are symmetric and rewards independent of the way to them.
@@ -49,6 +51,7 @@ class Graph:
     discount: Discount
     survival: FloatArray
     arrival: FloatArray
+    most_visits: int
     least_survival: float
     driving: float
     symmetric: bool
@@ -83,11 +86,13 @@ def graph_of(instance: Instance, scope: Scope, discount: Discount = NO_DISCOUNT)
         and np.array_equal(fuel[legs], fuel.T[legs])
     survival = leg_survival(scope.driven_s, bit >= 0, discount)
     arrival = np.ones(n) if discount.is_plain else greatest_survival(np.where(legs, survival, 0.0), instance.base)
+    shortest = float(time[:, bit >= 0][legs[:, bit >= 0]].min(initial=np.inf))
+    visits = int(limit / max(shortest, limit / _MOST_VISITS)) + 1
     return Graph(base=instance.base, bit=bit, legs=legs, time_s=np.where(legs, time, 0.0),
                  fuel_s=np.where(legs, fuel, 0.0), capacity_s=scope.capacity_s + _WITHIN * SLACK_S,
                  limit_s=limit + _WITHIN * SLACK_S, discount=discount, survival=survival,
                  arrival=arrival,
-                 least_survival=discount.chance(len(instance.pois), limit),
+                 most_visits=visits, least_survival=discount.chance(visits, limit),
                  driving=float((drive[legs] / np.maximum(time[legs], 1e-300)).min(initial=1.0)),
                  symmetric=bool(symmetric),
                  metric=is_metric(scope.fuel_s, instance.base, tolerance_s=0.0))

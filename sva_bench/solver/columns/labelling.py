@@ -5,11 +5,10 @@ that its site remembers (its ng-set). Labels grow up to half the mission limit f
 the leg that crosses the middle. A label is dominated by another one at its site that is nowhere worse. A label that
 can't exceed a threshold even with the completion bound is dropped, so a run without results proves that no route does.
 
-Under discounts a forward label also carries the probability ``D`` to get so far; the value of its routes is ``value +
-D W - duals``, where ``W`` is what the rest is worth if the label's site is reached. A backward label carries ``W`` and,
-apart, minus its duals. Both are linear in the other end's ``W`` or ``D``, so a label is nowhere worse than another for
-all of them if it isn't at the ends of their range. The reward of the return belongs to ``W``, the cost of leaving to
-the start: a cost of losses paid bit by bit along the route would make the value of a label fall with ``D``.
+Under discounts a forward label also carries the probability ``D`` to get so far; a backward label what the rest is
+worth once its site is reached, ``W``, and apart minus its duals. A route's value is linear in ``W`` and in ``D``, so a
+label is nowhere worse than another if it isn't at either end of their range. The return is a reward within ``W``: a
+cost of losses paid bit by bit would let a label's value fall with ``D``.
 
 Source:
     Baldacci, Mingozzi, Roberti (2011), "New route relaxation and pricing strategies for the vehicle routing problem";
@@ -109,8 +108,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
     c_x, c_y = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
     c_mask, c_cut_state = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
     c_least_fuel, c_most_value = np.zeros(chunks), np.zeros(chunks)
-    used, overflow = 0, False
-    polled, end_s = 0, now_s() + left_s
+    used, overflow, polled, end_s = 0, False, 0, now_s() + left_s
     bounded = len(bound) > 0
     new = np.zeros(words, np.uint64)
     for bucket in range(BUCKETS + 1):
@@ -263,8 +261,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
     undominated = np.flatnonzero(kept[:size])
     worth = x[undominated]
     if discounted:
-        for k in range(len(undominated)):
-            label = undominated[k]
+        for k, label in enumerate(undominated):
             worth[k] = _at_both_ends(forwards, x[label], y[label], low, high[site[label]])[0]
     by_value = undominated[np.argsort(-worth)]
     placed, by_site = begin.copy(), np.zeros(len(undominated), np.int64)

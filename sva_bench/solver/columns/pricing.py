@@ -78,8 +78,9 @@ def price(
     stop, survival, arrival = stop_flag(), subgraph.survival, subgraph.arrival
     # What the rest of a route is worth if it is reached, and the probability to reach it: both within a range, over
     # which a label dominates; heuristic runs take one value of it.
-    rest = home + float(np.maximum(subgraph.reward, 0.0).sum())
-    low, high = (home * graph.least_survival, rest) if exact else (_TYPICAL * rest, _TYPICAL * rest)
+    typical = _TYPICAL * (home + float(subgraph.reward.sum()))
+    low, high = (home * graph.least_survival, home + graph.most_visits * float(subgraph.reward.max(initial=0.0))) \
+        if exact else (typical, typical)
     least, most = (graph.least_survival, arrival) if exact else (_TYPICAL, np.full_like(arrival, _TYPICAL))
     ahead = behind = extend_labels(
         following, count, time, fuel, subgraph.bit, memory, subgraph.reward, subgraph.dual, charge, not plain, survival,
