@@ -92,6 +92,7 @@ class _Leg:
         to: Its end.
         departed_s: When it left [s].
         due_s: When it is expected there [s].
+        ready_s, burnt_s: When it is expected to leave again, and what it will have burnt by then, by schedule [s].
         arrived_s: When it gets there [s]; ``inf`` if it never does.
         window: When it fails on the leg [s of driving], if it does and the moment is open.
         driven: The leg, as long as the moment is open.
@@ -100,6 +101,8 @@ class _Leg:
     to: str
     departed_s: float
     due_s: float
+    ready_s: float
+    burnt_s: float
     arrived_s: float = math.inf
     window: Window | None = None
     driven: LegDriven | None = None
@@ -184,12 +187,16 @@ class _Play:
         if able:
             heapq.heappush(self._events, (now, _STOP, robot.number))
         else:
-            robot.leg = _Leg(to=orders.route[1], departed_s=now, due_s=now + self._schedule(robot, orders.route[1]))
+            robot.leg = self._leg(robot, orders.route[1], now)
             robot.remaining = orders.route[2:]
             self._report_missing(robot, now)
 
-    def _schedule(self, robot: _Robot, to: str) -> float:
-        return self._team.scheduled_s(robot.number, robot.stops[-1], to)
+    def _leg(self, robot: _Robot, to: str, now: float) -> _Leg:
+        """A leg as it is expected to be."""
+        scheduled_s = self._team.scheduled_s(robot.number, robot.stops[-1], to)
+        orders, due_s = self._team.orders[robot.number], robot.ready_s + scheduled_s
+        return _Leg(to=to, departed_s=now, due_s=due_s, ready_s=due_s + orders.stop_s[to],
+                    burnt_s=0.0 if to in orders.stations else robot.burnt_s + scheduled_s)
 
     def _leave(self, now: float, robot: _Robot) -> None:
         """A robot's stop is over: it may learn of failures there, and goes on."""
@@ -205,7 +212,7 @@ class _Play:
         to = mission.ahead[0]
         if mission.orders.is_poi(to) and not self._chance.tries(robot.number, mission.pois + 1):
             mission.fate = RobotFate(before_poi=mission.pois + 1)
-        robot.leg = leg = _Leg(to=to, departed_s=now, due_s=robot.ready_s + self._schedule(robot, to))
+        robot.leg = leg = self._leg(robot, to, now)
         robot.remaining = mission.ahead[1:]
         if mission.depart() is None:
             self._report_missing(robot, now)
@@ -235,11 +242,10 @@ class _Play:
         robot.heard_s = min(robot.heard_s, leg.arrived_s)
         if was_poi:
             robot.visited.append(leg.to)
-        stop_s = mission.orders.stop_s[leg.to]
-        fills = leg.to in mission.orders.stations
-        burnt = robot.burnt_s + leg.due_s - robot.ready_s
-        robot.ready_s = max(leg.due_s + stop_s, mission.clock_s)
-        robot.burnt_s = 0.0 if fills else max(burnt, mission.orders.fuel_capacity_s - mission.tank_s)
+        robot.ready_s = max(leg.ready_s, mission.clock_s)
+        robot.burnt_s = leg.burnt_s
+        if leg.to not in mission.orders.stations:
+            robot.burnt_s = max(leg.burnt_s, mission.orders.fuel_capacity_s - mission.tank_s)
         if mission.end is None:
             heapq.heappush(self._events, (mission.clock_s, _STOP, robot.number))
 
@@ -355,10 +361,8 @@ class _Play:
         site, ready_s, burnt_s = robot.stops[-1], robot.ready_s, robot.burnt_s
         if robot.mission is None:
             ready_s = now
-        elif leg is not None and leg.arrived_s == math.inf:  # it ended on this leg, which isn't known of the living
-            site = leg.to
-            burnt_s = 0.0 if site in orders.stations else burnt_s + leg.due_s - ready_s
-            ready_s = leg.due_s + orders.stop_s[site]
+        elif leg is not None and now < leg.arrived_s:  # whether it is late, or ended on this leg, isn't known yet
+            site, ready_s, burnt_s = leg.to, leg.ready_s, leg.burnt_s
         standing: Standing = "alive"
         if robot.number in self._dead:
             standing = "dead"

@@ -17,6 +17,7 @@ from sva_bench.choices import NEWS, FailureProcess, News
 from sva_bench.execution.chance import Drawn
 from sva_bench.execution.outcome import RobotFate
 from sva_bench.execution.policies.policy import TeamState
+from sva_bench.execution.rules import LegDriven
 from sva_bench.execution.team import TeamOutcome, play
 from sva_bench.mission.failures import NEVER, RouteProfile, process_of
 from sva_bench.mission.instance import Instance, Vehicle
@@ -384,3 +385,25 @@ def test_random_teams_have_what_makes_teams_hard() -> None:
         found["changes"] += any(r.after for _, _, outcome in all_histories(team, instance) for r in outcome.reactions)
     assert len(found) == 7
     assert min(found.values()) >= 8, found
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.0, -1.0])
+def test_a_policy_is_not_shown_how_late_a_robot_will_be_at_the_end_of_the_leg_that_it_is_on(late_s: float) -> None:
+    # At 6 s a is on its way from p, where it was on time, to q, where it is due after 2 + 6 s.
+    cost = np.array([[0, 2, 3, 6], [2, 0, 6, 9], [3, 6, 0, 9], [6, 9, 9, 0]], dtype=float)
+    instance = Instance(name="late", sites=("base", "p", "q", "s"), base=0, stations=(), stop_s=np.zeros(4),
+                        failure="per_leg", vehicles=tuple(Vehicle(
+                            name=name, fuel_capacity_s=30, mission_limit_s=30, fuel_s=cost, availability=0.5,
+                            incentives=np.array([0.0, 10, 20, 5])) for name in "ab"))
+    heard = Heard(keep(instance))
+    fates = Drawn([RobotFate(), RobotFate(before_poi=1)])
+    team = team_of(instance, ((1, 2, 0), (3, 0)), heard, "report")
+
+    def legs(robot: int, stops: tuple[str, ...]) -> LegDriven:
+        planned = legs_of(instance)(robot, stops)
+        return planned._replace(time_s=planned.time_s + (late_s if stops[-1] == "q" else 0.0))
+
+    play(team, fates, legs)
+    (state,) = heard.states
+    seen = state.robots[0]
+    assert (state.time_s, seen.site, seen.ready_s, seen.burnt_s) == (6.0, "q", 8.0, 8.0)
