@@ -220,7 +220,7 @@ def test_a_recording_is_written_where_it_is_asked_for(result: sb.Result[Summary]
     for wrong, said in (({"scenario": "hlaf"}, "scenario 'hlaf': .*did you mean 'half'"),
                         ({"planner": "informed"}, "planner 'informed'")):
         with pytest.raises(BadInput, match=said):
-            sb.record(result, tmp_path / "z.rrd", **wrong)
+            sb.record(result, tmp_path / "z.rrd", **wrong)  # type: ignore[arg-type]
     with pytest.raises(BadInput, match=r"end in \.rrd"):
         sb.record(result, tmp_path / "z.txt")
 
@@ -552,3 +552,18 @@ def test_costs_of_sites_of_the_same_names_elsewhere_are_refused(tmp_path: Path) 
         sb.make_instance(moved, costs=sb.fuel_costs(world))
     with pytest.raises(BadInput, match="make them for this world"):
         sb.fuel_costs(moved, times=sb.travel_times(world))
+
+
+def test_a_team_that_reacts_is_recorded_and_its_rows_are_beside_the_others(tmp_path: Path) -> None:
+    path = tmp_path / "w.yaml"
+    path.write_text(SMALL.replace("limit_s: 120", "limit_s: 30"), encoding="utf-8")
+    result = sb.run(path, policy="resolve", news=["report", "instant"], scenario=["half", "safe"], trials=4, rollouts=1,
+                    fidelity="kinematic", workers=1)
+    assert set(result.outcomes["policy"].to_pylist()) == set(result.legs["policy"].to_pylist()) == {"none", "resolve"}
+    assert sb.record(result, tmp_path / "r.rrd", policy="resolve").is_file()
+    assert (tmp_path / "r.rrd").stat().st_size > sb.record(result, tmp_path / "n.rrd").stat().st_size / 2
+    for changes, said in ((("safe", "resolve", None), "orders never change"), (("half", "resolve", "station"), "news")):
+        scenario, policy, news = changes
+        with pytest.raises(BadInput, match=said):
+            sb.record(result, tmp_path / "x.rrd", scenario=scenario, policy=policy, news=news)  # type: ignore[arg-type]
+    assert not (tmp_path / "x.rrd").exists()

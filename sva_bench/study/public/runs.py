@@ -44,6 +44,7 @@ from sva_bench.study.public.arguments import (
 )
 from sva_bench.study.public.plans import plan_given
 from sva_bench.study.public.results import Result
+from sva_bench.study.publish import record_team
 from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_to_anticipate
 from sva_bench.study.run import measure, publish_run
 from sva_bench.workers.pool import count_of, local_workers
@@ -181,21 +182,24 @@ def execute(
 @called_from_python()
 def record(
     result: Result[Summary] | Result[ComparisonSummary], path: PathLike, *, scenario: str | None = None,
-    planner: str | None = None,
+    planner: str | None = None, policy: PolicyName = "none", news: News | None = None,
 ) -> Path:
-    """Write the first trial of a plan as a recording for the Rerun viewer.
+    """Write the first trial of a plan, or a typical one in which the team reacts, for the Rerun viewer.
 
     Args:
         result: What ``run`` or ``execute`` gave.
         path: The ``.rrd`` file.
         scenario: The scenario; by default the first.
         planner: Whose plan, or the name it was given by; by default the first: ``stochastic`` after ``run``.
+        policy: What the team does about failures; with one, the most probable course of events in which it changes
+            orders is shown.
+        news: When it learns of one; by default the first that was measured.
 
     Returns:
         The path.
 
     Raises:
-        BadInput: If there is no such scenario or plan, or the file can't be written.
+        BadInput: If there is no such scenario, plan or reaction, orders never change, or the file can't be written.
         ValueError: If an argument is of a wrong type.
     """
     is_a("result", result, Result, "what run or execute gave")
@@ -205,6 +209,18 @@ def record(
     check_output(target, way_out="choose another path")
     plans = result.plans
     chosen_scenario = _one_of("scenario", scenario, list(plans))
+    if choice("policy", policy, PolicyName) != "none":
+        reacting = [run for run in result.reacted
+                    if (run.case.scenario.name, run.case.policy) == (chosen_scenario, policy)]
+        if not reacting:
+            raise BadInput(f"policy {policy!r}: the result holds no such reaction; ask run or execute for it")
+        heard = _one_of("news", news, list(dict.fromkeys(run.case.news for run in reacting)))
+        mine = {run.case.planner: run for run in reacting if run.case.news == heard}
+        chosen = mine[_one_of("planner", planner, list(mine))]
+        if chosen.shown is None:
+            raise BadInput(f"{chosen.case.title}: orders never change; record it without a policy")
+        record_team(target, result.world, chosen.case, chosen.shown)
+        return target
     name = _one_of("planner", planner, list(plans[chosen_scenario]))
     executed = next(run for run in result.executed
                     if (run.case.scenario.name, run.case.planner) == (chosen_scenario, name))
