@@ -17,10 +17,12 @@ from sva_bench.choices import NEWS, FailureProcess, News
 from sva_bench.execution.chance import Drawn
 from sva_bench.execution.outcome import RobotFate
 from sva_bench.execution.policies.policy import TeamState
+from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.rules import LegDriven
 from sva_bench.execution.team import TeamOutcome, play
 from sva_bench.mission.failures import NEVER, RouteProfile, process_of
 from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.mission.rest import Afield, Rest
 from sva_bench.solver.two_stage import knowledge_of, plan_deterministic, plan_stochastic, wait_and_see
 from tests.execution.reacting import (
     Enumerated,
@@ -204,6 +206,7 @@ def check_drawn(seed: int, process: FailureProcess) -> None:
                     # When a lifetime ends is a mean in a history, and everything else is the same to the second.
                     if process != "hazard" or own.end != "failed":
                         assert own.events == other.events
+                    assert [(e.kind, e.site) for e in own.events] == [(e.kind, e.site) for e in other.events]
 
 
 @over_processes
@@ -280,6 +283,48 @@ def test_orders_after_news_are_the_best_of_the_rest(seed: int, process: FailureP
 @pytest.mark.parametrize("seed", range(1000, 1500))
 def test_orders_after_news_are_the_best_of_the_rest_on_many_teams(seed: int, process: FailureProcess) -> None:
     check_resolve(seed, process)
+
+
+def check_asked(seed: int, process: FailureProcess) -> None:
+    instance, ground, plan = setting(seed, process)
+    for news in NEWS:
+        asked: list[Rest] = []
+
+        def answer(rest: Rest, asked: list[Rest] = asked) -> dict[str, tuple[str, ...] | None]:
+            asked.append(rest)
+            _, orders = ground.best_of_rest([here_of(ground, v) for v in rest.vehicles], sum(
+                ground.bit[instance.sites.index(p)] for p in rest.open_pois))
+            return {instance.vehicles[k].name: tuple(instance.sites[j] for j in own) for k, own in orders.items()}
+
+        heard = Heard(POLICIES["resolve"](Means(instance=instance, plans_rest=answer)))
+        expected(instance, plan, heard, news)
+        robots = Enumerated(ground)
+        want = {(shown(robots.reached(state), process, "report"), robots.free(state)) for state in heard.states}
+        assert {(shown([here_of(ground, v) for v in rest.vehicles], process, "report"), sum(
+            ground.bit[instance.sites.index(p)] for p in rest.open_pois)) for rest in asked} == want
+
+
+def here_of(ground: Ground, vehicle: Afield) -> Here:
+    """A robot as the dynamic program has it."""
+    sites, names = ground.instance.sites, [v.name for v in ground.instance.vehicles]
+    return Here(names.index(vehicle.name), sites.index(vehicle.site), vehicle.ready_s, vehicle.burnt_s,
+                vehicle.availability if ground.process == "mission" else 1.0,
+                tuple(sites.index(site) for site in vehicle.orders))
+
+
+@over_processes
+@pytest.mark.parametrize("seed", range(150))
+def test_the_rest_that_is_planned_leaves_out_what_others_claim_and_counts_on_what_is_known(
+        seed: int, process: FailureProcess) -> None:
+    check_asked(seed, process)
+
+
+@pytest.mark.long
+@over_processes
+@pytest.mark.parametrize("seed", range(1000, 2000))
+def test_the_rest_that_is_planned_leaves_out_what_others_claim_on_many_teams(
+        seed: int, process: FailureProcess) -> None:
+    check_asked(seed, process)
 
 
 def check_foresight(seed: int) -> None:
