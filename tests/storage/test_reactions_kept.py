@@ -219,7 +219,8 @@ def test_the_command_prints_the_rows_of_each_plan(folder: Path, capsys: pytest.C
 
 @pytest.mark.parametrize(("foreign", "planners"), [
     (False, ["stochastic", "deterministic", "anticipative"]),
-    (True, ["stochastic", "a", "a+resolve-report", "resolve-report+a", "@resolve-report+a", "+", "trial1", "a+trial1"])])
+    (True, ["stochastic", "a", "a+resolve-report", "resolve-report+a", "@resolve-report+a", "+", "trial1",
+            "a+trial1"])])
 def test_no_two_recordings_of_a_folder_share_a_name(foreign: bool, planners: list[str]) -> None:
     scenarios = ["S", "S-stochastic", "S-resolve-report", "S-a"]
     reactions = [("none", "never"), ("resolve", "report"), ("resolve", "instant")]
