@@ -123,6 +123,23 @@ def test_the_page_of_a_batch_shows_its_reactions(folder: Path) -> None:
     assert "Teams that react" in (folder / "done" / "report.html").read_text()
 
 
+def test_how_far_a_batch_is_says_what_reacting_is_worth_so_far(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command_line(["batch", "status", str(folder / "done"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["reactions"] == json.loads((folder / "done" / "summary.json").read_text())["reactions"]
+    assert run_command_line(["batch", "status", str(folder / "done")]) == 0
+    assert "Reactions over maps" in capsys.readouterr().out
+
+
+def test_a_batch_that_is_taken_up_again_reacts_as_before(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder / "done", tmp_path / "done")
+    (tmp_path / "done" / "outcomes-one-seed0-t00000000.parquet").unlink()
+    assert run_command_line(["batch", "retry", str(tmp_path / "done"), "--cache", str(folder / "cache"), "--csv"]) == 0
+    assert content_of(tmp_path / "done") == content_of(folder / "done")
+
+
 def test_how_a_world_reacts_is_varied_as_any_key(folder: Path, tmp_path: Path) -> None:
     words = ["batch", str(folder / "one.yaml"), *QUICK, "--cache", str(folder / "cache"), "--scenario", "half",
              "--out", str(tmp_path / "out")]
