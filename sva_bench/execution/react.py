@@ -28,6 +28,7 @@ from sva_bench.execution.settling import FIGURES, figures_of
 from sva_bench.execution.team import Team, TeamOutcome, play
 from sva_bench.execution.team_trace import Played, legs_used, trace_teams, typical
 from sva_bench.execution.whole import WholeDrives
+from sva_bench.files.printable import counted
 from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
@@ -211,10 +212,11 @@ def _plays(
         return enumerated
     held = settings.trials * len(world.robots) * len(cases)
     if held > MOST_TRIALS_HELD:
-        raise BadInput(f"{settings.trials} trials of {len(cases)} plans with and without reaction: the histories of "
-                       f"{world.name} are too many to go through all, and at most "
-                       f"{MOST_TRIALS_HELD // (len(world.robots) * len(cases))} trials can be sampled (--trials), or "
-                       "more of fewer reactions (--policy, --news)")
+        most = MOST_TRIALS_HELD // (len(world.robots) * len(cases))
+        raise BadInput(f"{counted(settings.trials, 'trial')} of {counted(len(cases), 'plan')} with and without "
+                       f"reaction: the histories of {world.name} are too many to go through all, and at most "
+                       f"{counted(most, 'trial')} can be sampled (--trials), or more of fewer reactions (--policy, "
+                       "--news)")
     sampled = [_Sampled(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
     for each in sampled:
         each.begin(legs)

@@ -32,6 +32,7 @@ SWEEP = "format: sva-bench/sweep@1\nworlds: [small.yaml]\n"
     (("replay",), "replay [OPTIONS] RUN"),
     (("reproduce",), "reproduce [OPTIONS] PART [ARGS]..."),
     (("reproduce", "simulation"), "reproduce simulation [OPTIONS] [WORLD...]"),
+    (("reproduce", "reaction"), "reproduce reaction [OPTIONS] [WORLD...]"),
     (("view",), "view [OPTIONS] RUN-or-RRD"),
     (("world",), "world [OPTIONS] COMMAND [ARGS]..."), (("world", "draw"), "world draw [OPTIONS] WORLD"),
     (("world", "from-map"), "world from-map [OPTIONS] MAP.yaml|MAP.map"),
@@ -193,7 +194,7 @@ SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
 
 def test_every_command_that_draws_takes_a_seed() -> None:
     assert {" ".join(words) for words in SEEDED} == {
-        "run", "execute", "reproduce simulation", "batch over", "world random", "world from-map", "instance random"}
+        "run", "execute", "reproduce simulation", "reproduce reaction", "batch over", "world random", "world from-map", "instance random"}
     assert bounds.MOST_SEED == seeds.MOST_SEED
 
 
