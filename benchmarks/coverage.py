@@ -23,8 +23,8 @@ from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End, FailureProcess
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import RouteKey, drive_tasks
-from sva_bench.execution.execute import drives_ahead, settle_trials
-from sva_bench.execution.outcome import Assignment, Driven
+from sva_bench.execution.execute import PlannedLegs, drives_ahead, planned_legs, settle_trials
+from sva_bench.execution.outcome import Assignment, Driven, RobotFate
 from sva_bench.execution.rules import settle
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import NEVER
@@ -49,6 +49,7 @@ class Population:
         cases: Its plans, scenario by scenario.
         expected: Closed-form value of each case, by scenario and planner.
         drives: Drives by robot, route, draw and 0.
+        planned: What each leg of the routes takes as planned.
         draws: How many draws.
     """
 
@@ -56,6 +57,7 @@ class Population:
     cases: tuple[Case, ...]
     expected: Mapping[tuple[str, str], float]
     drives: Mapping[RouteKey, Driven]
+    planned: PlannedLegs
     draws: int
 
 
@@ -73,7 +75,8 @@ def population(world: World, draws: int) -> Population:
     settings = Settings(seed=10_000, trials=draws, rollouts=draws, fidelity="kinematic", recorded=False)
     ahead = drives_ahead(world, costs, tuple(cases), settings)
     return Population(world=world, cases=tuple(cases), expected=expected, draws=draws,
-                      drives=ahead.routes([drive_tasks(chunk.tasks) for chunk in ahead.chunks]))
+                      planned=planned_legs(world, costs, cases),
+                      drives=ahead.drives([drive_tasks(chunk.tasks) for chunk in ahead.chunks]).routes)
 
 
 class Truths:
@@ -115,7 +118,7 @@ class Truths:
                 fuel_capacity_s=robots[robot].fuel_capacity_s, mission_limit_s=robots[robot].mission_limit_s)
             pois = sum(orders.is_poi(site) for site in route)
             kinds = [0, NEVER] if process == "mission" else [*range(1, pois + 1), NEVER]
-            outcomes = [[settle(orders, self._of.drives[robot, route, draw, 0], fails_before)
+            outcomes = [[settle(orders, self._of.drives[robot, route, draw, 0], RobotFate(fails_before))
                          for draw in range(self._of.draws)] for fails_before in kinds]
             self._known[key] = (
                 np.array([np.mean([o.incentive for o in row]) for row in outcomes]),
@@ -131,7 +134,7 @@ def intervals(of: Population, truths: Truths, rollouts: int, trials: int, seed: 
     drives = {(robot, route, k, 0): of.drives[robot, route, int(draw), 0]
               for robot, route in {key[:2] for key in of.drives} for k, draw in enumerate(chosen)}
     settings = Settings(seed=seed, trials=trials, rollouts=rollouts, fidelity="kinematic", recorded=False)
-    runs = settle_trials(of.world, of.cases, settings, drives)
+    runs = settle_trials(of.world, of.cases, settings, drives, of.planned)
     noisy = not of.world.noise.silent
     for s, d in zip(runs[::2], runs[1::2], strict=True):
         name = s.case.scenario.name

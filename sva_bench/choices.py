@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 # Inputs
 SiteKind = Literal["base", "station", "poi"]
-FailureProcess = Literal["mission", "per_leg"]
+FailureProcess = Literal["mission", "per_leg", "hazard"]
 MapMode = Literal["trinary", "scale", "raw"]
 Unknown = Literal["occupied", "free"]
 """What cells of a map count as that are neither occupied nor free."""
@@ -20,8 +20,9 @@ InstanceFamily = Literal["A", "B", "C"]
 # Planning
 PathPlanner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
 Objective = Literal["stochastic", "deterministic"]
-PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess"]
-"""What a plan was made for; the last two are the stochastic objective with a risk."""
+PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess", "anticipative"]
+"""What a plan was made for; ``cvar`` and ``excess`` are the stochastic objective with a risk, and ``anticipative`` is
+the value with a reaction."""
 RiskKind = Literal["cvar", "excess"]
 Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
 METHODS: Mapping[Method, str] = {
@@ -41,15 +42,21 @@ Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]
 EngineName = Literal["ideal", "bullet"]
-PolicyName = Literal["none"]
-"""What a team does about news."""
+PolicyName = Literal["none", "resolve"]
+"""What a team does about news of a failure."""
 POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
-News = Literal["never"]
-"""When a team learns of a failure."""
+News = Literal["never", "station", "report", "instant"]
+"""When a team learns of a failure, the worst informed first."""
 NEWS: tuple[News, ...] = get_args(News)
+HistoryMode = Literal["enumerated", "sampled"]
+"""How the failures of a team that reacts are gone through: all histories, or a sample of trials."""
+USUAL_NEWS: News = "report"
+"""What a team that reacts hears where nothing else is asked for: a missing report needs no radio beyond a stop's."""
+Standing = Literal["alive", "unheard", "dead", "home"]
+"""What a team knows of a robot: ``unheard`` is one that has not reported from any stop yet."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
-Role = Literal["stochastic", "deterministic", "informed", "informed_part", "worst_tie", "given"]
-"""What a plan is executed for: ours; what is behind the informed planner, and one of its plans; the least fortunate of
-the deterministic plans that tie; or given from elsewhere."""
+Role = Literal["stochastic", "deterministic", "anticipative", "informed", "informed_part", "worst_tie", "given"]
+"""What a plan is executed for: ours, the third made for a reaction; what is behind the informed planner, and one of its
+plans; the least fortunate of the deterministic plans that tie; or given from elsewhere."""
 EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]

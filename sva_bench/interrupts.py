@@ -128,8 +128,10 @@ class _Block:
         with _reminding:  # from here on the thread sends no further signal
             due = _flag[0] == _PRESSED
             _flag[0] = _NOT
-        _blocks.pop()
-        signal.signal(signal.SIGINT, _before)
+        try:
+            _blocks.pop()
+        finally:  # a key that another thread was told of may be raised just here
+            signal.signal(signal.SIGINT, _before)
         if kind is None and (due or _flag[0] != _NOT):
             _flag[0] = _NOT
             raise KeyboardInterrupt

@@ -220,7 +220,7 @@ def test_a_recording_is_written_where_it_is_asked_for(result: sb.Result[Summary]
     for wrong, said in (({"scenario": "hlaf"}, "scenario 'hlaf': .*did you mean 'half'"),
                         ({"planner": "informed"}, "planner 'informed'")):
         with pytest.raises(BadInput, match=said):
-            sb.record(result, tmp_path / "z.rrd", **wrong)
+            sb.record(result, tmp_path / "z.rrd", **wrong)  # type: ignore[arg-type]
     with pytest.raises(BadInput, match=r"end in \.rrd"):
         sb.record(result, tmp_path / "z.txt")
 
@@ -269,12 +269,17 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"precision": 1, "max_trials": 5}, "max_trials 5 is less than trials 40"), ({"workers": 10_000}, "workers 10000"),
     ({"execute_failure": "hazards"}, "execute_failure 'hazards'"), ({"out": ""}, "out: an empty path"),
     ({"informed": True, "execute_failure": "per_leg"}, "leave out informed"),
+    ({"policy": "resolv"}, "^policy 'resolv': .*did you mean 'resolve'"),
+    ({"policy": ["resolve", "resolve"]}, "^policy resolve: given twice"), ({"policy": ""}, "^policy '': an entry is"),
+    ({"news": "report"}, "^news: no policy reacts to it"), ({"news": "report,soon"}, "^news 'soon'"),
+    ({"anticipate": True}, "^anticipate: .* small has none; add the policy resolve"),
 ]
 MISTYPED: list[tuple[dict[str, Any], str]] = [
     ({"trials": "many"}, "trials: expected an integer, found str 'many'"), ({"trials": 1.5}, "trials"),
     ({"trials": True}, "trials"), ({"fidelity": 3}, "fidelity: expected a word"), ({"out": 3}, "out: expected a path"),
     ({"scenario": 3}, "scenario"), ({"margin": "a"}, "margin"), ({"evpi": 1}, "evpi: expected True or False"),
-    ({"progress": 3}, "progress"), ({"out": b"x"}, "out: expected a path"),
+    ({"progress": 3}, "progress"), ({"out": b"x"}, "out: expected a path"), ({"policy": 3}, "policy: expected a name"),
+    ({"news": []}, "news: expected a name or a list"), ({"anticipate": "yes"}, "anticipate: expected True or False"),
     ({"world": 3}, "world: expected a world or the path of its file, found int 3"),
 ]
 
@@ -293,6 +298,15 @@ def test_a_value_that_cannot_be_meant_is_refused_by_the_name_of_the_argument(
 def test_an_argument_of_a_wrong_type_is_a_value_error(world: sb.World, wrong: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         sb.run(**{"world": world, **QUICK, **wrong})
+
+
+def test_given_plans_react_and_anticipate_nothing(world: sb.World) -> None:
+    plan = sb.Plan(routes={"uv1": ("base", "p1", "base")})
+    with pytest.raises(BadInput, match=r"^anticipate: execute makes no plans"):
+        sb.execute(world, plan, policy="resolve", anticipate=True, **QUICK)
+    with pytest.raises(BadInput, match=r"^news: no policy reacts"):
+        sb.execute(world, plan, news="instant", **QUICK)
+    sb.execute(world, plan, policy=["none", "resolve"], news=["report", "instant"], **QUICK)
 
 
 def test_inputs_of_a_wrong_type_are_value_errors(world: sb.World) -> None:
@@ -538,3 +552,18 @@ def test_costs_of_sites_of_the_same_names_elsewhere_are_refused(tmp_path: Path) 
         sb.make_instance(moved, costs=sb.fuel_costs(world))
     with pytest.raises(BadInput, match="make them for this world"):
         sb.fuel_costs(moved, times=sb.travel_times(world))
+
+
+def test_a_team_that_reacts_is_recorded_and_its_rows_are_beside_the_others(tmp_path: Path) -> None:
+    path = tmp_path / "w.yaml"
+    path.write_text(SMALL.replace("limit_s: 120", "limit_s: 30"), encoding="utf-8")
+    result = sb.run(path, policy="resolve", news=["report", "instant"], scenario=["half", "safe"], trials=4, rollouts=1,
+                    fidelity="kinematic", workers=1)
+    assert set(result.outcomes["policy"].to_pylist()) == set(result.legs["policy"].to_pylist()) == {"none", "resolve"}
+    assert sb.record(result, tmp_path / "r.rrd", policy="resolve").is_file()
+    assert (tmp_path / "r.rrd").stat().st_size > sb.record(result, tmp_path / "n.rrd").stat().st_size / 2
+    for changes, said in ((("safe", "resolve", None), "orders never change"), (("half", "resolve", "station"), "news")):
+        scenario, policy, news = changes
+        with pytest.raises(BadInput, match=said):
+            sb.record(result, tmp_path / "x.rrd", scenario=scenario, policy=policy, news=news)  # type: ignore[arg-type]
+    assert not (tmp_path / "x.rrd").exists()

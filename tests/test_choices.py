@@ -11,10 +11,11 @@ import pytest
 
 from sva_bench import choices
 from sva_bench.choices import Cuts, MapMode, Unknown
+from sva_bench.execution.policies.registry import POLICIES
 from sva_bench.generate import instances, terrain, worlds
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.failures import PROCESSES
-from sva_bench.recording.story import SITE_COLORS
+from sva_bench.recording.colors import SITE_COLORS
 from sva_bench.report import drawing
 from sva_bench.solver.methods import METHODS
 from sva_bench.solver.two_stage import plan_stochastic
@@ -38,7 +39,8 @@ REGISTRIES: list[tuple[str, Iterable[Any]]] = [
     ("SiteKind", drawing._KINDS),
     ("SiteKind", drawing._MARKERS),
     ("End", choices.ENDS),
-    ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"]]),
+    ("PolicyName", POLICIES),
+    ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"], "anticipative"]),
 ]
 
 

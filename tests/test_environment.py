@@ -49,7 +49,8 @@ QUICK = ("--trials", "4", "--rollouts", "2", "--workers", "2")
 
 RUN = ["run", "small.yaml", *QUICK, "--fidelity", "kinematic", "--out", "runs"]
 BATCH = ["batch", "small.yaml", *QUICK, "--fidelity", "kinematic", "--out", "out", "--cache", "cache"]
-MORE = [["report", "RUN"], ["batch", "status", "out"], ["batch", "retry", "out", "--cache", "cache"],
+MORE = [["report", "RUN"], ["replay", "RUN", "--trial", "0", "--scenario", "half"],
+        ["batch", "status", "out"], ["batch", "retry", "out", "--cache", "cache"],
         ["execute", "small.yaml", "PLAN", *QUICK, "--fidelity", "kinematic", "--out", "runs2"]]
 
 

@@ -34,8 +34,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "_charts", lambda *_, **__: [])  # drawing is tried once, below; it takes a second
         patch.setattr(report, "_world", lambda *_: [])
-        assert run_command_line(["run", str(world), *QUICK, "--informed", "--assumptions", "--out",
-                                 str(folder / "runs")]) == 0
+        assert run_command_line(["run", str(world), *QUICK, "--informed", "--assumptions", "--policy",
+                                 "resolve", "--news", "instant", "--anticipate", "--out", str(folder / "runs")]) == 0
         (run,) = (folder / "runs").iterdir()
         plans = sorted(map(str, (run / "plans").glob("half-*tic.json")))
         assert run_command_line(["execute", str(world), *plans, *QUICK, "--out", str(folder / "more")]) == 0

@@ -65,6 +65,7 @@ MEMBERS = """\
 scenarios:
   S5: {joint: [{probability: 0.6, available: [uv1, uv2]}, {probability: 0.4, available: [uv1]}]}
 failure: {plan: mission, execute: per_leg}
+reaction: {policy: resolve, news: report}
 """
 OTHER_KEYS = SMALL.replace("scenarios:\n  half: {uv2: 0.5}\n  safe: {uv2: 1.0}\n", MEMBERS).replace(
     "incentives: {p1: 10, p2: 20, p3: 30, p4: 40}", "incentives: {uniform: [0, 170], zero_share: 0.5, seed: 3}"

@@ -87,8 +87,7 @@ def measure(case: Case) -> str:
 def alone(instance: Instance) -> float:
     """Value of the heuristic's plan."""
     weights = np.array([v.incentives * v.availability for v in instance.vehicles])
-    ones = np.ones(len(instance.vehicles))
-    found = search(leg_tables(instance), weights, ones, tuple(() for _ in instance.vehicles))
+    found = search(leg_tables(instance), weights, None, tuple(() for _ in instance.vehicles))
     return float(sum(weights[m, j] for m, order in enumerate(found.orders) for j in order))
 
 

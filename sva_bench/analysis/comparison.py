@@ -8,10 +8,11 @@ from itertools import combinations
 import numpy as np
 
 from sva_bench.analysis.figures import difference_figure
+from sva_bench.analysis.moments import Figure
 from sva_bench.analysis.over_trials import Judged, plan_result, totals, verdict_of
-from sva_bench.analysis.results import ComparedScenario, Comparison, GivenPlanResult, Ranked
+from sva_bench.analysis.results import Comparison, GivenPlanResult, Ranked
+from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.statistics import estimate
-from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed
 
 
@@ -27,25 +28,29 @@ def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy:
         name=scenario.name, availability={name: scenario.availability[name] for name in robots},
         plans={judged.executed.case.planner: GivenPlanResult(
             **vars(plan_result(judged.promise, judged.executed, noisy=noisy)), feasible=judged.feasible,
-            lost=lost(judged.executed)) for judged in plans},
+            lost=int(judged.executed.lost.sum())) for judged in plans},
         comparisons=tuple(comparisons),
         ranking=ranking({p.executed.case.planner: float(np.mean(totals(p.executed))) for p in plans}, comparisons))
 
 
 def _comparison(a: Executed, b: Executed, pairs: int, *, noisy: bool) -> Comparison:
-    beyond = difference_figure(a, b, noisy=noisy)
-    single, simultaneous = estimate(beyond), estimate(beyond, comparisons=pairs)
-    names = a.case.planner, b.case.planner
-    same = a.case.plan.drives_like(b.case.plan)
+    return comparison_of(difference_figure(a, b, noisy=noisy), (a.case.planner, b.case.planner), pairs,
+                         same=a.case.plan.drives_like(b.case.plan))
+
+
+def comparison_of(difference: Figure, names: tuple[str, str], pairs: int, *, same: bool) -> Comparison:
+    """The comparison of two plans.
+
+    Args:
+        difference: Value of the first less that of the second.
+        names: What they go by.
+        pairs: Number of pairs whose intervals hold simultaneously.
+        same: Whether they have the same routes.
+    """
+    single, simultaneous = estimate(difference), estimate(difference, comparisons=pairs)
     return Comparison(a=names[0], b=names[1], mean=single.mean, ci95=single.ci95, ci95_adjusted=simultaneous.ci95,
                       distinguishable=simultaneous.excludes_zero, same_plan=same,
                       verdict=verdict_of(simultaneous, *names, same=same))
-
-
-def lost(run: Executed) -> int:
-    """Number of robot missions of all trials that ended along the route: by a failure, out of fuel or stuck."""
-    along = (run.end == ENDS.index("failed")) & (run.stops_reached > 0)
-    return int((along | (run.end == ENDS.index("out_of_fuel")) | (run.end == ENDS.index("stuck"))).sum())
 
 
 def ranking(means: Mapping[str, float], comparisons: Sequence[Comparison]) -> tuple[Ranked, ...]:

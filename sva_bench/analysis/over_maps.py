@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
-from sva_bench.analysis.results import Estimate, ScenarioFigures, Words
+from sva_bench.analysis.results import Estimate, Words
+from sva_bench.analysis.scenarios import UnitScenario
 from sva_bench.analysis.summaries import Head, Reach
-from sva_bench.choices import Fidelity
+from sva_bench.choices import Fidelity, News, PolicyName
 from sva_bench.files.fields import NonNegativeInt
-from sva_bench.files.records import Record
+from sva_bench.files.records import Record, stands_after
 
 BATCH: Literal["sva-bench/batch@1"] = "sva-bench/batch@1"
 
@@ -25,7 +27,7 @@ class UnitSummary(Head):
     """
 
     variant: str
-    scenarios: tuple[ScenarioFigures, ...]
+    scenarios: tuple[UnitScenario, ...]
     reach: Reach
 
     @property
@@ -84,6 +86,39 @@ class OverMaps(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class GainOverMaps(Estimate):
+    """A difference in value over maps, and in per cent."""
+
+    pct: Percentage
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReactionOverMaps(Record):
+    """One policy and kind of news over maps, for one variant and scenario; the maps are the sample.
+
+    Attributes:
+        variant, scenario, policy, news: What was executed.
+        maps: Number of maps.
+        vss, value_of_recourse, vss_with_recourse, anticipation: As of ``ReactionResult``.
+    """
+
+    variant: str
+    scenario: str
+    policy: PolicyName
+    news: News
+    maps: int
+    vss: GainOverMaps
+    value_of_recourse: Mapping[str, GainOverMaps]
+    vss_with_recourse: GainOverMaps
+    anticipation: GainOverMaps
+
+    @property
+    def name(self) -> str:
+        """Policy and news, as shown to users."""
+        return f"{self.policy} on {self.news} news"
+
+
+@dataclass(frozen=True, kw_only=True)
 class GivenUp(Record):
     """A unit that failed for good, and why."""
 
@@ -108,6 +143,7 @@ class BatchSummary(Record):
     maps: tuple[MapRow, ...]
     aggregate: tuple[OverMaps, ...]
     failed: tuple[GivenUp, ...]
+    reactions: tuple[ReactionOverMaps, ...] = field(default_factory=tuple, metadata=stands_after("aggregate"))
 
 
 def labelled(name: str, variant: str) -> str:

@@ -19,11 +19,11 @@ from sva_bench.analysis.results import (
     PlanResult,
     Promise,
     ScenarioFacts,
-    ScenarioSummary,
     Share,
     Vss,
     VssFigures,
 )
+from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.statistics import controlled, distribution, estimate
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.arrays import FloatArray
@@ -102,13 +102,13 @@ def vss_figures(facts: ScenarioFacts, plans: Mapping[str, PlanFigures], differen
     Args:
         facts: Modelled values of the scenario.
         plans: Results of the stochastic and the deterministic plan.
-        difference: Executed difference in incentive between the two.
+        difference: Executed difference in value between the two.
     """
     s, d = plans["stochastic"], plans["deterministic"]
     modelled = s.expected - d.expected + 0.0
     return VssFigures(
-        modelled=modelled, modelled_pct=_percent(modelled, s.expected), modelled_range=facts.modelled_range,
-        executed=difference, executed_pct=_percent(difference.mean, s.executed.mean),
+        modelled=modelled, modelled_pct=percent(modelled, s.expected), modelled_range=facts.modelled_range,
+        executed=difference, executed_pct=percent(difference.mean, s.executed.mean),
         distinguishable=difference.excludes_zero, same_plan=facts.same_plan,
         verdict=verdict_of(difference, "stochastic", "deterministic", same=facts.same_plan))
 
@@ -137,7 +137,7 @@ def plan_result(promise: Promise, run: Executed, *, noisy: bool) -> PlanResult:
     counts: dict[End, int] = {end: int((run.end == k).sum()) for k, end in enumerate(ENDS)}
     shares = {name: {end: _share(found) for end, found in end_figures(run, k, noisy=noisy).items()
                      if (run.end[:, k] == ENDS.index(end)).any()} for k, name in enumerate(run.robots)}
-    by_robot = {name: float(run.incentive[:, k].mean()) for k, name in enumerate(run.robots)}
+    by_robot = {name: float(run.value[:, k].mean()) for k, name in enumerate(run.robots)}
     statistics = {key: estimate(found) for key, found in measured(run, noisy=noisy).items()}
     sums = plan_figures(promise, estimate(figure), by_robot, counts, charges(run) / len(run.end), statistics)
     return PlanResult(**vars(sums), executed_controlled=controlled(figure, promise.expected),
@@ -156,11 +156,11 @@ def promise_of(plan: Plan, expected: float) -> Promise:
 
 
 def charges(run: Executed) -> FloatArray:
-    """Incentive lost to each end in ``EXECUTION_LOSSES`` in all trials together, shape (3,).
+    """Value lost to each end in ``EXECUTION_LOSSES`` in all trials together, shape (3,).
 
-    A POI is charged to the end of the robot whose route it is on.
+    A POI is charged to the end of the robot whose route it is on, and the cost of a lost robot to its own.
     """
-    lost = run.planned_incentive - run.incentive
+    lost = run.planned_incentive - run.value
     return np.array([float(np.where(run.end == ENDS.index(end), lost, 0.0).sum()) for end in EXECUTION_LOSSES])
 
 
@@ -172,10 +172,10 @@ def plan_figures(
 
     Args:
         promise: Its values before any trial.
-        executed: Mean incentive of the team.
-        by_robot: Mean incentive of each robot.
+        executed: Mean value of the team.
+        by_robot: Mean value of each robot.
         ends: Number of robot missions with each end.
-        charged: Mean incentive lost to each end in ``EXECUTION_LOSSES``, shape (3,).
+        charged: Mean value lost to each end in ``EXECUTION_LOSSES``, shape (3,).
         statistics: The measured statistics, by key.
     """
     return PlanFigures(**vars(promise), executed=executed, by_robot=by_robot, statistics=statistics,
@@ -198,9 +198,9 @@ def ledger(promise: Promise, charged: FloatArray, executed: float) -> Ledger:
 
 
 def totals(run: Executed) -> FloatArray:
-    """Incentive of the team in each trial, shape (trials,)."""
-    collected: FloatArray = run.incentive.sum(axis=1)
-    return collected
+    """Value of the team in each trial, shape (trials,)."""
+    value: FloatArray = run.value.sum(axis=1)
+    return value
 
 
 def _share(figure: Figure) -> Share:
@@ -208,7 +208,7 @@ def _share(figure: Figure) -> Share:
     return Share(share=found.mean, ci95=found.ci95)
 
 
-def _percent(part: float, whole: float) -> float | None:
+def percent(part: float, whole: float) -> float | None:
     """A percentage; ``None`` of 0, or beyond ``MOST_AMOUNT``."""
-    percentage = 100.0 * part / whole + 0.0 if whole else np.inf
+    percentage = 100.0 * part / whole + 0.0 if whole > 0 else np.inf
     return percentage if abs(percentage) <= MOST_AMOUNT else None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sva_bench.analysis.results import ScenarioSummary
+from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.summaries import ReachedPrecision, Summary
 from sva_bench.errors import BadInput
 

@@ -132,8 +132,8 @@ class PlanFigures(Promise):
     """The results of a plan that follow from sums over its trials.
 
     Attributes:
-        executed: Mean incentive of the team.
-        by_robot: Mean incentive of each robot.
+        executed: Mean value of the team.
+        by_robot: Mean value of each robot.
         ends: Number of robot missions with each end.
         ledger: Decomposition of executed less promised value.
         statistics: Those of ``analysis.catalogue`` that are measured trial by trial, by their keys.
@@ -151,7 +151,7 @@ class PlanResult(PlanFigures):
     """The results of a plan from its single trials.
 
     Attributes:
-        executed_controlled: Variance-reduced mean incentive of the team.
+        executed_controlled: Variance-reduced mean value of the team.
         distribution: Distribution over trials.
         end_shares: Share of trials with each end, by robot.
     """
@@ -167,7 +167,7 @@ class GivenPlanResult(PlanResult):
 
     Attributes:
         feasible: Whether it keeps fuel capacities and mission limits.
-        lost: Number of robot missions that ended along the route.
+        lost: Number of robot missions that left the base and didn't come home.
     """
 
     feasible: bool
@@ -181,7 +181,7 @@ class VssFigures(Record):
     Attributes:
         modelled, modelled_pct: Difference of the plans' closed-form values; in per cent of the stochastic plan's.
         modelled_range: Least and greatest over all deterministic plans that tie; ``None`` if not known.
-        executed, executed_pct: Difference in incentive; in per cent of the stochastic plan's mean.
+        executed, executed_pct: Difference in value; in per cent of the stochastic plan's mean.
         distinguishable: Whether the executed interval excludes zero.
         same_plan: Whether both plans have the same routes.
         verdict: Which plan has the greater value, in words.
@@ -212,7 +212,7 @@ class Vss(VssFigures):
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison(Record):
-    """The incentive of plan ``a`` less that of ``b``, trial by trial; the verdict follows the simultaneous interval."""
+    """The value of plan ``a`` less that of ``b``, trial by trial; the verdict follows the simultaneous interval."""
 
     a: PlanName
     b: PlanName
@@ -235,7 +235,7 @@ class Ranked(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PerfectInformation(Estimate):
-    """The executed EVPI: incentive of the perfect-information plans less that of the stochastic plan."""
+    """The executed EVPI: value of the perfect-information plans less that of the stochastic plan."""
 
     distinguishable: bool
     verdict: Words
@@ -258,7 +258,7 @@ class AssumptionRow(Record):
         planner: ``stochastic`` or ``deterministic``.
         planned_for: The failure process that it was made for; ``None`` for the deterministic plan.
         expected: Its closed-form value under the process executed.
-        executed: Mean incentive of the team.
+        executed: Mean value of the team.
         loss_modelled, loss: Value of the plan for the process executed less its own, modelled and executed.
     """
 
@@ -326,61 +326,3 @@ class ScenarioFigures(ScenarioPlans):
     def deterministic(self) -> PlanFigures:
         """The results of the deterministic plan."""
         return self.plans["deterministic"]
-
-
-def not_null(given: object) -> object:
-    """The value of a key that may be absent, but not null."""
-    if given is None:
-        raise ValueError("expected something, found nothing")
-    return given
-
-
-@dataclass(frozen=True, kw_only=True)
-class ScenarioSummary(ScenarioFigures):
-    """One scenario of ``run``.
-
-    Attributes:
-        evpi_executed: Executed EVPI, with ``--informed``.
-        assumptions: Plans executed under each failure process, with ``--assumptions``.
-    """
-
-    plans: Annotated[Mapping[PlanName, PlanResult], Field(min_length=1)]
-    vss: Vss
-    evpi_executed: Annotated[PerfectInformation | None, BeforeValidator(not_null)] = None
-    assumptions: Annotated[tuple[AssumptionRow, ...] | None, BeforeValidator(not_null)] = None
-
-    @model_validator(mode="after")
-    def _is_consistent(self) -> ScenarioSummary:
-        _refuse_other_robots(self.plans, self.availability)
-        if not {"stochastic", "deterministic"} <= set(self.plans):
-            raise ValueError("a scenario with 'vss' has the plans 'stochastic' and 'deterministic'")
-        s, d = self.stochastic.executed.mean, self.deterministic.executed.mean
-        if abs(self.vss.executed.mean - (s - d)) > 1e-6 * max(abs(s), abs(d)):
-            raise ValueError("vss.executed.mean: expected the difference between the plans' means, "
-                             f"{s - d:g}, found {self.vss.executed.mean:g}")
-        return self
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparedScenario(ScenarioPlans):
-    """One scenario of ``execute``: the comparison of every pair of plans, and their ranking."""
-
-    plans: Annotated[Mapping[PlanName, GivenPlanResult], Field(min_length=1)]
-    comparisons: tuple[Comparison, ...]
-    ranking: tuple[Ranked, ...]
-
-    @model_validator(mode="after")
-    def _is_consistent(self) -> ComparedScenario:
-        _refuse_other_robots(self.plans, self.availability)
-        if sorted(row.plan for row in self.ranking) != sorted(self.plans):
-            raise ValueError("ranking: expected each of 'plans' once")
-        if not {name for pair in self.comparisons for name in (pair.a, pair.b)} <= set(self.plans):
-            raise ValueError("comparisons: expected pairs of 'plans'")
-        return self
-
-
-def _refuse_other_robots(plans: Mapping[str, PlanResult], availability: Mapping[str, float]) -> None:
-    for name, plan in plans.items():
-        for key, held in (("by_robot", plan.by_robot), ("end_shares", plan.end_shares)):
-            if list(held) != list(availability):
-                raise ValueError(f"plans.{name}.{key}: expected the robots of 'availability', in its order")

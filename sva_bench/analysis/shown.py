@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sva_bench.analysis.results import ComparedScenario, ScenarioPlans, ScenarioSummary
+from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.results import PlanFigures, ScenarioPlans, VssFigures
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.files.notebook import notebook_table
 from sva_bench.files.printable import counted
 
@@ -18,31 +20,45 @@ def headline(world: str, seed: int, trials: int, rollouts: int, fidelity: str) -
 
 
 def lines_of(scenarios: Sequence[ScenarioPlans]) -> list[str]:
-    """A line for each scenario: what each plan collected, and the VSS where there is one."""
+    """A line for each scenario: what each plan collected, and the VSS where there is one; one for each reaction."""
     lines = []
     for scenario in scenarios[:_MOST_LINES]:
         plans = ", ".join(f"{name} {_figure(plan.executed.mean, plan.executed.ci95)}"
                           for name, plan in scenario.plans.items())
         vss = _vss(scenario)
         lines.append(f"{scenario.name}: {plans}" + (f"; VSS {vss}" if vss else ""))
+        lines += [f"  {reaction.name}: VSS {_difference(reaction.vss)}; best plan tried: {reaction.best.plan}"
+                  for reaction in _reactions(scenario)]
     more = len(scenarios) - _MOST_LINES
     return [*lines, f"and {more} more"] if more > 0 else lines
 
 
 def table_of(title: str, scenarios: Sequence[ScenarioPlans]) -> str:
-    """A row for each scenario and plan."""
+    """A row for each scenario and plan, and for each plan whose team reacts."""
     compared = any(isinstance(scenario, ComparedScenario) for scenario in scenarios)
-    rows = [
-        ["" if number else scenario.name, name, f"{plan.promised:.1f}", f"{plan.expected:.1f}",
-         _figure(plan.executed.mean, plan.executed.ci95), *([] if compared else ["" if number else _vss(scenario)])]
-        for scenario in scenarios for number, (name, plan) in enumerate(scenario.plans.items())]
+    rows = []
+    for scenario in scenarios:
+        rows += [["" if number else scenario.name, name, *_cells(plan),
+                  *([] if compared else ["" if number else _vss(scenario)])]
+                 for number, (name, plan) in enumerate(scenario.plans.items())]
+        rows += [["", f"{name}, {reaction.name}", *_cells(plan), "" if number else _difference(reaction.vss)]
+                 for reaction in _reactions(scenario) for number, (name, plan) in enumerate(reaction.plans.items())]
     return notebook_table(title, _HEAD[:-1] if compared else _HEAD, rows)
 
 
+def _cells(plan: PlanFigures) -> list[str]:
+    return [f"{plan.promised:.1f}", f"{plan.expected:.1f}", _figure(plan.executed.mean, plan.executed.ci95)]
+
+
+def _reactions(scenario: ScenarioPlans) -> tuple[ReactionResult, ...]:
+    return scenario.reactions or () if isinstance(scenario, ScenarioSummary) else ()
+
+
 def _vss(scenario: ScenarioPlans) -> str:
-    if not isinstance(scenario, ScenarioSummary):
-        return ""
-    vss = scenario.vss
+    return _difference(scenario.vss) if isinstance(scenario, ScenarioSummary) else ""
+
+
+def _difference(vss: VssFigures) -> str:
     return "0: the same plan" if vss.same_plan else _figure(vss.executed.mean, vss.executed.ci95)
 
 

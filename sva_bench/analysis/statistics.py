@@ -178,6 +178,22 @@ def distribution(values: FloatArray) -> Distribution:
                         greatest=float(np.max(values)), cvar10=tail_mean(values, WORST))
 
 
+def weighted_distribution(values: FloatArray, weights: FloatArray) -> Distribution:
+    """Quantiles of values with probabilities, and the mean of the worst tenth of the probability.
+
+    Args:
+        values, weights: Shape (n,).
+    """
+    order = np.argsort(values, kind="stable")
+    ordered, below = values[order], np.cumsum(weights[order])
+    total = float(below[-1])
+    q05, q25, q50, q75, q95 = (float(ordered[min(int(np.searchsorted(below, (q - 1e-12) * total)), len(values) - 1)])
+                               for q in _QUANTILES)
+    worst = np.clip(WORST * total - (below - weights[order]), 0.0, weights[order])
+    return Distribution(least=float(ordered[0]), q05=q05, q25=q25, q50=q50, q75=q75, q95=q95,
+                        greatest=float(ordered[-1]), cvar10=float(worst @ ordered / worst.sum()) + 0.0)
+
+
 def tail_mean(values: FloatArray, worst: float) -> float:
     """Conditional value at risk: the mean of a given share of worst trials.
 

@@ -8,17 +8,8 @@ from typing import Annotated, Generic, Literal, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from sva_bench.analysis.results import (
-    MOST_ROLLOUTS,
-    MOST_TRIALS,
-    SUMMARY,
-    Amount,
-    ComparedScenario,
-    ScenarioFacts,
-    ScenarioPlans,
-    ScenarioSummary,
-    not_null,
-)
+from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, SUMMARY, Amount, ScenarioFacts, ScenarioPlans
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary, not_null
 from sva_bench.analysis.shown import headline, lines_of, table_of
 from sva_bench.choices import FailureProcess, Fidelity
 from sva_bench.errors import UnknownName, nearest

@@ -19,7 +19,7 @@ from sva_bench.execution.margins import Margins
 from sva_bench.mission.instance import TOLERANCE_S
 
 EXECUTION_LOSSES: tuple[End, ...] = ("out_of_fuel", "late", "stuck")
-"""The ends that lose incentive by the execution, not by a failure drawn."""
+"""The ends that lose value by the execution, not by a failure drawn."""
 
 _TAIL = 0.025  # one side of a 95 % interval
 _STUCK_S = 10.0  # least delay of a robot that gets stuck: that long without progress defines it
@@ -34,11 +34,11 @@ class Exposure:
     Shares are relative to the upper limit of an unobserved event: 1 = all that 3 / K allows, 0 = impossible.
 
     Attributes:
-        incentive: Incentive of each robot's POIs, each weighted by that share, shape (robots,).
+        value: Incentive of each robot's POIs and the cost of its loss, each weighted by that share, shape (robots,).
         ends: Such share of each end in ``EXECUTION_LOSSES``, shape (robots, 3).
     """
 
-    incentive: FloatArray
+    value: FloatArray
     ends: FloatArray
 
 
@@ -50,15 +50,16 @@ def exposure_of(margins: Sequence[Margins], robots: int, *, noisy: bool) -> Expo
         robots: Number of robots.
         noisy: Whether noise draws differ; without noise the observed one determines all.
     """
-    incentive, ends = np.zeros(robots), np.zeros((robots, len(EXECUTION_LOSSES)))
+    value, ends = np.zeros(robots), np.zeros((robots, len(EXECUTION_LOSSES)))
     for route in margins:
         nothing_known = (np.ones(len(route.worth)),) * 3
         fuel, late, stuck = _shares(route, noisy=noisy) if len(route.leg_s) else nothing_known
         lost = np.minimum(fuel + late + stuck, 1.0)
         m = route.robot
-        incentive[m] = max(incentive[m], float(route.worth @ lost))
+        never_home = min(float(fuel[-1] + stuck[-1]), 1.0)
+        value[m] = max(value[m], float(route.worth @ lost) + route.loss_cost * never_home)
         ends[m] = np.maximum(ends[m], [fuel[-1], late[-1], stuck[-1]])
-    return Exposure(incentive=incentive, ends=ends)
+    return Exposure(value=value, ends=ends)
 
 
 def _shares(route: Margins, *, noisy: bool) -> tuple[FloatArray, FloatArray, FloatArray]:

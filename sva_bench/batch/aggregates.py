@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from sva_bench.analysis.moments import Figure, pooled
-from sva_bench.analysis.over_maps import BatchSummary, GivenUp, MapRow, MapVss, OverMaps, Percentage, UnitSummary
+from sva_bench.analysis.over_maps import BatchSummary, GivenUp, MapRow, MapVss, OverMaps, UnitSummary
 from sva_bench.analysis.results import Estimate, VssFigures
-from sva_bench.analysis.statistics import estimate, sample_mean
+from sva_bench.analysis.statistics import estimate
 from sva_bench.batch.folder import shard_path
 from sva_bench.batch.grid import Grid
+from sva_bench.batch.map_samples import over, percentage_of
+from sva_bench.batch.reactions_over_maps import reactions_over_maps
 from sva_bench.batch.shards import Note, read_note, unit_of
 from sva_bench.batch.tallies import join, scenario_of
 
@@ -28,7 +30,8 @@ def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failur
         trials=grid.options.trials, fidelity=grid.options.fidelity,
         worlds=tuple(dict.fromkeys(point.world.name for point in grid.points)), seeds=tuple(grid.seeds),
         variants=tuple(dict.fromkeys(point.variant for point in grid.points)), units=tuple(units),
-        maps=map_rows(units, over_seeds(notes)), aggregate=aggregate(units), failed=tuple(failures))
+        maps=map_rows(units, over_seeds(notes)), aggregate=aggregate(units),
+        failed=tuple(failures), reactions=reactions_over_maps(units))
 
 
 def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterator[Note]:
@@ -48,7 +51,7 @@ def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterato
 def joined(a: Note, b: Note) -> Note:
     """The note of two ranges of trials of one point and seed."""
     return Note(facts=a.facts, variant=a.variant, robots=a.robots, first=min(a.first, b.first),
-                trials=a.trials + b.trials,
+                trials=a.trials + b.trials, reactions=a.reactions or b.reactions,
                 tallies={name: join(tally, b.tallies[name]) for name, tally in a.tallies.items()})
 
 
@@ -59,7 +62,8 @@ def unit_summary(note: Note) -> UnitSummary:
         world=facts.world, seed=facts.seed, trials=note.trials, rollouts=facts.rollouts, fidelity=facts.fidelity,
         failure=facts.failure, travel=facts.travel, reproducible=facts.reproducible, reach=facts.reach,
         variant=note.variant, scenarios=tuple(
-            scenario_of(scenario, note.tallies[scenario.name], note.robots) for scenario in facts.scenarios))
+            scenario_of(scenario, note.tallies[scenario.name], note.robots, note.reactions.get(scenario.name))
+            for scenario in facts.scenarios))
 
 
 def aggregate(units: Sequence[UnitSummary]) -> tuple[OverMaps, ...]:
@@ -80,17 +84,8 @@ def aggregate(units: Sequence[UnitSummary]) -> tuple[OverMaps, ...]:
         pcts = [float(np.mean(pct)) for pct in shares if pct]
         rows.append(OverMaps(
             variant=variant, scenario=scenario, maps=len(by_map), vss=over(vss, sure=certain),
-            vss_pct=_percentage(pcts, len(by_map), sure=certain)))
+            vss_pct=percentage_of(pcts, len(by_map), sure=certain)))
     return tuple(rows)
-
-
-def _percentage(figures: Sequence[float], maps: int, *, sure: bool) -> Percentage:
-    """Mean over the maps that have a percentage."""
-    fewer = None if len(figures) == maps else len(figures)
-    if not figures:
-        return Percentage(mean=None, ci95=None, maps=fewer)
-    found = over(figures, sure=sure)
-    return Percentage(mean=found.mean, ci95=found.ci95, maps=fewer)
 
 
 Key = tuple[str, str, str]
@@ -133,10 +128,3 @@ def _by_map(units: Sequence[UnitSummary]) -> dict[tuple[str, str], dict[str, lis
         for scenario in unit.scenarios:
             found.setdefault((unit.variant, scenario.name), {}).setdefault(unit.world, []).append(scenario.vss)
     return found
-
-
-def over(figures: Sequence[float], *, sure: bool) -> Estimate:
-    """Mean of a sample of maps, with its interval; ``sure`` where the value is the same on every possible map."""
-    found = sample_mean(figures)
-    alike = sure and len(figures) > 1 and len(set(figures)) == 1
-    return Estimate(mean=found.mean, ci95=(found.mean, found.mean)) if alike else found

@@ -11,12 +11,15 @@ from sva_bench.batch.cache import Cache
 from sva_bench.batch.folder import units_in
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob
+from sva_bench.batch.reactions import ReactionsJob
 from sva_bench.batch.strands import strand
+from sva_bench.study.options import Options, reactions_of
 from sva_bench.workers.engine import Job
 from sva_bench.workers.progress import OnProgress
+from sva_bench.world.model import World
 
 # Measured on a core of a shared virtual machine.
-_PATHS_S, _PLANS_S, _ROW_S = 5.0, 5.0, 1.5e-6
+_PATHS_S, _PLANS_S, _REACTION_S, _ROW_S = 5.0, 5.0, 2.5, 1.5e-6
 _REAL_TIME = 135.0
 """Speed of physics relative to real time."""
 _TWIN_TIME = 3000.0
@@ -81,15 +84,23 @@ def _seconds(job: Job, each: float) -> float:
         return _PATHS_S
     if isinstance(job, PlansJob):
         return _PLANS_S * len(job.world.scenarios)
+    if isinstance(job, ReactionsJob):
+        return _reactions_s(job.world, job.options)
     assert isinstance(job, DriveJob)
     return _USUAL_MISSION_S / each
+
+
+def _reactions_s(world: World, options: Options) -> float:
+    return _REACTION_S * len(world.scenarios) * len(reactions_of(world, options)) * (2 if options.anticipate else 1)
 
 
 def _beyond(job: Job, point: Point, grid: Grid, each: float) -> float:
     """Estimated processor time of the steps after one whose result isn't cached [s]."""
     scenarios = len(point.world.scenarios)
     plans = _PLANS_S * scenarios if isinstance(job, TravelTimesJob) else 0.0
-    if isinstance(job, DriveJob) or grid.options.fidelity == "physics":
+    if not isinstance(job, ReactionsJob):
+        plans += _reactions_s(point.world, grid.options)
+    if isinstance(job, DriveJob | ReactionsJob) or grid.options.fidelity == "physics":
         return plans
     rollouts = 1 if point.world.noise.silent else min(grid.options.rollouts, grid.options.trials)
     # A stochastic plan for each scenario and about one deterministic plan for all.

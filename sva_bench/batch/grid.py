@@ -77,7 +77,8 @@ class Grid:
         stored = self.options
         options = OptionsEntry(
             trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, informed=False, assumptions=False,
-            time_limit_s=stored.limits.time_limit_s, gap=stored.limits.gap, evpi=stored.evpi)
+            time_limit_s=stored.limits.time_limit_s, gap=stored.limits.gap, evpi=stored.evpi,
+            policies=stored.policies, news=stored.news, anticipate=stored.anticipate or None)
         return BatchSettings(version=__version__, seeds=tuple(self.seeds), options=options,
                              unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points})
 
@@ -150,6 +151,7 @@ def grid_of(document: Part, settings: BatchSettings) -> Grid:
     stored = settings.options
     options = Options(
         trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, evpi=stored.evpi,
+        policies=stored.policies, news=stored.news, anticipate=bool(stored.anticipate),
         limits=SolveLimits(time_limit_s=stored.time_limit_s, gap=stored.gap))
     points = []
     for name, entry in settings.points.items():

@@ -10,11 +10,11 @@ import numpy as np
 
 from sva_bench.analysis.summaries import Facts
 from sva_bench.arrays import FloatArray
-from sva_bench.batch.shards import Shard, shard_of
+from sva_bench.batch.shards import Reactions, Shard, shard_of
 from sva_bench.choices import PathPlanner
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import DriveTask, RouteKey, drive_tasks
-from sva_bench.execution.execute import execute, settle_trials
+from sva_bench.execution.execute import PlannedLegs, execute, settle_trials
 from sva_bench.execution.noise import UNDISTURBED
 from sva_bench.execution.outcome import Driven
 from sva_bench.files.digest import digest
@@ -159,6 +159,8 @@ class TrialsJob:
         first, trials: The range.
         facts: What is known of the plans before any trial.
         drives: All routes driven, but for ``physics``, which needs ``costs`` to make its own.
+        planned: What each leg of the routes takes as planned.
+        reactions: What came of its point and seed with reactions, of the first range of trials.
     """
 
     kind: ClassVar[str] = "trials"
@@ -173,7 +175,9 @@ class TrialsJob:
     trials: int
     facts: Facts
     drives: Mapping[RouteKey, Driven]
+    planned: PlannedLegs
     costs: Mapping[str, FuelCosts]
+    reactions: Reactions
 
     @property
     def key(self) -> str:
@@ -191,8 +195,8 @@ class TrialsJob:
         if settings.fidelity == "physics":
             executed = execute(self.world, self.costs, self.cases, settings)
         else:
-            executed = settle_trials(self.world, self.cases, settings, self.drives)
-        return shard_of(self.world, self.variant, executed, settings, self.facts)
+            executed = settle_trials(self.world, self.cases, settings, self.drives, self.planned)
+        return shard_of(self.world, self.variant, executed, settings, self.facts, self.reactions)
 
     def fits(self, result: Shard) -> bool:
         """The shard of its trials."""

@@ -9,10 +9,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from sva_bench.analysis.over_maps import GivenUp
+from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, low_and_high
 from sva_bench.analysis.summaries import Facts
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
-from sva_bench.choices import ENDS, Fidelity, Objective, PathPlanner
+from sva_bench.choices import ENDS, Fidelity, News, Objective, PathPlanner, PolicyName
 from sva_bench.files.fields import Name, NonNegativeInt, Number, Seed
 from sva_bench.files.records import Record
 
@@ -36,6 +37,9 @@ class OptionsEntry(Record):
     time_limit_s: Annotated[Number, Field(ge=0)] | None
     gap: Annotated[Number, Field(ge=0)]
     evpi: bool
+    policies: tuple[PolicyName, ...] = field(default_factory=tuple)
+    news: tuple[News, ...] = field(default_factory=tuple)
+    anticipate: bool | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,12 +133,19 @@ class StoredNote(Record):
     first: NonNegativeInt
     trials: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
     tallies: Mapping[Name, StoredTally]
+    reactions: Mapping[Name, tuple[ReactionResult, ...]] = field(default_factory=dict)
 
     @model_validator(mode="after")
     def _fits_together(self) -> StoredNote:
         names = [scenario.name for scenario in self.facts.scenarios]
         if list(self.tallies) != names:
             raise ValueError("tallies: expected one for each scenario of 'facts', in its order")
+        if self.reactions and list(self.reactions) != names:
+            raise ValueError("reactions: expected those of each scenario of 'facts', in its order")
+        for name, results in self.reactions.items():
+            if any(not {"stochastic", "deterministic"} <= set(result.plans) or set(result.plans) != set(
+                    result.value_of_recourse) for result in results):
+                raise ValueError(f"reactions.{name}: not of the two plans")
         for number, scenario in enumerate(self.facts.scenarios):
             if tuple(scenario.availability) != self.robots or len(scenario.plans) != 2:
                 raise ValueError(f"facts.scenarios[{number}]: expected the robots of 'robots', and two plans")

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 from pydantic import ValidationError
 
+from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.summaries import Facts
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.schema import StoredNote
@@ -21,21 +22,28 @@ from sva_bench.files.complaints import dotted, first_complaint
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.storage.outcome_table import constant, outcome_table
 from sva_bench.storage.tables import SHARDS, read_note_of, write_table
+from sva_bench.study.options import reactions_of
+from sva_bench.study.reacting import Reaction
 from sva_bench.world.model import World
 
 _KEY = b"sva-bench/unit"
 _REMOVE = "remove it and --resume"
 
 
+Reactions = Mapping[str, tuple[ReactionResult, ...]]
+"""Results of each policy and kind of news, by scenario; empty where nobody reacts."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Unit:
-    """A unit of a grid: a point, a seed, a range of trials, and the number of noise draws."""
+    """A unit of a grid: a point, a seed, a range of trials, the number of noise draws, and the reactions measured."""
 
     point: Point
     seed: int
     first: int
     trials: int
     rollouts: int
+    reactions: Sequence[Reaction]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,6 +69,7 @@ class Note:
         variant: The varied settings.
         robots: Names of the robots.
         first, trials: The range of trials.
+        reactions: What came of the point and seed with reactions; the note of the first range has it.
     """
 
     facts: Facts
@@ -69,23 +78,28 @@ class Note:
     robots: Sequence[str]
     first: int
     trials: int
+    reactions: Reactions
 
 
 def unit_of(grid: Grid, point: Point, seed: int, first: int) -> Unit:
     """A unit of a grid, by its first trial."""
     return Unit(point=point, seed=seed, first=first, rollouts=grid.options.rollouts,
-                trials=min(grid.unit_trials, grid.options.trials - first))
+                trials=min(grid.unit_trials, grid.options.trials - first),
+                reactions=() if first else reactions_of(point.world, grid.options))
 
 
-def shard_of(world: World, variant: str, executed: Sequence[Executed], settings: Settings, facts: Facts) -> Shard:
-    """Rows and tally of trials, ready to be written."""
+def shard_of(
+    world: World, variant: str, executed: Sequence[Executed], settings: Settings, facts: Facts, reactions: Reactions
+) -> Shard:
+    """Rows and tally of trials, ready to be written; the rows are of the plans without reaction."""
     robots = tuple(robot.name for robot in world.robots)
     runs = {(run.case.scenario.name, run.case.planner): run for run in executed}
-    note = Note(facts=facts, variant=variant, robots=robots, first=settings.first, trials=settings.trials, tallies={
+    note = Note(facts=facts, variant=variant, robots=robots, first=settings.first, trials=settings.trials,
+                reactions=reactions, tallies={
         s.name: tally_of(runs[s.name, "stochastic"], runs[s.name, "deterministic"], noisy=not world.noise.silent)
         for s in world.scenarios})
     stored = StoredNote(
-        facts=facts, variant=variant, robots=robots, first=note.first, trials=note.trials,
+        facts=facts, variant=variant, robots=robots, first=note.first, trials=note.trials, reactions=reactions,
         tallies={name: stored_tally(tally) for name, tally in note.tallies.items()})
     sink = pa.BufferOutputStream()
     write_table(sink, SHARDS.with_metadata({_KEY: json.dumps(as_dict(stored))}),
@@ -116,12 +130,14 @@ def read_note(path: Path, unit: Unit) -> Note:
             ("variant", note.variant, unit.point.variant), ("first", note.first, unit.first),
             ("trials", note.trials, unit.trials), ("robots", list(note.robots), [r.name for r in world.robots]),
             ("scenarios", [s.name for s in note.facts.scenarios], [s.name for s in world.scenarios]),
+            ("reactions", {name: [(r.policy, r.news) for r in results] for name, results in note.reactions.items()},
+             {s.name: list(unit.reactions) for s in world.scenarios if unit.reactions}),
             ("noise draws", all(0 < met <= most or met == most for met in draws), True)):
         if found != known:
             raise BadFile(path, None, key, f"the shard of another unit: expected {known!r:.60}, found {found!r:.60}; "
                           f"{_REMOVE}")
     return Note(facts=note.facts, variant=note.variant, robots=note.robots, first=note.first, trials=note.trials,
-                tallies={name: tally_from(tally) for name, tally in note.tallies.items()})
+                reactions=note.reactions, tallies={name: tally_from(tally) for name, tally in note.tallies.items()})
 
 
 def _rows(run: Executed, robots: Sequence[str], world: str, variant: str, settings: Settings) -> pa.Table:

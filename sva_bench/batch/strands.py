@@ -8,9 +8,12 @@ from typing import Any
 from sva_bench.analysis.summaries import Facts
 from sva_bench.batch.grid import Grid, Point, options_at
 from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob, TrialsJob
-from sva_bench.execution.execute import drives_ahead
+from sva_bench.batch.reactions import ReactionsJob
+from sva_bench.batch.shards import Reactions
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import drives_ahead, planned_legs
 from sva_bench.study.costs import reach_of
-from sva_bench.study.options import Options, settings_of
+from sva_bench.study.options import Options, reactions_of, settings_of
 from sva_bench.study.planning import Planned, two_cases
 from sva_bench.study.summing import facts_of, head_of, proved
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
@@ -22,7 +25,7 @@ Strand = Generator[Sequence[Job], Sequence[Any], None]
 
 
 def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
-    """The jobs of one point and seed: travel times, plans, drives, and the trials that are not done yet."""
+    """The jobs of one point and seed: travel times, plans, drives, reactions, and the trials that are not done yet."""
     world, options = point.world, options_at(grid, point, seed)
     left = [(first, count) for first, count in grid.ranges() if grid.unit_name(point, seed, first) not in done]
     if not left:
@@ -33,15 +36,21 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     (planned,) = yield [PlansJob(world=world, costs=costs, options=options)]
     cases = tuple(case for scenario in world.scenarios for case in two_cases(scenario, planned[scenario.name]))
     settings = settings_of(world, options)
-    drives = {}
+    drives = Drives()
     if settings.fidelity != "physics":
         ahead = drives_ahead(world, costs, cases, settings)
         driven = yield [DriveJob(tasks=chunk.tasks, what=chunk.what) for chunk in ahead.chunks]
-        drives = ahead.routes(driven)
-    facts = facts_at(world, options, costs, planned)
+        drives = ahead.drives(driven)
+    reactions: Reactions = {}
+    if left[0][0] == 0 and reactions_of(world, options):  # the unit of the first trials has them with it
+        (reactions,) = yield [ReactionsJob(
+            world=world, costs=costs, options=options, cases=cases, drives=drives,
+            instances={name: plans.instance for name, plans in planned.items()})]
+    facts, legs = facts_at(world, options, costs, planned), planned_legs(world, costs, cases)
     yield [TrialsJob(
         unit=grid.unit_name(point, seed, first), world=world, variant=point.variant, cases=cases, facts=facts,
-        drives=drives, costs=costs if settings.fidelity == "physics" else {}, first=first, trials=count,
+        drives=drives.routes, planned=legs, reactions=reactions if first == 0 else {},
+        costs=costs if settings.fidelity == "physics" else {}, first=first, trials=count,
         settings=settings) for first, count in left]
 
 

@@ -6,16 +6,16 @@ import json
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import Field
 
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
-from sva_bench.choices import FailureProcess, Fidelity, PathPlanner
+from sva_bench.choices import FailureProcess, Fidelity, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.complaints import shown
 from sva_bench.files.digest import digest
@@ -24,12 +24,14 @@ from sva_bench.files.fields import Name, Number, Section, Seed
 from sva_bench.files.patterns import has_pattern, matching
 from sva_bench.seeds import MOST_SEED
 from sva_bench.solver.two_stage import SolveLimits
-from sva_bench.study.options import Options
+from sva_bench.study.options import Options, reactions_of
+from sva_bench.study.reacting import misfit, news_of, policies_of
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 from sva_bench.world.variants import adapted, option_of, world_with
 
 _log = logging.getLogger(__name__)
+T = TypeVar("T")
 
 KIND = "sva-bench/sweep@1"
 UNIT_TRIALS = 10_000
@@ -51,7 +53,7 @@ class Sweep:
         planners: How paths are planned.
         scenarios: Names of the scenarios to execute.
         margin, plan_failure, execute_failure: In place of the worlds' own.
-        evpi: Compute the value of perfect information for any number of outcomes.
+        policies, news, anticipate, evpi: As for ``Options``.
         time_limit_s, gap: When a solve may stop.
         vary: Values by dotted key of a world file.
         file: The sweep file that the settings are from, if any.
@@ -69,6 +71,9 @@ class Sweep:
     margin: float | None = None
     plan_failure: FailureProcess | None = None
     execute_failure: FailureProcess | None = None
+    policies: tuple[PolicyName, ...] | None = None
+    news: tuple[News, ...] | None = None
+    anticipate: bool | None = None
     evpi: bool | None = None
     time_limit_s: float | None = None
     gap: float | None = None
@@ -96,6 +101,9 @@ class _SweepFile(Section):
     margin: Number | None = Field(default=None, ge=0, le=1)
     plan_failure: FailureProcess | None = None
     execute_failure: FailureProcess | None = None
+    policy: Annotated[list[str], Field(min_length=1)] | str | None = None
+    news: Annotated[list[str], Field(min_length=1)] | str | None = None
+    anticipate: bool | None = None
     evpi: bool | None = None
     time_limit_s: Number | None = Field(default=None, ge=0)
     gap: Number | None = Field(default=None, ge=0)
@@ -119,11 +127,9 @@ def sweep_of(paths: Sequence[Path], from_options: Sweep) -> Sweep:
 
 def _from_file(document: Document) -> Sweep:
     file = validate(document, _SweepFile, KIND)
-    given = file.seeds if isinstance(file.seeds, list) else [] if file.seeds is None else [file.seeds]
-    try:
-        seeds = seeds_of([str(seed) for seed in given], "") if given else None
-    except BadInput as error:
-        raise document.error(("seeds",), str(error)) from None
+    seeds = _words_at(document, "seeds", file.seeds, seeds_of)
+    policies = _words_at(document, "policy", file.policy, policies_of)
+    news = _words_at(document, "news", file.news, news_of)
     for key, values in (file.set or {}).items():
         if not values:
             raise document.error(("set", key), "give at least one value")
@@ -137,8 +143,21 @@ def _from_file(document: Document) -> Sweep:
         worlds=tuple(worlds), seeds=seeds, trials=file.trials, rollouts=file.rollouts, fidelity=file.fidelity,
         unit_trials=file.unit_trials, planners=tuple(file.planners) if file.planners else None,
         scenarios=tuple(file.scenarios) if file.scenarios else None, margin=file.margin,
-        plan_failure=file.plan_failure, execute_failure=file.execute_failure, evpi=file.evpi,
-        time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set, file=document)
+        plan_failure=file.plan_failure, execute_failure=file.execute_failure, policies=policies, news=news,
+        anticipate=file.anticipate, evpi=file.evpi, time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set,
+        file=document)
+
+
+def _words_at(
+    document: Document, key: str, written: Sequence[str | int] | str | int | None,
+    parse: Callable[[Sequence[str], str], tuple[T, ...]],
+) -> tuple[T, ...] | None:
+    """What an option of one word or several means, as a key of the sweep file has it; ``None`` = nothing."""
+    given = [] if written is None else [written] if isinstance(written, str | int) else written
+    try:
+        return parse([str(word) for word in given], "") if given else None
+    except BadInput as error:
+        raise document.error((key,), str(error)) from None
 
 
 def _matching(given: Path) -> list[Path]:
@@ -246,7 +265,9 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
     first_with_effect: dict[tuple[int, str], str] = {}
     from_options: set[str] = set()
     for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
-        before = first_with_effect.setdefault(_effective(world), "; ".join(variant))
+        if unfit := misfit(world, options.policies, options.news, anticipate=options.anticipate):
+            raise sweep.wrong(unfit.option, (unfit.option,), f"--{unfit.option}", unfit.problem)
+        before = first_with_effect.setdefault(_effective(world, options), "; ".join(variant))
         if before != "; ".join(variant) and world.name not in from_options:  # once: there may be thousands
             from_options.add(world.name)
             _log.warning("%s: %s changes nothing against %s: its scenarios, or other keys, say otherwise", world.name,
@@ -265,7 +286,7 @@ def _options_of(sweep: Sweep) -> Options:
     return Options(
         trials=sweep.trials or 1000, rollouts=sweep.rollouts or 32, fidelity=sweep.fidelity or "rollout",
         limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap),
-        evpi=bool(sweep.evpi))
+        policies=sweep.policies or (), news=sweep.news or (), anticipate=bool(sweep.anticipate), evpi=bool(sweep.evpi))
 
 
 def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tuple[World, list[str]]]:
@@ -298,14 +319,15 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
                    [f"{key}={json.dumps(value)}" for key, value in values.items()])
 
 
-def _effective(world: World) -> tuple[int, str]:
-    """A key of all that trials depend on in a world; equal obstacles are one object (``_sharing``).
+def _effective(world: World, options: Options) -> tuple[int, str]:
+    """A key of all that trials depend on in a world, with these options; equal obstacles are one object (``_sharing``).
 
     Availabilities under ``robots:`` are those of scenarios that don't say otherwise, and of nothing else.
     """
     robots = [replace(robot, availability=1.0) for robot in world.robots]
     return id(world.obstacles), digest(world.name, world.sites, robots, world.scenarios, world.plan_failure,
-                                       world.execute_failure, world.margin, world.noise)
+                                       world.execute_failure, world.margin, world.noise,
+                                       reactions_of(world, options))
 
 
 def _sharing(world: World, from_file: dict[str, World]) -> World:

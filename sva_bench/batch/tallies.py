@@ -11,7 +11,9 @@ from sva_bench.analysis.catalogue import measured
 from sva_bench.analysis.figures import difference_figure, value_figure
 from sva_bench.analysis.moments import Clusters, Figure, Moments, joined
 from sva_bench.analysis.over_trials import charges, plan_figures, vss_figures
-from sva_bench.analysis.results import PlanFigures, ScenarioFacts, ScenarioFigures
+from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.results import PlanFigures, ScenarioFacts
+from sva_bench.analysis.scenarios import UnitScenario
 from sva_bench.analysis.statistics import estimate
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.batch.schema import StoredFigure, StoredPlan, StoredTally
@@ -24,10 +26,10 @@ class PlanTally:
     """Sums over one plan's trials under one scenario.
 
     Attributes:
-        total: Incentive of the team.
-        by_robot: Incentive of each robot in all trials, shape (robots,).
+        total: Value of the team.
+        by_robot: Value of each robot in all trials, shape (robots,).
         ends: Number of robot missions with each end, shape (5,).
-        charged: Incentive lost to each end in ``EXECUTION_LOSSES`` in all trials, shape (3,).
+        charged: Value lost to each end in ``EXECUTION_LOSSES`` in all trials, shape (3,).
         statistics: The measured statistics, by key.
     """
 
@@ -49,7 +51,7 @@ class Tally:
 def tally_of(stochastic: Executed, deterministic: Executed, *, noisy: bool) -> Tally:
     """Add up the trials of a scenario."""
     def added_up(run: Executed) -> PlanTally:
-        return PlanTally(total=value_figure(run, noisy=noisy), by_robot=run.incentive.sum(axis=0),
+        return PlanTally(total=value_figure(run, noisy=noisy), by_robot=run.value.sum(axis=0),
                          ends=np.bincount(run.end.ravel(), minlength=len(ENDS)), charged=charges(run),
                          statistics=measured(run, noisy=noisy))
 
@@ -70,8 +72,10 @@ def _join(a: PlanTally, b: PlanTally) -> PlanTally:
                          if key in b.statistics})
 
 
-def scenario_of(facts: ScenarioFacts, tally: Tally, robots: Sequence[str]) -> ScenarioFigures:
-    """The results of a scenario, from its modelled values and its tally."""
+def scenario_of(
+    facts: ScenarioFacts, tally: Tally, robots: Sequence[str], reactions: tuple[ReactionResult, ...] | None
+) -> UnitScenario:
+    """The results of a scenario, from its modelled values and its tally, with those of reactions."""
     count = tally.difference.drawn.count
     plans: dict[str, PlanFigures] = {name: plan_figures(
         facts.plans[name], estimate(plan.total),
@@ -79,11 +83,11 @@ def scenario_of(facts: ScenarioFacts, tally: Tally, robots: Sequence[str]) -> Sc
         {end: int(times) for end, times in zip(ENDS, plan.ends, strict=True)}, plan.charged / count,
         {key: estimate(figure) for key, figure in plan.statistics.items()})
         for name, plan in tally.plans.items()}
-    return ScenarioFigures(
+    return UnitScenario(
         name=facts.name, availability=facts.availability, plans=plans,
         vss=vss_figures(facts, plans, estimate(tally.difference)), vss_mean_value=facts.vss_mean_value,
         vss_mean_value_executed=facts.vss_mean_value, ws=facts.ws, evpi=facts.evpi,
-        value_of_process=facts.value_of_process)
+        value_of_process=facts.value_of_process, reactions=reactions)
 
 
 def stored_tally(tally: Tally) -> StoredTally:

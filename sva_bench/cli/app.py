@@ -11,6 +11,7 @@ from sva_bench.cli.batch import batch_app
 from sva_bench.cli.inputs import instance_app, world_app
 from sva_bench.cli.paper import paper_app
 from sva_bench.cli.plans import certify, plan, times
+from sva_bench.cli.replay import replay
 from sva_bench.cli.run import execute, run
 from sva_bench.cli.usage import OneAtATime, PlainCommand
 from sva_bench.cli.view import report, view
@@ -27,6 +28,7 @@ for command in (run, times, plan, certify, execute):
     app.command(cls=PlainCommand)(command)
 app.command(cls=OneAtATime)(view)
 app.command(cls=OneAtATime)(report)
+app.command(cls=OneAtATime)(replay)
 for name, group in (("batch", batch_app), ("world", world_app), ("instance", instance_app), ("reproduce", paper_app)):
     app.add_typer(group, name=name)
 

@@ -13,10 +13,13 @@ from rich.markup import escape
 from sva_bench.choices import Fidelity, PathPlanner
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import (
+    Anticipate,
     AsJson,
     ExecuteFailure,
     MarginOption,
+    NewsNames,
     PlanFailure,
+    PolicyNames,
     ScenarioNames,
     TimeLimit,
     Verbose,
@@ -37,6 +40,7 @@ from sva_bench.files.outputs import check_folder
 from sva_bench.files.printable import counted
 from sva_bench.study.bounds import MOST_ROLLOUTS, MOST_TRIALS
 from sva_bench.study.libraries import load_libraries
+from sva_bench.study.reacting import news_of, policies_of
 
 if TYPE_CHECKING:
     from sva_bench.batch.grid import Grid
@@ -81,6 +85,9 @@ def over(
     margin: MarginOption = None,
     plan_failure: PlanFailure = None,
     execute_failure: ExecuteFailure = None,
+    policy: PolicyNames = None,
+    news: NewsNames = None,
+    anticipate: Anticipate = False,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
                                                       "takes.")] = False,
     time_limit: TimeLimit = None,
@@ -121,7 +128,9 @@ def over(
     sweep = sweep_of(worlds, Sweep(
         seeds=seeds_of(seed) if seed else None, trials=trials, rollouts=rollouts, fidelity=fidelity,
         planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
-        margin=margin, plan_failure=plan_failure, execute_failure=execute_failure, evpi=evpi or None,
+        margin=margin, plan_failure=plan_failure, execute_failure=execute_failure,
+        policies=policies_of(policy) if policy else None, news=news_of(news) if news else None,
+        anticipate=anticipate or None, evpi=evpi or None,
         time_limit_s=time_limit, gap=gap,
         vary=varied(vary) if vary else None, unit_trials=unit_trials))
     with progress_bars() as progress:
@@ -164,7 +173,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
         from sva_bench.batch.aggregates import summary_of
         from sva_bench.batch.folder import at_work, failures_in, settings_in, units_in
         from sva_bench.batch.grid import grid_of
-        from sva_bench.cli.watching import over_maps, print_failed
+        from sva_bench.cli.watching import over_maps, print_failed, reactions_over_maps
         from sva_bench.files.records import as_dict
 
     refuse_closed_output()
@@ -178,6 +187,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     if as_json:
         print_json({"format": "sva-bench/batch-status@1", "at_work": running, "units": len(units), "done": len(done),
                     "aggregate": [as_dict(row) for row in summary.aggregate],
+                    **({"reactions": [as_dict(row) for row in summary.reactions]} if summary.reactions else {}),
                     "failed": [as_dict(unit) for unit in summary.failed]})
         return
     console = results()
@@ -187,6 +197,8 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
                   highlight=False)
     if done:
         console.print(over_maps(summary.aggregate, "VSS over maps, so far"))
+        if summary.reactions:
+            console.print(reactions_over_maps(summary.reactions))
     print_failed(summary.failed, console)
 
 

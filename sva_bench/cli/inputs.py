@@ -56,6 +56,9 @@ def check_world(
         console.print(f"{cost.times.model.name}: {counted(cost.pairs, 'travel time')} of up to {longest:.1f} s, "
                       f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
                       highlight=False)
+    if loaded.reaction.policy != "none":
+        console.print(f"the team reacts to failures: policy {loaded.reaction.policy}, news {loaded.reaction.news}",
+                      highlight=False)
     reach = reach_of(loaded, costs)
     for said in beyond_reach(reach):
         console.print(said, highlight=False, markup=False)

@@ -8,11 +8,7 @@ from typing import Annotated
 
 import typer
 
-from sva_bench.choices import (
-    FailureProcess,
-    Fidelity,
-    PathPlanner,
-)
+from sva_bench.choices import NEWS, POLICY_NAMES, USUAL_NEWS, FailureProcess, Fidelity, PathPlanner
 from sva_bench.errors import BadInput
 from sva_bench.files.streams import CLOSED, output_is_closed
 from sva_bench.study.bounds import MOST_ROLLOUTS, MOST_SEED, MOST_TRIALS
@@ -59,6 +55,15 @@ PlanFailure = Annotated[FailureProcess | None, typer.Option(help="Failure proces
                                                            show_default="the world's")]
 ExecuteFailure = Annotated[FailureProcess | None, typer.Option(help="Failure process that is executed.",
                                                               show_default="the world's")]
+PolicyNames = Annotated[list[str] | None, typer.Option(
+    "--policy", metavar="NAME,...", help=f"What the team does about failures: {', '.join(POLICY_NAMES)}; of several, "
+    "each is measured. resolve plans what is left again, exactly.", show_default="the world's")]
+NewsNames = Annotated[list[str] | None, typer.Option(
+    "--news", metavar="WHEN,...", help=f"When the team learns of a failure: {', '.join(NEWS)}; of several, each is "
+    "measured. report: when a robot's report from its next stop is overdue; station: each robot at a station.",
+    show_default=f"the world's, or {USUAL_NEWS}")]
+Anticipate = Annotated[bool, typer.Option("--anticipate", help="With a policy: make a plan for the reaction too, the "
+                                          "planner anticipative.")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
 

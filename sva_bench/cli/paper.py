@@ -66,6 +66,33 @@ def simulation(
 
 
 @paper_app.command(cls=PlainCommand)
+def reaction(
+    worlds: Annotated[list[Path] | None, typer.Argument(metavar="[WORLD...]", help="The maps.",
+                                                        show_default="the five shipped ones")] = None,
+    rollouts: Rollouts = 8,
+    fidelity: FidelityOption = "rollout",
+    seed: Seed = 0,
+    output: Page = None,
+    workers: WorkerCount = None,
+    verbose: Verbose = False,
+) -> None:
+    """What stochastic planning is worth if the team reacts, under every process and kind of news."""
+    set_up_logging(verbose)
+    check_output(output)
+    with loading():
+        from sva_bench.execution.execute import Settings
+        from sva_bench.generate.examples import example_world
+        from sva_bench.paper import reaction as paper
+        from sva_bench.study.inputs import load
+
+    loaded = [load(path) for path in worlds or [example_world(name) for name in (*_SHIPPED, "three-robots")]]
+    settings = Settings(seed=seed, trials=1000, rollouts=rollouts, fidelity=fidelity)
+    with progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
+        page = paper.reaction_page(paper.reaction(loaded, settings, executor, progress), settings)
+    write_result(output, page)
+
+
+@paper_app.command(cls=PlainCommand)
 def runtimes(
     whole: Annotated[bool, typer.Option("--whole", help="The paper's whole grid, which takes a day and more; default: "
                                         "four sizes, one seed, one availability, under ten minutes.")] = False,

@@ -10,15 +10,18 @@ from rich.markup import escape
 
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import (
+    Anticipate,
     AsCsv,
     AsJson,
     ExecuteFailure,
     FidelityOption,
     Gap,
     MarginOption,
+    NewsNames,
     Out,
     PlanFailure,
     PlannerOption,
+    PolicyNames,
     Rollouts,
     ScenarioNames,
     Seed,
@@ -33,10 +36,14 @@ from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder
 from sva_bench.study.bounds import MOST_TRIALS
 from sva_bench.study.libraries import PRELOAD, load_libraries
+from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_to_anticipate
 from sva_bench.workers.pool import local_workers
 
 if TYPE_CHECKING:
     from sva_bench.analysis.summaries import AnySummary
+
+AnticipateNothing = Annotated[bool, typer.Option("--anticipate", hidden=True)]
+"""Refused: whoever looks for it here is told where it is."""
 
 
 def run(
@@ -50,6 +57,9 @@ def run(
     margin: MarginOption = None,
     plan_failure: PlanFailure = None,
     execute_failure: ExecuteFailure = None,
+    policy: PolicyNames = None,
+    news: NewsNames = None,
+    anticipate: Anticipate = False,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
@@ -82,8 +92,10 @@ def run(
     if precision is None and max_trials is not None:
         raise BadInput("--max-trials belongs to --precision; --trials says how many there are without it")
     asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts)
+    policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
     loaded = load(world, scenario, margin, plan_failure, execute_failure)
+    check_reactions(loaded, policies, heard, anticipate=anticipate)
     load_libraries()  # after the world is read: an error in the file is said at once
     with loading():
         from sva_bench.solver.two_stage import SolveLimits
@@ -94,7 +106,7 @@ def run(
     tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
-                      assumptions=assumptions, precision=asked)
+                      assumptions=assumptions, policies=policies, news=heard, anticipate=anticipate, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
     _show(result.summary, result.folder, as_json, csv=csv)
@@ -117,6 +129,9 @@ def execute(
     scenario: ScenarioNames = None,
     margin: MarginOption = None,
     execute_failure: ExecuteFailure = None,
+    policy: PolicyNames = None,
+    news: NewsNames = None,
+    anticipate: AnticipateNothing = False,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -132,9 +147,12 @@ def execute(
         from sva_bench.study.inputs import about, by_name, load
 
     set_up_logging(verbose)
+    refuse_to_anticipate(asked=anticipate)
+    policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
     named = by_name(plans)
     loaded = load(world, scenario, margin, execute_failure=execute_failure)
+    check_reactions(loaded, policies, heard)
     read = read_plans(loaded, named)
     load_libraries()
     with loading():
@@ -145,7 +163,8 @@ def execute(
         from sva_bench.study.planning import check_plans
 
     tidy(out)
-    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner)
+    options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
+                      policies=policies, news=heard)
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)

@@ -9,10 +9,13 @@ from rich.table import Table
 
 from sva_bench.analysis.catalogue import statistics
 from sva_bench.analysis.reach import lost_robots
-from sva_bench.analysis.results import ComparedScenario, GivenPlanResult
+from sva_bench.analysis.results import GivenPlanResult
+from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
+from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
+from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     answer,
@@ -36,10 +39,13 @@ def print_summary(summary: AnySummary) -> None:
         for scenario in summary.scenarios:
             if scenario.comparisons:
                 console.print(f"{scenario.name}: {ranked(scenario)}", highlight=False, markup=False)
+        for said in reaction_lines(summary):
+            console.print(said, highlight=False, markup=False)
     console.print(answer(summary), highlight=False)
     for said in remarks(summary):
         console.print(said, highlight=False)
     if not isinstance(summary, ComparisonSummary):
+        print_reactions(summary, console)
         _print_assumptions(summary, console)
     if not summary.reproducible:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)

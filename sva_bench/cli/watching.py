@@ -12,12 +12,13 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from sva_bench.analysis.over_maps import BatchSummary, GivenUp, OverMaps, UnitSummary
+from sva_bench.analysis.over_maps import BatchSummary, GivenUp, OverMaps, ReactionOverMaps, UnitSummary
 from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.batch.estimates import StrandCost
 from sva_bench.batch.run import BatchProgress
 from sva_bench.cli.terminal import messages, results
 from sva_bench.files.printable import counted
+from sva_bench.report.reactions_over_maps import reaction_table
 from sva_bench.report.wording import over_few_maps, percentage, verdict, with_interval
 
 _LINE_S = 10.0
@@ -88,11 +89,25 @@ def over_maps(rows: Sequence[OverMaps], title: str) -> Table:
     return table
 
 
+def reactions_over_maps(rows: Sequence[ReactionOverMaps]) -> Table:
+    """What reacting is worth over maps, as a table."""
+    varied = any(row.variant for row in rows)
+    head, words, cells = reaction_table(rows)
+    table = Table(title="Reactions over maps", title_justify="left")
+    for number, heading in enumerate(head):
+        table.add_column(heading, justify="left" if number in words else "right", overflow="fold")
+    for row in cells:
+        table.add_row(*(Text(cell) if varied and not k else cell for k, cell in enumerate(row)))
+    return table
+
+
 def print_batch(summary: BatchSummary, console: Console | None = None) -> None:
     """Print a batch: the VSS map by map, over maps, and what failed."""
     console = console or results()
     console.print(_map_by_map(summary))
     console.print(over_maps(summary.aggregate, "VSS over maps"))
+    if summary.reactions:
+        console.print(reactions_over_maps(summary.reactions))
     if said := over_few_maps(summary.aggregate):
         console.print(said, highlight=False)
     for said in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing]):

@@ -29,6 +29,17 @@ class Case:
     policy: PolicyName = "none"
     news: News = "never"
 
+    @property
+    def key(self) -> tuple[str, str, PolicyName, News]:
+        """Scenario, planner, policy and news by their names."""
+        return self.scenario.name, self.planner, self.policy, self.news
+
+    @property
+    def title(self) -> str:
+        """As shown to people."""
+        reaction = "" if self.policy == "none" else f", {self.policy} on {self.news} news"
+        return f"{self.scenario.name}, {self.planner}{reaction}"
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Settings:

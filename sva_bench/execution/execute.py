@@ -10,24 +10,33 @@ from itertools import pairwise
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
-from sva_bench.choices import ENDS
 from sva_bench.execution.case import Case as Case
 from sva_bench.execution.case import Settings as Settings
 from sva_bench.execution.drives import Chunk, Courses, Drives, RouteKey, drive_all, receive
-from sva_bench.execution.fate import Fate, draw_fate, reliability_of
+from sva_bench.execution.fate import Fate, draw_fate
 from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, trace_of
 from sva_bench.execution.rules import settle
-from sva_bench.mission.failures import NEVER, process_of
+from sva_bench.execution.settling import left_by_draws, settle_alike
+from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.mission.plan import Route
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import Robot, World
 
+PlannedLegs = Mapping[tuple[str, Route], tuple[float, ...]]
+"""Driving time of each leg as planned [s], without margin, by robot and route."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LegTime:
-    """A leg as planned (the repaired twin time, without margin) and as driven [s]; waits on the way are apart."""
+    """A leg as planned (the repaired twin time, without margin) and as driven [s]; waits on the way are apart.
 
+    Attributes:
+        trial: The first trial that it belongs to.
+        leg: Its place on the robot's route in that trial.
+    """
+
+    trial: int
     rollout: int
     robot: str
     leg: int
@@ -46,15 +55,18 @@ class Executed:
         case: Plan and scenario.
         robots: Names of the robots, in order.
         rollout: Noise draw of each trial, shape (trials,).
-        available: Whether the robot was never drawn to fail.
+        available: Whether the robot was never drawn to fail; of lifetimes, whether its own outlasted what it drove.
         incentive: What it collected.
         lost: Whether it failed on its way, ran out of fuel or got stuck.
+        value: What it collected, less the cost of its loss.
         pois_reached, stops_reached: How far it got.
         end: Index into ``ENDS``.
         end_time_s, fuel_used_s: When it ended, and on how much.
         contacts: How many times its hull came to touch an obstacle.
         planned_incentive: What each robot's route holds, shape (robots,).
-        drawn_incentive: What the failures drawn would have left of that, had nothing else gone wrong.
+        drawn_value: What its value had been under the failures drawn alone, with each leg driven as planned.
+        drawn_failed: Whether it had failed then.
+        terms: The expected rewards under the failure process executed, by robot.
         margins: What fuel and time each route left under the draws that were driven; none of robots that stay home.
         legs: Every leg that was driven; none unless recorded.
         traces: The first trial over time, a trace for each robot; none unless recorded.
@@ -66,6 +78,7 @@ class Executed:
     available: BoolArray
     incentive: FloatArray
     lost: BoolArray
+    value: FloatArray
     pois_reached: IntArray
     stops_reached: IntArray
     end: IntArray
@@ -73,16 +86,12 @@ class Executed:
     fuel_used_s: FloatArray
     contacts: IntArray
     planned_incentive: FloatArray
-    drawn_incentive: FloatArray
+    drawn_value: FloatArray
+    drawn_failed: BoolArray
+    terms: PlanningTerms
     margins: tuple[Margins, ...]
     legs: tuple[LegTime, ...]
     traces: tuple[Trace, ...]
-
-
-    @property
-    def value(self) -> FloatArray:
-        """What each robot's mission is worth: what it collected, for nothing is charged for a loss."""
-        return self.incentive
 
     @property
     def waited_s(self) -> FloatArray:
@@ -107,7 +116,8 @@ def execute(
         drives: What was driven already; what is driven now is added.
     """
     drives = Drives() if drives is None else drives
-    orders = [orders_of(world, case) for case in cases]
+    planned = planned_legs(world, costs, cases)
+    orders = [orders_of(world, case, planned) for case in cases]
     fates = [_fate(world, case, own, settings) for case, own in zip(cases, orders, strict=True)]
     wanted = _wanted(settings, orders, fates)
     courses = Courses(world, costs, settings)
@@ -131,13 +141,13 @@ class Ahead:
     wanted: tuple[RouteKey, ...]
     chunks: tuple[Chunk, ...]
 
-    def routes(self, driven: Sequence[Sequence[Driven]]) -> dict[RouteKey, Driven]:
-        """The routes, from what came of each chunk."""
+    def drives(self, driven: Sequence[Sequence[Driven]]) -> Drives:
+        """The routes and what they are composed of, from what came of each chunk."""
         drives = Drives()
         for chunk, results in zip(self.chunks, driven, strict=True):
             receive(drives, chunk, results)
         self.courses.compose(self.wanted, drives)
-        return drives.routes
+        return drives
 
 
 def drives_ahead(
@@ -148,7 +158,7 @@ def drives_ahead(
     for case in cases:
         for robot in world.robots:
             route = case.plan.route(robot.name)
-            can_leave = route and process_of(world.execute_failure).can_leave(reliability_of(robot, case.scenario))
+            can_leave = route and process_of(world.execute_failure).can_leave(case.scenario.reliability(robot))
             for rollout in range(min(settings.rollouts, settings.trials) if can_leave else 0):
                 wanted[robot.name, route, rollout, 0] = False
     courses = Courses(world, costs, settings)
@@ -156,23 +166,37 @@ def drives_ahead(
 
 
 def settle_trials(
-    world: World, cases: Sequence[Case], settings: Settings, drives: Mapping[RouteKey, Driven]
+    world: World, cases: Sequence[Case], settings: Settings, drives: Mapping[RouteKey, Driven], planned: PlannedLegs
 ) -> list[Executed]:
     """Settle trials by routes driven ahead, which cannot be recorded."""
     settled = []
     for case in cases:
-        orders = orders_of(world, case)
+        orders = orders_of(world, case, planned)
         settled.append(_settle_all(world, {}, case, orders, _fate(world, case, orders, settings), settings, drives))
     return settled
 
 
-def orders_of(world: World, case: Case) -> list[Assignment]:
+def planned_legs(world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case]) -> PlannedLegs:
+    """Planned driving times of every route of some cases."""
+    planned: dict[tuple[str, Route], tuple[float, ...]] = {}
+    for robot in world.robots:
+        fuel = costs[robot.model.name]
+        number = {site: k for k, site in enumerate(fuel.times.sites)}
+        for route in {case.plan.route(robot.name) for case in cases}:
+            planned[robot.name, route] = tuple(
+                int(fuel.repaired_ms[number[a], number[b]]) / 1000 for a, b in pairwise(route))
+    return planned
+
+
+def orders_of(world: World, case: Case, planned: PlannedLegs) -> list[Assignment]:
     """What each robot is told to do, and the rules it drives under."""
-    return [_orders(world, robot, case.plan.route(robot.name)) for robot in world.robots]
+    routes = [(robot, case.plan.route(robot.name)) for robot in world.robots]
+    return [_orders(world, robot, route, planned[robot.name, route]) for robot, route in routes]
 
 
-def _orders(world: World, robot: Robot, route: Route) -> Assignment:
+def _orders(world: World, robot: Robot, route: Route, planned_s: tuple[float, ...]) -> Assignment:
     return Assignment(
+        loss_cost=robot.loss_cost, planned_s=planned_s,
         robot=robot.name, route=route, stations=frozenset(s.name for s in world.stations),
         incentives=robot.incentives, stop_s={s.name: s.stop_s for s in world.sites},
         fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s)
@@ -189,7 +213,7 @@ def _wanted(settings: Settings, orders: Sequence[Sequence[Assignment]], fates: S
     for own, fate in zip(orders, fates, strict=True):
         for number, order in enumerate(own):
             failed = fate.fails[:, number]
-            for row in _alike(settings, failed)[0]:
+            for row in (int(rows[0]) for rows in _alike(settings, failed)):
                 key = _key(settings, order, settings.first + row, int(failed[row]))
                 if key is not None:
                     traced = settings.recorded and (row == 0 or (key[2] == 0 and settings.fidelity != "physics"))
@@ -197,22 +221,16 @@ def _wanted(settings: Settings, orders: Sequence[Sequence[Assignment]], fates: S
     return wanted
 
 
-def _alike(settings: Settings, failed: IntArray) -> tuple[list[int], IntArray]:
-    """Trials that end alike, since they share a drive and fail alike.
-
-    Returns:
-        The first row of each kind, in order; the kind of each row, shape (trials,).
-    """
+def _alike(settings: Settings, failed: IntArray) -> list[IntArray]:
+    """Rows of the trials that end alike but for their lifetimes, since they share a drive and are drawn to fail before
+    the same POI; in order of the first of each kind."""
     rows = np.arange(len(failed))
     if settings.fidelity == "physics":
-        return rows.tolist(), rows
+        return list(rows[:, None])
     _, how = np.unique(failed, return_inverse=True)
     kind = how * settings.rollouts + (settings.first + rows) % settings.rollouts
-    _, first, kind = np.unique(kind, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return first[order].tolist(), rank[kind]
+    kinds = np.split(np.argsort(kind, kind="stable"), np.cumsum(np.unique(kind, return_counts=True)[1])[:-1])
+    return sorted(kinds, key=lambda alike: int(alike[0]))
 
 
 def _key(settings: Settings, order: Assignment, trial: int, fails_before: int) -> RouteKey | None:
@@ -237,54 +255,46 @@ def _settle_all(
 ) -> Executed:
     columns: list[dict[str, FloatArray]] = []
     traces = []
-    mine: dict[RouteKey, Driven] = {}
+    mine: dict[RouteKey, tuple[int, Driven]] = {}
     for number, order in enumerate(orders):
         failed = fate.fails[:, number]
-        rows, kind = _alike(settings, failed)
-        outcomes = []
-        for row in rows:
-            key = _key(settings, order, settings.first + row, int(failed[row]))
+        parts = []
+        kinds = _alike(settings, failed)
+        for rows in kinds:
+            key = _key(settings, order, settings.first + int(rows[0]), int(failed[rows[0]]))
             driven = _drive_of(drives, key)
-            outcomes.append(settle(order, driven, int(failed[row])))
+            parts.append(settle_alike(order, driven, int(failed[rows[0]]), fate.lifetime_s[rows, number]))
             if key is not None:
-                mine[key] = driven
-        columns.append({name: values[kind] for name, values in _figures(outcomes).items()})
+                mine.setdefault(key, (settings.first + int(rows[0]), driven))
+        back = np.argsort(np.concatenate(kinds))
+        columns.append({name: np.concatenate([part[name] for part in parts])[back] for name in parts[0]})
         if settings.recorded:
-            key = _key(settings, order, settings.first, int(failed[0]))
-            traces.append(_trace(world, costs[world.robots[number].model.name], order, _drive_of(drives, key),
-                                 outcomes[kind[0]]))
+            driven = _drive_of(drives, _key(settings, order, settings.first, int(failed[0])))
+            traces.append(_trace(world, costs[world.robots[number].model.name], order, driven,
+                                 settle(order, driven, fate.of(0, number))))
     figures = {name: np.column_stack([column[name] for column in columns]) for name in columns[0]}
+    drawn = [left_by_draws(o, fate.fails[:, k], fate.lifetime_s[:, k]) for k, o in enumerate(orders)]
     return Executed(
         case=case, robots=tuple(robot.name for robot in world.robots), rollout=fate.rollout,
-        available=fate.fails == NEVER, incentive=figures["incentive"], lost=figures["lost"].astype(np.bool_),
         planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in orders]),
-        drawn_incentive=np.column_stack([_left_by_draws(o, fate.fails[:, k]) for k, o in enumerate(orders)]),
-        margins=margins_of_team(orders, drives), end_time_s=figures["end_time_s"], fuel_used_s=figures["fuel_used_s"],
+        drawn_value=np.column_stack([value for value, _ in drawn]),
+        drawn_failed=np.column_stack([fails for _, fails in drawn]),
+        terms=process_of(world.execute_failure).terms([case.scenario.reliability(r) for r in world.robots]),
+        margins=margins_of_team(orders, drives),
+        available=figures["available"].astype(np.bool_), lost=figures["lost"].astype(np.bool_),
+        incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],
+        fuel_used_s=figures["fuel_used_s"],
         **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
         legs=tuple(_leg_times(world, costs, mine)) if settings.recorded else (), traces=tuple(traces))
 
 
-def _figures(outcomes: Sequence[Outcome]) -> dict[str, FloatArray]:
-    """Outcomes as columns, each of shape (outcomes,); counts are below 2^53."""
-    names = ("incentive", "lost", "pois_reached", "stops_reached", "end_time_s", "fuel_used_s", "contacts")
-    return {"end": np.array([ENDS.index(o.end) for o in outcomes], dtype=np.float64),
-            **{name: np.array([getattr(o, name) for o in outcomes], dtype=np.float64) for name in names}}
-
-
-def _left_by_draws(orders: Assignment, fails: IntArray) -> FloatArray:
-    """What each trial's draw leaves of a route: the POIs before the failure, shape (trials,)."""
-    earned = [orders.incentives.get(site, 0.0) for site in orders.route if orders.is_poi(site)]
-    collected = np.concatenate([[0.0], np.cumsum(earned)])
-    left: FloatArray = collected[np.where(fails == NEVER, len(earned), np.maximum(fails - 1, 0))]
-    return left
-
-
-_NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
+NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
+"""The drive of a robot that never leaves."""
 
 
 def _drive_of(drives: Mapping[RouteKey, Driven], key: RouteKey | None) -> Driven:
     """The drive of a robot; nothing where it never leaves."""
-    return _NOTHING if key is None else drives[key]
+    return NOTHING if key is None else drives[key]
 
 
 def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, outcome: Outcome) -> Trace:
@@ -294,15 +304,17 @@ def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, ou
                     np.concatenate(planned) if planned else np.empty((0, 2)))
 
 
-def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[RouteKey, Driven]) -> list[LegTime]:
-    """Every leg of the drives given; of trials that share a drive, once."""
+def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[RouteKey, tuple[int, Driven]]
+               ) -> list[LegTime]:
+    """Every leg of the drives given, each with its first trial; of trials that share a drive, once."""
     models = {robot.name: robot.model.name for robot in world.robots}
     rows = []
-    for (robot, route, rollout, _), driven in drives.items():
+    for (robot, route, rollout, _), (trial, driven) in drives.items():
         fuel = costs[models[robot]]
         for leg, (driven_s, (origin, destination)) in enumerate(
                 zip(driven.leg_s.tolist(), pairwise(route), strict=False)):  # a stuck robot drives fewer
             planned_ms = fuel.repaired_ms[fuel.times.sites.index(origin), fuel.times.sites.index(destination)]
-            rows.append(LegTime(rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
-                                planned_s=int(planned_ms) / 1000, driven_s=driven_s))
+            rows.append(LegTime(
+                trial=trial, rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
+                planned_s=int(planned_ms) / 1000, driven_s=driven_s))
     return rows

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sva_bench.arrays import IntArray, frozen_int
+from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.execution.case import Settings
 from sva_bench.execution.noise import Disturbance, draw_disturbance
-from sva_bench.mission.failures import NEVER, FailureDraw, Reliability, process_of
-from sva_bench.world.model import Robot, Scenario, World
+from sva_bench.execution.outcome import RobotFate
+from sva_bench.mission.failures import NEVER, FailureDraw, Failures, process_of
+from sva_bench.world.model import Scenario, World
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -20,19 +21,26 @@ class Fate:
 
     Attributes:
         fails: Number of the POI before which each robot fails, shape (trials, robots). 0: before it leaves the base;
-            ``NEVER``: it doesn't fail, or not within its route.
+            ``NEVER``: it doesn't fail so, or not within its route.
+        lifetime_s: Driving time after which each robot fails [s], shape (trials, robots); ``inf`` = never.
         rollout: Noise draw of each trial, shape (trials,).
         disturbances: How each robot differs from its model, by noise draw and the robot's position in its team.
     """
 
     fails: IntArray
+    lifetime_s: FloatArray
     rollout: IntArray
     disturbances: Mapping[tuple[int, int], Disturbance]
 
     def __post_init__(self) -> None:
         trials = len(self.rollout)
         object.__setattr__(self, "fails", frozen_int(self.fails, (trials, None)))
+        object.__setattr__(self, "lifetime_s", frozen(self.lifetime_s, self.fails.shape))
         object.__setattr__(self, "rollout", frozen_int(self.rollout, (trials,)))
+
+    def of(self, row: int, robot: int) -> RobotFate:
+        """The fate of one robot in one trial."""
+        return RobotFate(before_poi=int(self.fails[row, robot]), lifetime_s=float(self.lifetime_s[row, robot]))
 
 
 def draw_fate(world: World, scenario: Scenario, pois: Sequence[int], settings: Settings) -> Fate:
@@ -45,20 +53,17 @@ def draw_fate(world: World, scenario: Scenario, pois: Sequence[int], settings: S
         settings: Seed, and which trials and rollouts.
     """
     rollout = (settings.first + np.arange(settings.trials)) % settings.rollouts
+    failures = _failures(world, scenario, np.array(pois, dtype=np.int64), settings)
     return Fate(
-        fails=_failures(world, scenario, np.array(pois, dtype=np.int64), settings), rollout=rollout,
+        fails=failures.before_poi, lifetime_s=failures.lifetime_s, rollout=rollout,
         disturbances={(k, robot): draw_disturbance(world.noise, settings.seed, k, robot)
                       for k in np.unique(rollout).tolist() for robot in range(len(world.robots))})
 
 
-def _failures(world: World, scenario: Scenario, pois: IntArray, settings: Settings) -> IntArray:
-    fails = process_of(world.execute_failure).draw(FailureDraw(
+def _failures(world: World, scenario: Scenario, pois: IntArray, settings: Settings) -> Failures:
+    drawn = process_of(world.execute_failure).draw(FailureDraw(
         seed=settings.seed, vehicles=tuple(robot.name for robot in world.robots), trials=settings.trials,
         first=settings.first, pois=int(pois.max(initial=0)), joint=scenario.joint,
-        reliability=tuple(reliability_of(robot, scenario) for robot in world.robots))).before_poi
-    return np.where(fails > pois, NEVER, fails)  # draws for a longer route of another robot mean nothing to this one
-
-
-def reliability_of(robot: Robot, scenario: Scenario) -> Reliability:
-    """What a failure process has to know of a robot under a scenario."""
-    return Reliability(availability=scenario.availability[robot.name], mission_limit_s=robot.mission_limit_s)
+        reliability=tuple(scenario.reliability(robot) for robot in world.robots)))
+    # Draws for a longer route of another robot mean nothing to this one.
+    return replace(drawn, before_poi=np.where(drawn.before_poi > pois, NEVER, drawn.before_poi))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +22,9 @@ class Margins:
         is_poi: Whether a stop is a POI, shape (stops,).
         fills: Whether the tank is filled there, shape (stops,).
         worth: Incentive of each stop, shape (stops,).
+        loss_cost: Cost of the robot if it doesn't come home [incentive].
+        planned_s: Driving time of the leg to each stop as planned [s], without margin, shape (stops,); of none where
+            unknown.
         leg_s: Driving time of the leg to each stop [s], shape (draws, stops); NaN from a leg on that it got stuck on.
         fuel_s: Fuel left on arrival [s of driving], shape (draws, stops); negative: it ran dry on the way.
         time_s: What was left of the mission limit when the stop was over [s], shape (draws, stops).
@@ -35,10 +38,13 @@ class Margins:
     leg_s: FloatArray
     fuel_s: FloatArray
     time_s: FloatArray
+    loss_cost: float = 0.0
+    planned_s: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         draws, stops = self.leg_s.shape
         object.__setattr__(self, "worth", frozen(self.worth, (stops,)))
+        object.__setattr__(self, "planned_s", frozen(self.planned_s, (None,)))
         for name in ("leg_s", "fuel_s", "time_s"):
             values: FloatArray = getattr(self, name)
             if values.shape != (draws, stops):
@@ -77,6 +83,7 @@ def margins_of(robot: int, orders: Assignment, drives: Sequence[Driven]) -> Marg
     is_poi = np.array([orders.is_poi(site) for site in stops], dtype=np.bool_)
     return Margins(
         robot=robot, route=orders.route, is_poi=is_poi, leg_s=leg, fuel_s=fuel, time_s=time,
+        loss_cost=orders.loss_cost, planned_s=np.array(orders.planned_s, dtype=np.float64),
         fills=np.array([site in orders.stations for site in stops], dtype=np.bool_),
         worth=np.array([orders.incentives.get(site, 0.0) if poi else 0.0
                         for site, poi in zip(stops, is_poi, strict=True)]))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.choices import End, EventKind
+from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
 
 
@@ -44,6 +47,18 @@ class Driven:
         object.__setattr__(self, "pose", frozen(self.pose, (n, 3)))
 
 
+class RobotFate(NamedTuple):
+    """When one robot fails; it does so by whichever comes first.
+
+    Attributes:
+        before_poi: 0: before it leaves the base; k: on leaving its last stop for the k-th POI that it tries; ``NEVER``.
+        lifetime_s: Driving time after which it fails, on whatever leg [s]; ``inf`` = never.
+    """
+
+    before_poi: int = NEVER
+    lifetime_s: float = math.inf
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Assignment:
     """One robot's orders: its route, and the rules it drives under.
@@ -56,6 +71,8 @@ class Assignment:
         stop_s: Time that a stop at each site takes.
         fuel_capacity_s: Driving time on one filling [s].
         mission_limit_s: Longest mission that still earns [s].
+        loss_cost: Cost if it doesn't come home [incentive].
+        planned_s: Driving time of each leg as planned [s], without margin, length (legs,); nothing where unknown.
     """
 
     robot: str
@@ -65,6 +82,8 @@ class Assignment:
     stop_s: Mapping[str, float]
     fuel_capacity_s: float
     mission_limit_s: float
+    loss_cost: float = 0.0
+    planned_s: tuple[float, ...] = ()
 
     def is_poi(self, site: str) -> bool:
         """Whether a site of the route is a POI."""
@@ -86,21 +105,23 @@ class Outcome:
     """One robot's mission.
 
     Attributes:
-        available: Whether it was never drawn to fail.
+        available: Whether it was never drawn to fail; of lifetimes, whether its own outlasted what it drove.
         incentive: What it collected.
         lost: Whether it failed on its way, ran out of fuel or got stuck: it doesn't come home.
+        value: What it collected, less the cost of its loss.
         pois_reached: POIs it reached, those too late to earn anything included.
         stops_reached: Stops it reached, the base at the end included.
         end: How it ended.
         end_time_s: When [s on the mission clock].
         fuel_used_s: Fuel of the whole mission [s of driving].
-        contacts: How many times its hull came to touch an obstacle; on a leg that it ran dry on, all of that leg.
+        contacts: How many times its hull came to touch an obstacle; on a leg that it ran dry or failed on, all of it.
         events: What happened, in order.
     """
 
     available: bool
     incentive: float
     lost: bool
+    value: float
     pois_reached: int
     stops_reached: int
     end: End
@@ -139,11 +160,23 @@ class Trace:
 
 
 def trace_of(
-    orders: Assignment, driven: Driven, outcome: Outcome, start: tuple[float, float, float], planned: FloatArray
+    orders: Assignment, driven: Driven, outcome: Outcome, start: tuple[float, float, float], planned: FloatArray,
+    start_s: float = 0.0,
 ) -> Trace:
-    """Lay a traced drive on the mission clock: stops put in, cut off where the mission ended."""
+    """Lay a traced drive on the mission clock: stops put in, cut off where the mission ended.
+
+    Args:
+        orders: Its orders; the route is the one driven.
+        driven: The drive.
+        outcome: What came of it.
+        start: Where it stands at rest: x, y [m], yaw [rad].
+        planned: The path that was planned [m], shape (k, 2).
+        start_s: When it leaves the base [s].
+    """
     times, poses, fuels = [np.zeros(1)], [np.array([start])], [np.array([orders.fuel_capacity_s])]
-    clock, tank = 0.0, orders.fuel_capacity_s
+    clock, tank = start_s, orders.fuel_capacity_s
+    if start_s > 0:
+        times, poses, fuels = [np.array([0.0, start_s])], [np.array([start] * 2)], [np.full(2, tank)]
     for leg, leg_s in enumerate(driven.leg_s.tolist()):
         mine = driven.leg_of == leg
         times.append(clock + driven.clock_s[mine])

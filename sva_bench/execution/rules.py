@@ -1,19 +1,15 @@
 """The rules of a mission, event by event: a robot departs, drives, runs dry or gets stuck, arrives, stops, comes home.
 
-They are here and nowhere else. ``settle`` plays one robot that keeps its orders; ``play`` a team whose policy may
-change what is left of them whenever a robot stands at a stop, its stop time over (an epoch). Nothing here knows an
-engine: what a leg takes is given.
+They are here and nowhere else. ``settle`` plays one robot that keeps its orders; ``team.play`` a team that reacts.
+Nothing here knows an engine: what a leg takes is given.
 """
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from sva_bench.choices import End, EventKind
-from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome
-from sva_bench.execution.policies.policy import Policy, RobotState, TeamState
+from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, RobotFate
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
 
@@ -32,22 +28,28 @@ class LegDriven(NamedTuple):
     contacts: int = 0
 
 
+_SURE = RobotFate()
+
+
 class RobotMission:
     """One robot's mission as far as it has been played; it changes by ``depart`` and ``drive`` in turn.
 
     Attributes:
         orders: Its rules, and the route it began with.
+        fate: When it fails.
         ahead: Sites that it is to go to yet.
         site: Where it stands, or where it was going when it ended.
         clock_s: Mission clock [s]; at a stop, when the stop is over.
+        arrived_s: When it reached its last stop [s].
         fuel_s: Fuel burnt [s of driving].
         tank_s: Fuel left in the tank [s of driving].
         end: How it ended; ``None`` as long as it goes on.
     """
 
-    def __init__(self, orders: Assignment, fails_before: int = NEVER) -> None:
-        self.orders, self._fails_before = orders, fails_before
-        self.clock_s = self.fuel_s = self.incentive = 0.0
+    def __init__(self, orders: Assignment, fate: RobotFate = _SURE, *, start_s: float = 0.0) -> None:
+        self.orders, self.fate = orders, fate
+        self.clock_s = self.arrived_s = start_s
+        self.fuel_s = self.incentive = 0.0
         self.tank_s = orders.fuel_capacity_s
         self.pois = self.stops = self.contacts = 0
         self.end: End | None = None
@@ -57,10 +59,21 @@ class RobotMission:
         self.ahead = orders.route[1:]
         if not self.ahead:
             self.end = "home"  # an empty route ends home, whatever its draw
-        elif fails_before == 0:
+        elif fate.before_poi == 0:
             self._ends("failed", self.site)
         else:
             self._tell("departed", self.site)
+
+    def give(self, stops: tuple[str, ...]) -> None:
+        """Replace what is left of its orders; a robot whose mission is over takes none.
+
+        Args:
+            stops: Sites from its next decision epoch on, the base last; none for a robot that is to stay at the base.
+        """
+        if self.end is None:
+            self.ahead = stops
+            if not stops:
+                self._ends("home", self.site)
 
     def depart(self) -> str | None:
         """Set off for the next stop, at an epoch: the stop, or ``None`` if the mission is over.
@@ -69,18 +82,26 @@ class RobotMission:
         """
         if self.end is not None:
             return None
-        if self.orders.is_poi(self.ahead[0]) and self.pois + 1 == self._fails_before:
+        if self.orders.is_poi(self.ahead[0]) and self.pois + 1 == self.fate.before_poi:
             self._ends("failed", self.site, lost=True)
             return None
         return self.ahead[0]
 
     def drive(self, leg: LegDriven) -> None:
-        """Drive the leg to the next stop and serve the stop; fuel burns while driving, and only then."""
+        """Drive the leg to the next stop and serve the stop; fuel burns while driving, and only then.
+
+        A robot whose lifetime ends before it would arrive, run dry or get stuck fails there and then.
+        """
         to = self.ahead[0]
         runs_dry = leg.time_s > self.tank_s + TOLERANCE_S
         burnt = min(leg.time_s, max(self.tank_s, 0.0)) if runs_dry else leg.time_s
-        self.clock_s, self.fuel_s, self.tank_s = self.clock_s + burnt, self.fuel_s + burnt, self.tank_s - burnt
         self.contacts += leg.contacts
+        if self.fuel_s + burnt > self.fate.lifetime_s:
+            left = self.fate.lifetime_s - self.fuel_s
+            self.clock_s, self.fuel_s, self.tank_s = self.clock_s + left, self.fate.lifetime_s, self.tank_s - left
+            self._ends("failed", to, lost=True)
+            return
+        self.clock_s, self.fuel_s, self.tank_s = self.clock_s + burnt, self.fuel_s + burnt, self.tank_s - burnt
         if burnt < leg.time_s:
             self._ends("out_of_fuel", to, lost=True)
         elif leg.stuck:
@@ -91,7 +112,7 @@ class RobotMission:
     def _arrive(self, site: str) -> None:
         """Reach a stop, spend its time, and then refuel, collect, or be home."""
         self.site, self.ahead = site, self.ahead[1:]
-        self.stops += 1
+        self.stops, self.arrived_s = self.stops + 1, self.clock_s
         self._tell("arrived", site)
         self.clock_s += self.orders.stop_s[site]
         # Only what is over within the mission limit counts; a late robot drives on and earns nothing more.
@@ -129,74 +150,24 @@ class RobotMission:
         if self.end is None:
             raise ValueError(f"the mission of {self.orders.robot} is not over")
         return Outcome(
-            available=self._fails_before == NEVER, incentive=self.incentive, lost=self._lost, pois_reached=self.pois,
-            stops_reached=self.stops, end=self.end, end_time_s=self.clock_s, fuel_used_s=self.fuel_s,
-            contacts=self.contacts, events=tuple(self._events))
-
-    def state(self) -> RobotState:
-        """What a policy may know of it."""
-        return RobotState(
-            robot=self.orders.robot, site=self.site, ready_s=self.clock_s,
-            burnt_s=self.orders.fuel_capacity_s - self.tank_s, remaining=self.ahead, end=self.end)
+            available=self.fate.before_poi == NEVER and self.end != "failed", incentive=self.incentive,
+            lost=self._lost, value=self.incentive - self.orders.loss_cost if self._lost else self.incentive,
+            pois_reached=self.pois, stops_reached=self.stops, end=self.end, end_time_s=self.clock_s,
+            fuel_used_s=self.fuel_s, contacts=self.contacts, events=tuple(self._events))
 
 
-def settle(orders: Assignment, driven: Driven, fails_before: int = NEVER) -> Outcome:
+def settle(orders: Assignment, driven: Driven, fate: RobotFate = _SURE) -> Outcome:
     """What comes of a driven route: one robot, which keeps its orders.
 
     Args:
         orders: Route and rules.
         driven: Driving time of its legs, at least of those before a failure.
-        fails_before: 0: fails before leaving the base; k: on leaving its last stop for the k-th POI; ``NEVER``.
+        fate: When it fails.
     """
-    mission = RobotMission(orders, fails_before)
+    mission = RobotMission(orders, fate)
     times, contacts, last = driven.leg_s.tolist(), driven.contacts.tolist(), len(driven.leg_s) - 1
     leg = 0
     while mission.depart() is not None:
         mission.drive(LegDriven(times[leg], driven.stuck and leg == last, contacts[leg]))
         leg += 1
     return mission.outcome()
-
-
-def play(
-    orders: Sequence[Assignment], fails_before: Sequence[int], legs: Callable[[int, str, str], LegDriven],
-    policy: Policy,
-) -> list[Outcome]:
-    """Play a team's mission: at each epoch the policy says what is left of each robot's orders.
-
-    Epochs come by time, at equal times by the robot's position. Legs are atomic: a robot is at its next epoch as soon
-    as it has departed, and its remaining orders begin from there. A robot at home has no more epochs.
-
-    Args:
-        orders: Orders that each robot begins with, length (robots,).
-        fails_before: As for ``settle``, length (robots,).
-        legs: What the leg of a robot from one site to another takes, by the robot's position.
-        policy: The policy.
-
-    Raises:
-        ValueError: If the policy leaves a robot with orders that don't end at the base.
-    """
-    missions = [RobotMission(own, fails) for own, fails in zip(orders, fails_before, strict=True)]
-    numbers = {own.robot: number for number, own in enumerate(orders)}
-    epochs = [(0.0, number) for number, mission in enumerate(missions) if mission.end is None]
-    while epochs:
-        now, number = heapq.heappop(epochs)
-        remaining = policy(TeamState(time_s=now, at_epoch=number, robots=tuple(m.state() for m in missions)))
-        for robot, stops in remaining.items():
-            _give_orders(missions[numbers[robot]], tuple(stops))
-        mission = missions[number]
-        origin, to = mission.site, mission.depart()
-        if to is None:
-            continue
-        mission.drive(legs(number, origin, to))
-        if mission.end is None:
-            heapq.heappush(epochs, (mission.clock_s, number))
-    return [mission.outcome() for mission in missions]
-
-
-def _give_orders(mission: RobotMission, stops: tuple[str, ...]) -> None:
-    """Replace what is left of a robot's orders; one whose mission is over takes none."""
-    if mission.end is not None or stops == mission.ahead:
-        return
-    if not stops or stops[-1] != mission.orders.route[0]:
-        raise ValueError(f"the remaining orders of {mission.orders.robot} don't end at the base: {stops}")
-    mission.ahead = stops

@@ -16,6 +16,8 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]
 """Times [s] and incentives: beyond 1e9 the feasibility tolerance is below the rounding of sums."""
+MeanTime = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+"""A mean time to failure [s]; of robots that hardly ever fail it may be any number."""
 Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]
 NonNegativeInt = Annotated[int, Field(strict=True, ge=0)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=MOST_SEED)]

@@ -228,7 +228,7 @@ def _weights(instance: Instance) -> FloatArray:
 def _good_orders(instance: Instance, weights: FloatArray, stop: Callable[[float], bool]) -> VisitOrders:
     """A good plan, or the first for whose value ``stop`` is true."""
     robots = len(weights)
-    return search(leg_tables(instance), weights, np.ones(robots), tuple(() for _ in range(robots)), starts=1,
+    return search(leg_tables(instance), weights, None, tuple(() for _ in range(robots)), starts=1,
                   stop=stop).orders
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sva_bench.files.notebook import notebook_table
-from sva_bench.mission.failures import Reliability, RouteProfile, process_of
+from sva_bench.mission.failures import RouteProfile, process_of
 from sva_bench.mission.instance import TOLERANCE_S, Instance, Vehicle
 from sva_bench.mission.plan import Plan, Route
 
@@ -93,7 +93,7 @@ def certify(instance: Instance, plan: Plan) -> Certificate:
         expected += process.route_value(
             RouteProfile(incentives=tuple(earned), arrival_s=tuple(arrival),
                          home_s=driving_s[-1] if driving_s else 0.0),
-            Reliability(availability=vehicle.availability, mission_limit_s=vehicle.mission_limit_s))
+            vehicle.reliability)
         nominal += sum(earned)
     if reasons:
         return Certificate(feasible=False, expected=None, nominal=None, fuel_s=fuel, duration_s=duration,

@@ -10,7 +10,7 @@ from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput, UnknownName, nearest
 from sva_bench.files.printable import counted
-from sva_bench.mission.failures import JointState
+from sva_bench.mission.failures import JointState, Reliability, undefined_under
 
 TOLERANCE_S = 1e-6
 """Feasibility tolerance of fuel and time [s]."""
@@ -24,9 +24,12 @@ class Vehicle:
         name: Its name.
         fuel_capacity_s: Fuel capacity [s of driving]; ``inf`` = no limit.
         mission_limit_s: Longest mission, driving and stops [s]; ``inf`` = no limit.
-        availability: Probability that it is available, or that it survives each leg (``per_leg``).
+        availability: Probability that it is available, that it survives each leg (``per_leg``), or that it survives
+            driving for as long as its mission limit (``hazard``, without ``mtbf_s``).
         incentives: Incentive of its visit to each site, shape (n,); 0 at base and stations.
         fuel_s: Fuel of the leg from site i to site j [s of driving], shape (n, n), zero diagonal; ``inf`` = no leg.
+        mtbf_s: Mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and mission limit.
+        loss_cost: Cost if it leaves the base and doesn't come home [incentive].
     """
 
     name: str
@@ -35,6 +38,8 @@ class Vehicle:
     availability: float
     incentives: FloatArray
     fuel_s: FloatArray
+    mtbf_s: float | None = None
+    loss_cost: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(self.incentives)
@@ -42,6 +47,12 @@ class Vehicle:
             raise ValueError(f"availability of {self.name}: expected 0 to 1, found {self.availability}")
         object.__setattr__(self, "incentives", frozen(self.incentives, (n,)))
         object.__setattr__(self, "fuel_s", frozen(self.fuel_s, (n, n)))
+
+    @property
+    def reliability(self) -> Reliability:
+        """What a failure process has to know of it."""
+        return Reliability(availability=self.availability, mission_limit_s=self.mission_limit_s, mtbf_s=self.mtbf_s,
+                           loss_cost=self.loss_cost)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,11 +103,13 @@ class Instance:
         raise UnknownName(f"{self.name} has no vehicle {name!r}; {nearest(name, [v.name for v in self.vehicles])}")
 
     def with_availability(self, availability: Mapping[str, float]) -> Instance:
-        """The same instance with other, independent availabilities; vehicles that aren't named keep theirs.
+        """The same instance with other, independent availabilities, also in place of ``mtbf_s``.
+
+        Vehicles that aren't named keep theirs.
 
         Raises:
             UnknownName: If the instance has no such vehicle.
-            BadInput: If an availability is no probability.
+            BadInput: If an availability is no probability, or says nothing of failures under the instance's process.
             ValueError: If it is no number.
         """
         for name, probability in availability.items():
@@ -105,5 +118,9 @@ class Instance:
                 raise ValueError(f"availability of {name}: expected a number, found {type(probability).__name__}")
             if not 0 <= probability <= 1:
                 raise BadInput(f"{self.name}: availability of {name}: {probability} is no probability; expected 0 to 1")
-        vehicles = tuple(replace(v, availability=availability.get(v.name, v.availability)) for v in self.vehicles)
+        vehicles = tuple(replace(v, availability=availability[v.name], mtbf_s=None) if v.name in availability else v
+                         for v in self.vehicles)
+        for vehicle in vehicles:
+            if problem := undefined_under([self.failure], vehicle.reliability):
+                raise BadInput(f"{self.name}: availability of {vehicle.name}: {problem} of the vehicle")
         return replace(self, vehicles=vehicles, joint=None)

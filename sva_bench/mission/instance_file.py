@@ -14,10 +14,10 @@ from sva_bench.arrays import FloatArray
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_json, validate
-from sva_bench.files.fields import Bounded, Name, Probability, Section
+from sva_bench.files.fields import Bounded, MeanTime, Name, Probability, Section
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.printable import counted
-from sva_bench.mission.failures import JointState, marginals, without_joint
+from sva_bench.mission.failures import JointState, availability_by, marginals, undefined_under, without_joint
 from sva_bench.mission.instance import Instance, Vehicle
 
 KIND = "sva-bench/instance@1"
@@ -32,6 +32,8 @@ class _VehicleFile(Section):
     fuel_capacity_s: Bounded | None
     mission_limit_s: Bounded | None
     availability: Probability | None = None
+    mtbf_s: MeanTime | None = None
+    loss_cost: Bounded = 0.0
     incentives: dict[Name, Bounded] = Field(default_factory=dict)
     fuel_s: list[list[Bounded | None]] | None = None
 
@@ -138,13 +140,19 @@ def _vehicle(
             raise document.error((*loc, "availability"),
                                  f"{availability} is not the marginal of joint_availability, {marginal}; drop it")
         availability = marginal
+    limit_s = math.inf if file.mission_limit_s is None else file.mission_limit_s
     if availability is None:
-        raise document.error(loc, "the key 'availability' is missing; add it")
-    return Vehicle(
+        if file.mtbf_s is None:
+            raise document.error(loc, "the key 'availability' is missing; add it")
+        availability = availability_by(file.mtbf_s, limit_s)
+    vehicle = Vehicle(
         name=file.name, incentives=incentives, fuel_s=fuel, availability=availability,
         fuel_capacity_s=math.inf if file.fuel_capacity_s is None else file.fuel_capacity_s,
-        mission_limit_s=math.inf if file.mission_limit_s is None else file.mission_limit_s,
+        mission_limit_s=limit_s, mtbf_s=file.mtbf_s, loss_cost=file.loss_cost,
     )
+    if problem := undefined_under([instance.failure], vehicle.reliability):
+        raise document.error((*loc, "availability"), f"{problem} of the vehicle")
+    return vehicle
 
 
 def _matrix(document: Document, loc: tuple[str | int, ...], rows: list[list[float | None]], n: int) -> FloatArray:
@@ -201,6 +209,9 @@ def instance_as_dict(instance: Instance) -> dict[str, Any]:
         entry: dict[str, Any] = {
             "name": v.name, "fuel_capacity_s": _plain(v.fuel_capacity_s), "mission_limit_s": _plain(v.mission_limit_s),
             "availability": _plain(v.availability),
+            # A mean of infinity is what an availability of 1 says too.
+            **({"mtbf_s": _plain(v.mtbf_s)} if v.mtbf_s is not None and math.isfinite(v.mtbf_s) else {}),
+            **({"loss_cost": _plain(v.loss_cost)} if v.loss_cost else {}),
             "incentives": {instance.sites[j]: _plain(v.incentives[j]) for j in range(n) if v.incentives[j] > 0},
         }
         if not shared:

@@ -17,11 +17,11 @@ from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import Executed, execute
 from sva_bench.files.printable import counted
 from sva_bench.report.wording import verdict, with_interval
-from sva_bench.study.costs import NOMINAL, plan_costs
+from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios, two_cases
 from sva_bench.workers.progress import OnProgress
-from sva_bench.world.model import World
+from sva_bench.world.model import NOMINAL, World
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +85,7 @@ _PROCESSES: tuple[FailureProcess, ...] = ("per_leg", "mission")
 def _simulated(s: Executed, d: Executed, *, noisy: bool) -> Simulated:
     vss, mean = estimate(difference_figure(s, d, noisy=noisy)), float(totals(s).mean())
     return Simulated(stochastic=mean, deterministic=float(totals(d).mean()),
-                     by_robot=tuple(s.incentive.mean(axis=0).tolist()), vss=vss,
+                     by_robot=tuple(s.value.mean(axis=0).tolist()), vss=vss,
                      vss_pct=100 * vss.mean / mean if mean else None,
                      same_plan=s.case.plan.drives_like(d.case.plan))
 

@@ -18,9 +18,12 @@ from rerun.experimental import ViewerClient
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.outcome import Trace
+from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.files.atomic import by_way_of
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.recording.story import DISABLED, Color, Marks, RobotView, Series, Story, story_of
+from sva_bench.recording.colors import ALARM, DISABLED, Color, pale
+from sva_bench.recording.reactions import Change, Lost
+from sva_bench.recording.story import Marks, RobotView, Series, Story, story_of
 from sva_bench.world.model import World
 
 TIMELINE = "sim_time"
@@ -34,12 +37,14 @@ _TOTAL: Color = (190, 190, 190)
 _OBSTACLE_M = 0.35  # shown height: low, so that little is hidden behind it
 _FLOOR_M = 0.02  # shown thickness
 _PLANNED_M, _DRIVEN_M = 0.015, 0.03  # heights of lines above the floor, and below the robots
+_ORDERS_M, _LOST_M = 0.045, 0.6  # of changed orders above those, and of what marks a lost robot above all
+_NEW_UI, _CROSS_UI, _MARK_UI = 3.5, 3.5, 6.0  # widths of new orders and crosses, and size of marks
 _NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
 _SETTLE_S, _SETTLE_TRIES = 0.5, 40  # between pictures; a third or fourth one is the last, on a slow machine a tenth
 _PLAY_S = 30.0  # a mission is played in about this time
 
 
-def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> None:
+def record(path: Path, world: World, traces: Sequence[Trace], *, title: str, news: Sequence[NewsHeard] = ()) -> None:
     """Write one trial as a recording, with the layout that it is shown in.
 
     Args:
@@ -47,11 +52,12 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
         world: The world.
         traces: One per robot at most, of one trial.
         title: What the viewer calls the recording.
+        news: News of failures that the team heard, and what it made of it.
 
     Raises:
         ValueError: If the traces don't belong to the world.
     """
-    story = story_of(world, traces, title)
+    story = story_of(world, traces, title, news)
     # Layouts are kept per application id, and one layout fits one world. The recording's id follows from its content:
     # the same trial is the same recording, and two that are opened together stay apart.
     recording = rr.RecordingStream(f"sva-bench {world.name}", recording_id=_identity(story), send_properties=False)
@@ -67,6 +73,11 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str) -> 
             _write_marks(recording, marks, story.solids)
         for robot in story.views:
             _write_robot(recording, robot)
+        for lost in story.lost:
+            _write_lost(recording, lost)
+        for change in story.changes:
+            _write_change(recording, change)
+        _write_lanes(recording, story)
         _write_numbers(recording, story)
         _write_log(recording, story)
         recording.flush()
@@ -139,11 +150,6 @@ def _about_z(yaw_rad: FloatArray) -> NDArray[np.float32]:
     return np.stack([nought, nought, np.sin(yaw_rad / 2), np.cos(yaw_rad / 2)], axis=-1).astype(np.float32)
 
 
-def _pale(color: Color) -> Color:
-    r, g, b = (round(c + (255 - c) * 0.45) for c in color)
-    return r, g, b
-
-
 def _write_solids(recording: rr.RecordingStream, solids: Obstacles) -> None:
     x0, y0, x1, y1 = solids.bounds_m.tolist()
     _constant(recording, "world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
@@ -210,12 +216,50 @@ def _write_robot(recording: rr.RecordingStream, robot: RobotView) -> None:
         centers=[[r / 2, 0, height]], half_sizes=[[r / 2, r / 6, r / 10]], colors=[(255, 255, 255)], fill_mode="solid"))
     if len(robot.planned):
         _constant(recording, f"world/planned/{robot.name}", rr.LineStrips3D(
-            _deep(robot.planned, _PLANNED_M), colors=[_pale(robot.color)], radii=rr.Radius.ui_points(1.0)))
+            _deep(robot.planned, _PLANNED_M), colors=[pale(robot.color)], radii=rr.Radius.ui_points(1.0)))
     if len(robot.trail):
         entity = f"world/driven/{robot.name}"
         _constant(recording, entity, rr.LineStrips3D.from_fields(
             colors=[robot.color], radii=rr.Radius.ui_points(1.75)))
         _column(recording, entity, robot.trail_s, rr.LineStrips3D.columns(strips=_deep(robot.trail, _DRIVEN_M)))
+
+
+def _write_lost(recording: rr.RecordingStream, lost: Lost) -> None:
+    """A red cross where a robot was lost, from then on, larger than the robot, and what happened."""
+    entity, r = f"world/lost/{lost.robot}", 2.2 * lost.radius_m
+    cross = np.array([[[-r, -r], [r, r]], [[-r, r], [r, -r]]]) + lost.at_m
+    _column(recording, entity, [lost.time_s], rr.LineStrips3D.columns(
+        strips=_deep(cross, _LOST_M), colors=[ALARM] * 2).partition([2]))
+    _constant(recording, entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_CROSS_UI)))
+    _column(recording, f"{entity}/what", [lost.time_s], rr.Points3D.columns(
+        positions=_deep(lost.at_m[None] - [0.0, r + 0.2], _LOST_M), colors=[ALARM], labels=[lost.what]))
+    _constant(recording, f"{entity}/what", rr.Points3D.from_fields(
+        radii=rr.Radius.ui_points(0.0), show_labels=True))
+
+
+def _write_change(recording: rr.RecordingStream, change: Change) -> None:
+    """A robot's orders from the moment on at which they change: what was left of them thin, what is left now thick."""
+    for name, paths, color, width in (("old", change.old, pale(change.color), 1.0),
+                                      ("new", change.new, change.color, _NEW_UI)):
+        entity = f"world/orders/{change.robot}/{name}"
+        _constant(recording, entity, rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(width)))
+        lines = [path for path in paths if len(path) > 1]
+        # No line is one too: it takes an earlier one away.
+        strips = [_deep(path, _ORDERS_M) if len(path) > 1 else np.zeros((1, 3), dtype=np.float32) for path in paths]
+        if lines:
+            _column(recording, entity, change.time_s, rr.LineStrips3D.columns(strips=strips))
+
+
+def _write_lanes(recording: rr.RecordingStream, story: Story) -> None:
+    """A lane for each robot: a cross where it was lost, and a mark each time that it learned of a failure."""
+    for lane in story.lanes:
+        for name, times, marker, color in (("lost", lane.lost_s, rr.components.MarkerShape.Cross, ALARM),
+                                           ("learned", lane.learned_s, rr.components.MarkerShape.Diamond, lane.color)):
+            if len(times):
+                entity = f"news/{lane.robot}/{name}"
+                _constant(recording, entity, rr.SeriesPoints(
+                    names=f"{lane.robot} {name}", colors=[color], markers=marker, marker_sizes=_MARK_UI))
+                _column(recording, entity, times, rr.Scalars.columns(scalars=[lane.height] * len(times)))
 
 
 def _write_numbers(recording: rr.RecordingStream, story: Story) -> None:
@@ -236,7 +280,7 @@ def _write_log(recording: rr.RecordingStream, story: Story) -> None:
     if story.log:
         _column(recording, "events", [s.time_s for s in story.log], rr.TextLog.columns(
             text=[s.text for s in story.log], level=[s.level for s in story.log],
-            color=[_pale(s.color) for s in story.log]))
+            color=[pale(s.color) for s in story.log]))
 
 
 def _layout(story: Story) -> rrb.Blueprint:
@@ -261,12 +305,18 @@ def _layout(story: Story) -> rrb.Blueprint:
     right.append(rrb.TimeSeriesView(origin="collected", name="Incentive collected", axis_x=axis,
                                     axis_y=_from_zero(float(story.total.value[-1])),
                                     plot_legend=rrb.Corner2D.LeftTop))
+    shares.append(3)
+    if story.lanes:
+        right.append(rrb.TimeSeriesView(
+            origin="news", name="Who was lost, and who learned of it when", axis_x=axis,
+            axis_y=rrb.ScalarAxis(range=(-len(story.views) + 0.4, 0.6)), plot_legend=rrb.Corner2D.RightTop))
+        shares.append(2)
     right.append(rrb.TextLogView(
         origin="events", name="Events", columns=rrb.TextLogColumns(
             timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"]),
         rows=rrb.TextLogRows(filter_by_log_level=["INFO", "WARN", "ERROR"])))
     return rrb.Blueprint(
-        rrb.Horizontal(space, rrb.Vertical(*right, row_shares=[*shares, 3, 4]), column_shares=[13, 7]),
+        rrb.Horizontal(space, rrb.Vertical(*right, row_shares=[*shares, 4]), column_shares=[13, 7]),
         rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing",
                       playback_speed=max(1.0, round(story.duration_s / _PLAY_S))),

@@ -13,25 +13,13 @@ from numpy.typing import NDArray
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.choices import SiteKind
 from sva_bench.execution.outcome import Event, Trace
+from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.recording.colors import ALARM, ROBOT_COLORS, SITE_COLORS, Color, pale
+from sva_bench.recording.reactions import LOST, Change, Lane, Lost, changes_of, lanes_of, lost_of, sentences_of
 from sva_bench.world.model import Site, World
 
-Color = tuple[int, int, int]
 Level = Literal["DEBUG", "INFO", "WARN", "ERROR"]
-
-# Colours that colour-blind readers tell apart too. Source: Okabe and Ito (2002), Color Universal Design.
-BLACK: Color = (0, 0, 0)
-BLUE: Color = (0, 114, 178)
-VERMILLION: Color = (213, 94, 0)
-PURPLE: Color = (204, 121, 167)
-SKY_BLUE: Color = (86, 180, 233)
-ORANGE: Color = (230, 159, 0)
-YELLOW: Color = (240, 228, 66)
-GREEN: Color = (0, 158, 115)
-
-ROBOT_COLORS = (BLUE, VERMILLION, PURPLE, SKY_BLUE, ORANGE)  # the sixth robot has the first one's again
-SITE_COLORS: dict[SiteKind, Color] = {"base": BLACK, "station": GREEN, "poi": YELLOW}
-DISABLED: Color = (45, 45, 45)  # a robot that has stopped for good
 
 _DASH_M, _GAP_M = 0.25, 0.2  # of planned paths
 _TRAIL_STEP_S = 0.25  # a robot at 0.65 m/s is 0.16 m past the end of its trail then: less than its radius
@@ -136,6 +124,9 @@ class Story:
         solids: What stands in the world.
         marks: The sites, one entry per kind that occurs.
         views: The robots.
+        lost: Those that didn't come home.
+        changes: Those whose orders changed.
+        lanes: What is known when, robot by robot; none if no news came.
         total: Incentive collected by all robots together.
         log: What happened, in order of time.
         eye_m: Position of the camera, x, y, z [m].
@@ -148,19 +139,23 @@ class Story:
     solids: Obstacles
     marks: tuple[Marks, ...]
     views: tuple[RobotView, ...]
+    lost: tuple[Lost, ...]
+    changes: tuple[Change, ...]
+    lanes: tuple[Lane, ...]
     total: Series
     log: tuple[LogEntry, ...]
     eye_m: tuple[float, float, float]
     target_m: tuple[float, float, float]
 
 
-def story_of(world: World, traces: Sequence[Trace], title: str) -> Story:
+def story_of(world: World, traces: Sequence[Trace], title: str, news: Sequence[NewsHeard] = ()) -> Story:
     """The content of a recording of one trial.
 
     Args:
         world: The world.
         traces: One per robot at most, of one trial.
         title: What the recording is called.
+        news: News of failures that the team heard, in order.
 
     Raises:
         ValueError: If there is no trace, one without poses or of a robot that the world doesn't have, or two of
@@ -174,17 +169,21 @@ def story_of(world: World, traces: Sequence[Trace], title: str) -> Story:
         raise ValueError(f"no poses of {empty}: a trace begins with the pose at the base")
     traces = sorted(traces, key=lambda trace: known[trace.orders.robot])
     colors = {name: ROBOT_COLORS[k % len(ROBOT_COLORS)] for name, k in known.items()}
-    duration_s = max(max(float(trace.time_s[-1]), trace.outcome.end_time_s) for trace in traces)
+    duration_s = max([*(heard.time_s for heard in news), *(max(float(trace.time_s[-1]), trace.outcome.end_time_s)
+                                                           for trace in traces)])
     views = tuple(
         _robot_view(trace, world.robots[known[trace.orders.robot]].model.radius_m, colors[trace.orders.robot],
                     duration_s)
         for trace in traces)
     gains = [_gains(trace) for trace in traces]
     eye, target = _eye(world.obstacles.bounds_m)
+    lost = tuple(lost_of(trace, view.radius_m) for trace, view in zip(traces, views, strict=True)
+                 if view.disabled_s is not None)
     return Story(
         title=title, world=world.name, duration_s=duration_s, solids=world.obstacles.walled(_WALL_M),
-        marks=_marks(world.sites, traces, colors), views=views,
-        total=_staircase(np.concatenate(gains), duration_s), log=_log(traces, colors), eye_m=eye, target_m=target)
+        marks=_marks(world.sites, traces, colors, news), views=views, lost=lost, changes=changes_of(news, colors),
+        lanes=lanes_of(traces, news, colors), total=_staircase(np.concatenate(gains), duration_s),
+        log=_log(traces, colors, news), eye_m=eye, target_m=target)
 
 
 def dashes(path: FloatArray, dash_m: float, gap_m: float) -> FloatArray:
@@ -228,7 +227,17 @@ def corners(time_s: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
     return kept
 
 
-def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[Marks, ...]:
+def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Color], news: Sequence[NewsHeard]
+           ) -> tuple[Marks, ...]:
+    """Sites by kind. A POI has the colour of the robot that collected it, and before a light one of who takes it over
+    or, left to nobody again, its own."""
+    collected = [(event.time_s, event.site, colors[trace.orders.robot], True)
+                 for event, trace in _events(traces) if event.kind == "collected"]
+    orphans = [change for heard in news for robot in heard.rerouted for change in (
+        *((heard.time_s, site, SITE_COLORS["poi"], False) for site in robot.dropped),
+        *((heard.time_s, site, pale(colors[robot.robot]), False) for site in robot.taken))]
+    # Of the same moment, what is dropped comes before what is taken over: by whomever, it has a new owner then.
+    painted = sorted([*orphans, *collected], key=lambda p: (p[0], p[3], p[2] != SITE_COLORS["poi"]))
     marks = []
     for kind in SITE_COLORS:
         mine = [site for site in sites if site.kind == kind]
@@ -236,12 +245,16 @@ def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Col
         now = np.tile(np.array(SITE_COLORS[kind], dtype=np.int64), (len(mine), 1))
         times, rows = [0.0], [now.copy()]
         taken: set[str] = set()
-        for event, trace in _events(traces):
-            if event.kind == "collected" and event.site in index and event.site not in taken:  # the first one's colour
-                taken.add(event.site)
-                now[index[event.site]] = colors[trace.orders.robot]
-                times.append(event.time_s)
-                rows.append(now.copy())
+        for time_s, site, color, for_good in painted:
+            if site in index and site not in taken:  # who collects it first
+                if for_good:
+                    taken.add(site)
+                now[index[site]] = color
+                if times[-1] == time_s and len(times) > 1:
+                    rows[-1] = now.copy()
+                else:
+                    times.append(time_s)
+                    rows.append(now.copy())
         if mine:
             marks.append(Marks(kind=kind, names=tuple(index), at_m=np.array([[s.x_m, s.y_m] for s in mine]),
                                time_s=np.array(times), colors=np.array(rows)))
@@ -264,7 +277,7 @@ def _robot_view(trace: Trace, radius_m: float, color: Color, duration_s: float) 
         fuel = Series(time_s=when[kept], value=left[kept])
     return RobotView(
         name=trace.orders.robot, radius_m=radius_m, color=color, time_s=time, pose=pose,
-        disabled_s=outcome.end_time_s if outcome.end in ("failed", "out_of_fuel", "stuck") else None,
+        disabled_s=outcome.end_time_s if outcome.end in LOST else None,
         planned=dashes(trace.planned, _DASH_M, _GAP_M), trail_s=time[at[1:]][moved], trail=pieces, fuel=fuel,
         collected=_staircase(_gains(trace), duration_s))
 
@@ -288,7 +301,7 @@ def _events(traces: Sequence[Trace]) -> list[tuple[Event, Trace]]:
     return sorted(((event, trace) for trace in traces for event in trace.outcome.events), key=lambda e: e[0].time_s)
 
 
-def _log(traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[LogEntry, ...]:
+def _log(traces: Sequence[Trace], colors: dict[str, Color], news: Sequence[NewsHeard]) -> tuple[LogEntry, ...]:
     at_home = [
         LogEntry(time_s=0.0, level="INFO", text=f"{trace.orders.robot} stays home", color=colors[trace.orders.robot])
         for trace in traces if not trace.outcome.events]
@@ -296,7 +309,9 @@ def _log(traces: Sequence[Trace], colors: dict[str, Color]) -> tuple[LogEntry, .
     for event, trace in _events(traces):
         level, text = _sentence(event, trace)
         entries.append(LogEntry(time_s=event.time_s, level=level, text=text, color=colors[trace.orders.robot]))
-    return (*at_home, *entries)
+    told = [LogEntry(time_s=heard.time_s, level="WARN", text=text, color=ALARM if robot is None else colors[robot])
+            for heard in news for text, robot in sentences_of(heard)]
+    return (*at_home, *sorted([*entries, *told], key=lambda entry: entry.time_s))
 
 
 def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
@@ -312,7 +327,8 @@ def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
         case "refuelled":
             return "INFO", f"{robot} refuelled at {site}"
         case "failed":
-            return "ERROR", f"{robot} failed at {site}, with {earned} collected"
+            where = "at" if site == _stood_at(trace, event) else "on the way to"
+            return "ERROR", f"{robot} failed {where} {site}, with {earned} collected"
         case "out_of_fuel":
             return "ERROR", f"{robot} ran out of fuel on the way to {site}, with {earned} collected"
         case "stuck":
@@ -323,6 +339,12 @@ def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
             return "WARN", f"{robot} passed its limit of {trace.orders.mission_limit_s:g} s at {site}: earns no more"
         case "home":
             return "INFO", f"{robot} came home, with {earned} collected"
+
+
+def _stood_at(trace: Trace, event: Event) -> str:
+    """Site that a robot stood at, or was last, when something happened."""
+    before = [e.site for e in trace.outcome.events if e.kind in ("departed", "arrived") and e is not event]
+    return before[-1] if before else trace.orders.route[0]
 
 
 def _eye(bounds_m: FloatArray) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

@@ -10,6 +10,7 @@ from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, write_page
+from sva_bench.report.reactions_over_maps import reaction_table
 from sva_bench.report.wording import (
     VSS_PCT,
     listed,
@@ -35,6 +36,7 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
+        *_reactions(summary),
         *(note(remark) for remark in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing])),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, fidelity {summary.fidelity}; 95 "
              "% intervals in brackets. Over maps, the maps are the sample."),
@@ -48,6 +50,17 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
               sections=[unit.label for unit in summary.units for _ in unit.scenarios]),
     ]
     write_page(path, "batch", parts)
+
+
+def _reactions(summary: BatchSummary) -> list[str]:
+    """What teams that react make of it."""
+    if not summary.reactions:
+        return []
+    head, words, cells = reaction_table(summary.reactions)
+    return [heading("Teams that react"), table(head, cells, words=words), note(
+        "VSS: stochastic less deterministic plan under the reaction, of either sign. Recourse: what reacting adds to a "
+        "plan. VSS with recourse and anticipation: the best plan for the reaction less the deterministic and the "
+        "stochastic one.")]
 
 
 def _pictures(summary: BatchSummary) -> list[str]:

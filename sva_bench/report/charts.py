@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from sva_bench.analysis.results import ComparedScenario, Estimate, ScenarioSummary
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
 from sva_bench.report.drawing import Axes, chart
 
@@ -27,14 +28,15 @@ def incentive_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequ
     """
     robots = list(scenarios[0].availability)
     heights = {robot: [s.plans[plan].by_robot[robot] for s in scenarios] for robot in robots}
-    most = max(s.plans[name].by_robot[robot] for s in scenarios for name in {plan, *beside} for robot in robots)
+    shown = [s.plans[name].by_robot[robot] for s in scenarios for name in {plan, *beside} for robot in robots]
+    least, most = min(0.0, *shown), max(0.0, *shown)  # below 0: a robot's loss cost more than it collected
 
     def draw(axes: Axes) -> None:
         _bars(axes, [s.name for s in scenarios], heights, {})
         axes.set_ylabel("mean incentive [world file's units]")
         axes.set_title(f"Incentive by robot, {plan} plan")
-        if most > 0:
-            axes.set_ylim(0, 1.05 * most)
+        if most > least:
+            axes.set_ylim(1.05 * least, 1.05 * most)
 
     return chart(_name("robots", plan), f"Mean incentive that each robot collects in each scenario, {plan} plan",
                  (_width(len(scenarios), len(robots)), 3.6), draw)
@@ -177,6 +179,11 @@ def _legend(axes: Axes) -> None:
 
 def _offset(number: int, of: int) -> float:
     return 0.8 * ((number + 0.5) / of - 0.5)
+
+
+def mark(number: int) -> tuple[str, str]:
+    """Colour and shape of the points of a series."""
+    return _colour(number), _MARKERS[number % len(_MARKERS)]
 
 
 def _colour(number: int) -> str:

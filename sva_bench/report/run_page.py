@@ -11,12 +11,14 @@ import numpy as np
 
 from sva_bench.analysis.catalogue import Section, statistics
 from sva_bench.analysis.reach import lost_robots
-from sva_bench.analysis.results import ComparedScenario, Estimate, ScenarioSummary, Share
+from sva_bench.analysis.results import Estimate, Share
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
+from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
@@ -50,21 +52,24 @@ def write_report(path: Path, content: Content) -> None:
     parts = [
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
         *_answer(summary),
+        *(reactions_answered(summary) if isinstance(summary, Summary) else ()),
         *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
              f"{assumed(summary)}. "
              "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
         *_charts(summary),
+        *(reaction_section(summary) if isinstance(summary, Summary) else ()),
         *_world(content.world),
         *_over_trials(scenarios),
         *_from_promise(scenarios),
+        *(reaction_ledgers(summary) if isinstance(summary, Summary) else ()),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
         *_measured(scenarios),
-        *_legs(content.legs),
+        *_legs(content.legs.without_reaction()),
         *_routes(content.routes),
-        *_recordings(content.stems, content.lacking),
+        *_recordings(content),
         *_again(summary, content.manifest),
     ]
     write_page(path, summary.world, parts)
@@ -235,13 +240,22 @@ def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> li
     return [heading("Routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
 
 
-def _recordings(stems: Mapping[tuple[str, str], str], lacking: Sequence[str]) -> list[str]:
-    links = [f'<a href="recordings/{quote(stem)}.rrd">{text(f"{scenario}, {planner}")}</a>'
-             for (scenario, planner), stem in stems.items() if f"recordings/{stem}.rrd" not in lacking]
+def _recordings(content: Content) -> list[str]:
+    lacking = content.lacking
+
+    def linked(stems: Mapping[str, str]) -> list[str]:
+        return [f'<a href="recordings/{quote(stem)}.rrd">{text(what)}</a>' for what, stem in stems.items()
+                if f"recordings/{stem}.rrd" not in lacking]
+
+    links = linked({f"{scenario}, {planner}": stem for (scenario, planner), stem in content.stems.items()})
+    reacting = linked({f"{scenario}, {planner}, {policy} on {news} news": stem
+                       for (scenario, planner, policy, news), stem in content.reaction_stems.items()})
     parts = [heading("Recordings")]
     if links:
         parts.append(f"<p>Trial 0 of each plan, for the Rerun viewer: {', '.join(links)}. Open them all with "
                      "<code>sva-bench view</code> and this folder.</p>")
+    if reacting:
+        parts.append(f"<p>The most probable course of events in which orders change: {', '.join(reacting)}.</p>")
     if lacking:
         parts.append(note(f"Missing in this run folder: {', '.join(lacking)}. This page doesn't rest on them."))
     return parts

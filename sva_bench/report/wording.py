@@ -8,14 +8,8 @@ from typing import Protocol
 from sva_bench.analysis.catalogue import Statistic
 from sva_bench.analysis.over_maps import OverMaps, Percentage
 from sva_bench.analysis.reach import NOTHING, beyond_reach, infeasible_plans, warned
-from sva_bench.analysis.results import (
-    ComparedScenario,
-    Comparison,
-    Estimate,
-    PlanFigures,
-    ScenarioSummary,
-    VssFigures,
-)
+from sva_bench.analysis.results import Comparison, Estimate, PlanFigures, VssFigures
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.files.printable import counted
 

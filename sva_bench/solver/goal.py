@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray
+from sva_bench.solver.discounts import NO_DISCOUNT, Discount, Discounts
 from sva_bench.solver.risk import Risk
 
 
@@ -19,38 +20,47 @@ class Goal:
         weights: Reward of a visit by vehicle m to site j, shape (M, n); may be negative.
         floors: Constraints: weights of shape (M, n), and the least sum of them over a plan's visits.
         driving: Cost of a second of driving and stopping.
-        survival: Probability of each vehicle to get to its next POI, shape (M,): the k-th visit of a route earns its
-            k-th power; ``None`` = certain.
+        discounts: What failures along the routes leave of ``weights``, and the costs of losses; ``None`` = no failures.
+            Then there are no floors, no cost of driving, no measure of risk and no negative weights.
         risk: A measure of risk, added to ``weights``; its outcomes are then the floors, which are rows of the measure
             and no constraints.
+        arrival: Upper bound on the probability of vehicle m to get to site j, shape (M, n); ``None`` = 1.
     """
 
     weights: FloatArray
     floors: tuple[tuple[FloatArray, float], ...] = ()
     driving: float = 0.0
-    survival: FloatArray | None = None
+    discounts: Discounts | None = None
     risk: Risk | None = None
+    arrival: FloatArray | None = None
 
-    def chances(self) -> FloatArray:
-        """``survival``, or ones."""
-        return np.ones(len(self.weights)) if self.survival is None else self.survival
+    def __post_init__(self) -> None:
+        if self.discounts is not None and (
+                self.floors or self.driving or self.risk is not None or bool((self.weights < 0).any())):
+            raise ValueError("a goal with discounts has rewards that aren't negative, and nothing else")
+
+    def discount(self, vehicle: int) -> Discount:
+        """The discount of one vehicle."""
+        return NO_DISCOUNT if self.discounts is None else self.discounts.of(vehicle)
 
     def times(self, factor: float) -> Goal:
         """The same goal with incentives, and all that is compared with them, multiplied by a factor."""
         return replace(
             self, weights=self.weights * factor, driving=self.driving * factor,
+            discounts=None if self.discounts is None else self.discounts.times(factor),
             floors=tuple((weights * factor, floor * factor) for weights, floor in self.floors),
             risk=None if self.risk is None else self.risk.times(factor))
 
-    def within(self, reach: BoolArray) -> Goal:
+    def within(self, reach: BoolArray, arrival: FloatArray | None = None) -> Goal:
         """The same goal without the rewards of infeasible visits.
 
         Args:
             reach: Whether vehicle m can visit site j, shape (M, n).
+            arrival: Upper bound on the probability of vehicle m to get to site j, shape (M, n); ``None`` = 1.
         """
         risk = self.risk and replace(self.risk, outcomes=replace(
             self.risk.outcomes, incentives=np.where(reach, self.risk.outcomes.incentives, 0.0)))
-        return replace(self, weights=np.where(reach, self.weights, 0.0), risk=risk)
+        return replace(self, weights=np.where(reach, self.weights, 0.0), risk=risk, arrival=arrival)
 
     def essential(self) -> Goal:
         """The same goal but for a constant: its measure of risk reduced to what is not linear in the visits."""
@@ -62,12 +72,14 @@ class Goal:
 
     def rates(self) -> FloatArray:
         """The most that the visit of vehicle m to site j can earn, or cost, shape (M, n)."""
-        rates: FloatArray = np.abs(self.weights) * self.chances()[:, None]
+        rates: FloatArray = np.abs(self.weights) * (1.0 if self.arrival is None else self.arrival)
         return rates if self.risk is None else rates + self.risk.rates()
 
     def rewarded(self) -> BoolArray:
         """Whether the visit of vehicle m to site j counts anywhere, shape (M, n)."""
         counts: BoolArray = self.weights != 0
+        for m in range(len(counts)):
+            counts[m] &= not self.discount(m).is_hopeless
         for weights, _ in self.floors:
             counts = counts | (weights != 0)
         return counts

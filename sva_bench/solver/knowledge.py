@@ -16,8 +16,8 @@ from sva_bench.mission.instance import Instance
 from sva_bench.solver.goal import Goal
 from sva_bench.solver.routes.fronts import LegTables, leg_tables
 from sva_bench.solver.routes.heuristic import VisitOrders
-from sva_bench.solver.routes.heuristic import value_of as rewards
 from sva_bench.solver.routes.refuelling import VehicleLegs, quickest_route, vehicle_legs
+from sva_bench.solver.routes.ways import ValuedRoute, best_way
 from sva_bench.solver.units import common_unit
 
 Routes = tuple[tuple[int, ...], ...]
@@ -115,7 +115,9 @@ class Solution:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Knowledge:
-    """What solves of one instance share: cuts, plans and solutions; availabilities may differ between the solves.
+    """What solves of one instance share: cuts, plans and solutions.
+
+    Between the solves, what vehicles' reliability is made of may differ: availabilities, and the rest of it.
 
     Attributes:
         instance: The instance of the first solve.
@@ -206,12 +208,16 @@ class Progress:
 
 
 def best_known(goal: Goal, known: Knowledge) -> VisitOrders | None:
-    """The best of the known plans under a goal, without stops that earn nothing; ``None`` if none keeps the floors."""
+    """The best of the known plans under a goal; ``None`` if none keeps the floors.
+
+    Stops that earn nothing are left out, and routes whose risk costs more than they earn.
+    """
     rewarded = goal.rewarded()
     all_at_base: VisitOrders = tuple(() for _ in known.legs_by_vehicle)
     candidates = [
-        tuple(without_idle_stops(own_legs, order, rewarded[m])
-              for m, (own_legs, order) in enumerate(zip(known.legs_by_vehicle, orders, strict=True)))
+        without_losses(goal, known.legs_by_vehicle, tuple(
+            without_idle_stops(own_legs, order, rewarded[m])
+            for m, (own_legs, order) in enumerate(zip(known.legs_by_vehicle, orders, strict=True))))
         for orders in (*known.orders, all_at_base)]
     kept = [orders for orders in candidates if _keeps_floors(goal, orders)]
     return max(kept, key=lambda orders: value_of(goal, known.legs_by_vehicle, orders)) if kept else None
@@ -228,12 +234,20 @@ def without_idle_stops(own_legs: VehicleLegs, order: tuple[int, ...], rewarded: 
     return order
 
 
+def without_losses(goal: Goal, legs_by_vehicle: Sequence[VehicleLegs], orders: VisitOrders) -> VisitOrders:
+    """The plan without the routes that are worth less than staying at the base."""
+    if goal.discounts is None:
+        return orders
+    return tuple(order if _way(goal, m, legs_by_vehicle[m], order).value > 0 else () for m, order in enumerate(orders))
+
+
 def _keeps_floors(goal: Goal, orders: VisitOrders) -> bool:
     return goal.risk is not None or all(_sum(weights, orders) >= floor for weights, floor in goal.floors)
 
 
 def adopt(progress: Progress, goal: Goal, known: Knowledge, orders: VisitOrders) -> None:
     """Make a plan the incumbent if it is better."""
+    orders = without_losses(goal, known.legs_by_vehicle, orders)
     value = value_of(goal, known.legs_by_vehicle, orders)
     if value > progress.value and _keeps_floors(goal, orders):
         progress.orders, progress.value = orders, value
@@ -243,9 +257,12 @@ def value_of(goal: Goal, legs_by_vehicle: Sequence[VehicleLegs], orders: VisitOr
     """Value of a feasible plan under a goal.
 
     Raises:
-        ValueError: If driving costs and the plan is infeasible.
+        ValueError: If the plan is infeasible, and its driving times matter.
     """
-    value = rewards(goal.weights, goal.chances(), orders)
+    if goal.discounts is not None:
+        return math.fsum(_way(goal, m, own_legs, order).value
+                         for m, (own_legs, order) in enumerate(zip(legs_by_vehicle, orders, strict=True)))
+    value = _sum(goal.weights, orders)
     if goal.risk is not None:
         earned = goal.risk.outcomes.incentives
         sums = np.array([math.fsum(earned[m, j] for j in order) for m, order in enumerate(orders)])
@@ -263,6 +280,23 @@ def _sum(weights: FloatArray, orders: VisitOrders) -> float:
     return math.fsum(weights[m, j] for m, order in enumerate(orders) for j in order)
 
 
+def _way(goal: Goal, vehicle: int, own_legs: VehicleLegs, order: tuple[int, ...]) -> ValuedRoute:
+    found = best_way(own_legs, order, [float(goal.weights[vehicle, j]) for j in order], goal.discount(vehicle))
+    if found is None:
+        raise ValueError(f"no feasible route visits {order}")
+    return found
+
+
+def routes_of(goal: Goal, legs_by_vehicle: Sequence[VehicleLegs], orders: VisitOrders) -> Routes:
+    """The most valuable route of each vehicle over its POIs in order, of several the quickest.
+
+    Raises:
+        ValueError: If an order is infeasible.
+    """
+    return tuple(_way(goal, m, own_legs, order).route
+                 for m, (own_legs, order) in enumerate(zip(legs_by_vehicle, orders, strict=True)))
+
+
 def route_over(own_legs: VehicleLegs, order: tuple[int, ...]) -> tuple[int, ...]:
     """Sites of the quickest route over POIs in this order, from base to base.
 
@@ -276,10 +310,11 @@ def route_over(own_legs: VehicleLegs, order: tuple[int, ...]) -> tuple[int, ...]
 
 
 def trivial_bound(goal: Goal) -> float:
-    """Upper bound on a goal: every POI visited by the vehicle that earns most there."""
+    """Upper bound on a goal: every POI visited by the vehicle that earns most there, at no cost."""
     if not len(goal.weights):
         return 0.0
-    bound = float(np.maximum(goal.weights.max(axis=0), 0.0).sum())
+    earned = goal.weights if goal.arrival is None else goal.weights * goal.arrival
+    bound = float(np.maximum(earned.max(axis=0), 0.0).sum())
     if goal.risk is not None and goal.risk.measure.kind == "cvar":
         bound += float(goal.risk.rates().max(axis=0).sum())
     return bound
@@ -287,6 +322,6 @@ def trivial_bound(goal: Goal) -> float:
 
 def grain_of(goal: Goal) -> float:
     """The greatest number of which every plan's value is a multiple; 0 where none is known."""
-    if goal.driving or goal.survival is not None or goal.risk is not None:
+    if goal.driving or goal.discounts is not None or goal.risk is not None:
         return 0.0
     return common_unit(goal.weights.ravel())

@@ -31,7 +31,7 @@ class SolutionMethod:
         name: Its name in options; ``choices.METHODS`` has its description.
         prove: Proves the plan of a problem's progress, or a better one, within the gap.
         second_stage: Whether it keeps the second stage explicitly, as in the paper.
-        discounts: Whether it supports rewards that depend on the order of visits.
+        discounts: Whether it supports rewards that depend on the order of visits or on driving times.
         risk: Whether it supports measures of risk.
         serves: Whether it supports an instance, whatever the goal.
     """
@@ -50,7 +50,7 @@ class SolutionMethod:
 
     def accepts(self, problem: Problem) -> bool:
         """Whether it supports this problem."""
-        return ((self.discounts or problem.goal.survival is None) and (self.risk or problem.goal.risk is None)
+        return ((self.discounts or problem.goal.discounts is None) and (self.risk or problem.goal.risk is None)
                 and self.serves(problem))
 
 
@@ -93,7 +93,8 @@ def keeps_second_stage(name: Method) -> bool:
 
 
 def serves_discounts(name: Method) -> bool:
-    """Whether a method supports rewards that depend on the order of visits; ``auto`` chooses one that does."""
+    """Whether a method supports rewards that depend on the order of visits or on driving times; ``auto`` chooses one
+    that does."""
     return name not in METHODS or METHODS[name].discounts
 
 
@@ -118,7 +119,7 @@ def choice(problem: Problem) -> Method:
     failures along the route and measures of risk are supported by no other method.
     """
     instance, scopes, goal = problem.instance, problem.scopes, problem.goal
-    if goal.survival is not None or goal.risk is not None:
+    if goal.discounts is not None or goal.risk is not None:
         return "branch-and-price"
     if not all(math.isfinite(v.mission_limit_s) for v in instance.vehicles):
         return "expected"

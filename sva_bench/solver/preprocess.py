@@ -27,6 +27,7 @@ class Scope:
 
     Attributes:
         legs: Whether an optimal plan can use the leg from site i to site j, shape (n, n).
+        driven_s: Driving time of a leg, kept or not [s], shape (n, n).
         fuel_s: Fuel of a leg [s], shape (n, n).
         time_s: Driving time of a leg and the stop at its end [s], shape (n, n).
         since_refuel_s: Least fuel burnt since the last refuel on arrival at a site [s], ``s_i``, shape (n,).
@@ -38,6 +39,7 @@ class Scope:
     """
 
     legs: BoolArray
+    driven_s: FloatArray
     fuel_s: FloatArray
     time_s: FloatArray
     since_refuel_s: FloatArray
@@ -126,7 +128,8 @@ def scope_of(instance: Instance, vehicle: Vehicle, rewarded: BoolArray) -> Scope
                 & np.isfinite(arrival[q][:, None] + time + departure[r][None, :])
     np.fill_diagonal(legs, False)
     return Scope(
-        legs=legs, fuel_s=fuel, time_s=time, since_refuel_s=since_refuel.min(axis=0), to_refuel_s=to_refuel.min(axis=0),
+        legs=legs, driven_s=vehicle.fuel_s, fuel_s=fuel, time_s=time,
+        since_refuel_s=since_refuel.min(axis=0), to_refuel_s=to_refuel.min(axis=0),
         since_start_s=arrival.min(axis=0), to_end_s=departure.min(axis=0), capacity_s=capacity,
         limit_s=vehicle.mission_limit_s)
 

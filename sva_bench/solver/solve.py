@@ -12,6 +12,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.choices import Cuts, Method
 from sva_bench.interrupts import deferring_ctrl_c, hearing_ctrl_c
 from sva_bench.mission.instance import Instance
+from sva_bench.solver.discounts import greatest_survival, leg_survival
 from sva_bench.solver.goal import Goal
 from sva_bench.solver.knowledge import (
     Clock,
@@ -21,15 +22,15 @@ from sva_bench.solver.knowledge import (
     adopt,
     best_known,
     grain_of,
-    route_over,
+    routes_of,
     trivial_bound,
     value_of,
 )
 from sva_bench.solver.methods import method_for
 from sva_bench.solver.outcomes import Outcomes
-from sva_bench.solver.preprocess import scope_of
+from sva_bench.solver.preprocess import Scope, scope_of
 from sva_bench.solver.problem import Problem
-from sva_bench.solver.routes.heuristic import search, shorten
+from sva_bench.solver.routes.heuristic import STARTS, search, shorten
 from sva_bench.solver.routes.packing import Route
 from sva_bench.solver.units import ROUNDING, factor_of, most_of_a_visit
 
@@ -69,7 +70,8 @@ def _solve(
         raise ValueError("no known plan reaches the floors of the goal")
     rewarded = goal.rewarded()
     scopes = tuple(scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles))
-    goal = goal.within(np.array([scope.legs.any(axis=0) for scope in scopes]).reshape(goal.weights.shape))
+    reach = np.array([scope.legs.any(axis=0) for scope in scopes]).reshape(goal.weights.shape)
+    goal = goal.within(reach, None if goal.discounts is None else _arrival(instance, goal, scopes))
     constant = 0.0
     if goal.risk is not None:
         goal = goal.essential()
@@ -93,15 +95,23 @@ def _solve(
     if progress.closed(gap):
         progress.status = "optimal"
     orders = progress.orders
-    if not goal.driving and goal.survival is None and progress.status != "interrupted":
+    if not goal.driving and goal.discounts is None and progress.status != "interrupted":
         orders = shorten(known.tables, orders)
     known.orders[orders] = None
     return Solution(
-        routes=tuple(route_over(own_legs, order)
-                     for own_legs, order in zip(known.legs_by_vehicle, orders, strict=True)), orders=orders,
+        routes=routes_of(goal, known.legs_by_vehicle, orders), orders=orders,
         value=progress.value / factor, bound=progress.bound / factor, status=progress.status, nodes=progress.nodes,
         cuts=progress.cuts, optimality_cuts=progress.optimality_cuts, rounds=progress.rounds, seconds=progress.seconds,
         method=used.name)
+
+
+def _arrival(instance: Instance, goal: Goal, scopes: Sequence[Scope]) -> FloatArray:
+    """Greatest probability of vehicle m to get to site j, shape (M, n)."""
+    pois = np.isin(np.arange(len(instance.sites)), instance.pois)
+    return np.array([
+        greatest_survival(leg_survival(np.where(scope.legs, scope.fuel_s, np.inf), pois, goal.discount(m)),
+                          instance.base)
+        for m, scope in enumerate(scopes)]).reshape(goal.weights.shape)
 
 
 def _search(problem: Problem) -> Sequence[Route]:
@@ -111,7 +121,8 @@ def _search(problem: Problem) -> Sequence[Route]:
         return ()
     started_s = clock.used_s()
     found = search(
-        problem.known.tables, _searched(goal), goal.chances(), progress.orders,
+        problem.known.tables, _searched(goal), goal.discounts, progress.orders,
+        starts=STARTS if goal.discounts is None else 1,  # columns find the optimum sooner than further starts
         stop=lambda value: clock.is_over() or (
             goal.risk is None and progress.bound - value <= problem.gap * abs(value)),
         offer=lambda orders: adopt(progress, goal, problem.known, orders))

@@ -77,9 +77,9 @@ def in_own_units(instance: Instance) -> tuple[Instance, float]:
     return own, max(largest / (top * factor), math.ulp(0.0))
 
 
-def in_unit(value: float, unit: float) -> float:
-    """A quantity that is compared with incentives, such as a target, in another unit."""
-    return float(_without_noise(np.array([value / unit]))[0])
+def in_unit(values: FloatArray, unit: float) -> FloatArray:
+    """Quantities that are compared with incentives, such as targets and costs, in another unit, shape as given."""
+    return _without_noise(values / unit)
 
 
 def _without_noise(values: FloatArray) -> FloatArray:

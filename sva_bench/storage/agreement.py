@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from sva_bench.errors import BadFile
 from sva_bench.files.printable import counted
@@ -16,8 +21,11 @@ from sva_bench.storage.tables import OUTCOMES, pieces_of
 _AGREE = 1e-6  # relative tolerance of means that are summed in another order
 _AGAIN = "run the command in manifest.json again"
 
-Routes = Mapping[tuple[str, str], Mapping[str, Sequence[str]]]
-"""Route of each robot, by scenario and planner."""
+Key = tuple[str, str, str, str]
+"""Scenario, planner, policy and news."""
+
+Routes = Mapping[Key, Mapping[str, Sequence[str]]]
+"""Route of each robot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,71 +46,172 @@ class StopsReached:
         return StopsReached(most=max(self.most, most), home=ends if home else self.home)
 
 
-def check_outcomes(path: Path, plans: Mapping[tuple[str, str], float], trials: int, robots: int,
-                   words: Mapping[str, frozenset[str]]) -> dict[tuple[str, str, str], StopsReached]:
-    """Check that outcomes have a row for each trial and robot, and the means of the summary; the stops reached.
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """What a summary says of a plan's rows.
+
+    Attributes:
+        mean: Mean value.
+        trials: How many trials they are of; ``None``: they are all histories.
+        begins_whole: Whether nobody fails by draw in trial 0.
+    """
+
+    mean: float
+    trials: int | None
+    begins_whole: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found:
+    """What outcomes say of the routes driven.
+
+    Attributes:
+        reached: Stops reached by each robot, by scenario, planner and robot, where nobody reacts.
+        whole: Plans with a reaction in whose trial 0 nothing happened: they were driven as they are.
+    """
+
+    reached: Mapping[tuple[str, str, str], StopsReached]
+    whole: frozenset[Key]
+
+
+class _Sums:
+    """Sums over the rows of one plan, as they are read."""
+
+    def __init__(self) -> None:
+        self.rows = 0
+        self.weight, self.by_column = 0.0, dict.fromkeys(("incentive", "value"), 0.0)
+        self.lightest, self.heaviest = math.inf, -math.inf
+        self.first_history, self.last_history = 2**63, -2**63
+
+    def add(self, row: Mapping[str, Any], loss_cost: float) -> None:
+        """Add what some rows of one robot sum up to."""
+        self.rows += row["trial_count"]
+        self.weight += row["weight_sum"]
+        self.by_column["incentive"] += row["weighted_incentive_sum"] - loss_cost * row["weighted_lost_sum"]
+        self.by_column["value"] += row["weighted_value_sum"]
+        self.lightest, self.heaviest = min(self.lightest, row["weight_min"]), max(self.heaviest, row["weight_max"])
+        self.first_history = min(self.first_history, row["history_min"])
+        self.last_history = max(self.last_history, row["history_max"])
+
+
+def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[str, float],
+                   words: Mapping[str, frozenset[str]]) -> Found:
+    """Check that outcomes have a row for each trial or history and robot, and the means of the summary.
 
     Args:
         path: The table.
-        plans: Mean incentive by scenario and planner.
-        trials, robots: How many there are.
+        plans: What the summary says, by scenario, planner, policy and news.
+        loss_cost: Cost of each robot if it doesn't come home.
         words: What columns of words may hold.
-
-    Returns:
-        Stops reached, by scenario, planner and robot.
 
     Raises:
         BadFile: If they don't.
     """
-    sums, counts = dict.fromkeys(plans, 0.0), dict.fromkeys(plans, 0)
+    robots = len(loss_cost)
+    known = [claim.trials for claim in plans.values() if claim.trials is not None]
+    rows = sum(known) * robots if len(known) == len(plans) else None
+    sums = {key: _Sums() for key in plans}
     reached: dict[tuple[str, str, str], StopsReached] = {}
-    for piece in pieces_of(path, OUTCOMES, rows=len(plans) * trials * robots, words=words):
-        grouped = piece.group_by(["scenario", "planner", "robot", "end"]).aggregate([
-            ("incentive", "sum"), ("trial", "count"), ("stops_reached", "min"), ("stops_reached", "max")])
-        for row in grouped.to_pylist():
-            key = row["scenario"], row["planner"]
-            sums[key] += row["incentive_sum"]
-            counts[key] += row["trial_count"]
-            whose = *key, row["robot"]
-            reached[whose] = reached.get(whose, StopsReached()).also(
-                row["stops_reached_min"], row["stops_reached_max"], home=row["end"] == "home")
-    for (scenario, name), mean in plans.items():
-        found = sums[scenario, name] / trials
-        if counts[scenario, name] != trials * robots or not np.isclose(found, mean, rtol=_AGREE, atol=_AGREE):
-            raise BadFile(path, None, "incentive", f"these aren't the trials of summary.json: {scenario}, {name} "
-                          f"collected {mean:.6g} there and {found:.6g} here, in "
-                          f"{counted(counts[scenario, name] // robots, 'trial')}; {_AGAIN}")
-    return reached
+    lost: set[Key] = set()
+    for piece in pieces_of(path, OUTCOMES, rows=rows, words=words):
+        for row in _grouped(piece):
+            key = row["scenario"], row["planner"], row["policy"], row["news"]
+            if key not in sums:
+                raise BadFile(path, None, "policy", f"summary.json has no {_named(key)}; {_AGAIN}")
+            sums[key].add(row, loss_cost[row["robot"]])
+            if row["trial_min"] == 0 and row["end"] in ("failed", "out_of_fuel", "stuck"):
+                lost.add(key)
+            if row["policy"] == "none":
+                whose = row["scenario"], row["planner"], row["robot"]
+                reached[whose] = reached.get(whose, StopsReached()).also(
+                    row["stops_reached_min"], row["stops_reached_max"], home=row["end"] == "home")
+    for key, claim in plans.items():
+        _check_sums(path, key, claim, sums[key], robots)
+    return Found(reached=reached, whole=frozenset(key for key, claim in plans.items() if claim.begins_whole) - lost)
 
 
-def check_routes(files: Mapping[tuple[str, str], Path], routes: Routes, legs: Legs,
-                 reached: Mapping[tuple[str, str, str], StopsReached]) -> None:
+def _grouped(piece: pa.Table) -> list[dict[str, Any]]:
+    """Sums over the rows of each plan, robot and end."""
+    weight = piece.column("weight")
+    for column in ("incentive", "value", "lost"):
+        piece = piece.append_column(f"weighted_{column}", pc.multiply(
+            weight, pc.cast(piece.column(column), pa.float64())))
+    found: list[dict[str, Any]] = piece.group_by(["scenario", "planner", "policy", "news", "robot", "end"]).aggregate([
+        ("weighted_incentive", "sum"), ("weighted_lost", "sum"), ("weighted_value", "sum"), ("trial", "count"),
+        ("trial", "min"), ("weight", "sum"), ("weight", "min"), ("weight", "max"), ("history", "min"),
+        ("history", "max"), ("stops_reached", "min"), ("stops_reached", "max")]).to_pylist()
+    return found
+
+
+def _check_sums(path: Path, key: Key, claim: Claim, found: _Sums, robots: int) -> None:
+    """Check the rows of one plan against what the summary says of them."""
+    if claim.trials is None:
+        if found.rows % robots or not np.isclose(found.weight, robots, rtol=_AGREE, atol=_AGREE) \
+                or found.lightest < 0 or found.first_history != 0:
+            raise BadFile(path, None, "weight", "these aren't all histories of failures: the probabilities of "
+                          f"{_named(key)} add up to {found.weight / robots:.6g}; {_AGAIN}")
+    elif found.rows != claim.trials * robots or (found.lightest, found.heaviest) != (1, 1) \
+            or (found.first_history, found.last_history) != (-1, -1):
+        raise BadFile(path, None, "trial", f"these aren't the trials of summary.json: {_named(key)} has "
+                      f"{counted(claim.trials, 'trial')} there and {found.rows // robots} here; {_AGAIN}")
+    for column, total in found.by_column.items():
+        mean = total / (claim.trials or 1)
+        if not np.isclose(mean, claim.mean, rtol=_AGREE, atol=_AGREE):
+            raise BadFile(path, None, column, f"these aren't the trials of summary.json: {_named(key)} collected "
+                          f"{claim.mean:.6g} there and {mean:.6g} here, in "
+                          f"{counted(found.rows // robots, 'trial' if claim.trials else 'row')}; {_AGAIN}")
+
+
+def _named(key: Key) -> str:
+    """A plan as it is called in messages."""
+    scenario, planner, policy, news = key
+    return f"{scenario}, {planner}" + ("" if policy == "none" else f", {policy} on {news} news")
+
+
+def check_routes(files: Mapping[Key, Path], routes: Routes, legs: Legs, found: Found) -> None:
     """Check that what was driven are the routes of the plans.
 
+    What teams that react drove may be another: there the mission in which nothing happened is checked.
+
     Args:
-        files: Plan files, by scenario and planner; not those of perfect-information plans, which have other routes in
-            each outcome.
-        routes: Their routes.
+        files: Plan files; not those of perfect-information plans, which have other routes in each outcome.
+        routes: Routes of each of them.
         legs: The legs driven.
-        reached: Stops reached, by scenario, planner and robot.
+        found: What outcomes say.
 
     Raises:
         BadFile: If a plan has another route than was driven.
     """
-    for scenario, planner, robot, leg, origin, destination in sorted(set(zip(
-            legs.scenario, legs.planner, legs.robot, legs.leg, legs.origin, legs.destination, strict=True))):
-        if (scenario, planner) not in files:
+    first: dict[Key, set[tuple[str, int, str, str]]] = {key: set() for key in found.whole}
+    for *key, trial, robot, leg, origin, destination in sorted(set(zip(
+            legs.scenario, legs.planner, legs.policy, legs.news, legs.trial, legs.robot, legs.leg, legs.origin,
+            legs.destination, strict=True))):
+        whose: Key = (key[0], key[1], key[2], key[3])
+        if whose not in files:
             continue
-        route = routes[scenario, planner].get(robot, ())
+        if whose[2] != "none":
+            if trial == 0 and whose in first:
+                first[whose].add((robot, leg, origin, destination))
+            continue
+        route = routes[whose].get(robot, ())
         if leg < 0 or tuple(route[leg:leg + 2]) != (origin, destination):
-            raise BadFile(files[scenario, planner], None, f"routes.{robot}", "not the route that was driven: leg "
+            raise BadFile(files[whose], None, f"routes.{robot}", "not the route that was driven: leg "
                           f"{leg} of legs.parquet goes from {origin!r} to {destination!r}; {_AGAIN}")
-    for (scenario, planner, robot), found in reached.items():
-        if (scenario, planner) not in files:
+    for (scenario, planner, robot), reached in found.reached.items():
+        whose = scenario, planner, "none", "never"
+        if whose not in files:
             continue
-        route = routes[scenario, planner].get(robot, ())
+        route = routes[whose].get(robot, ())
         stops = len(route) - 1 if len(set(route)) > 1 else 0  # what never leaves the base reaches no stop
-        if found.most > stops or found.home not in (None, (stops, stops)):
-            raise BadFile(files[scenario, planner], None, f"routes.{robot}", "not the route that was driven: it has "
-                          f"{counted(stops, 'stop')} after the base, and {found.most} were reached in "
+        if reached.most > stops or reached.home not in (None, (stops, stops)):
+            raise BadFile(files[whose], None, f"routes.{robot}", "not the route that was driven: it has "
+                          f"{counted(stops, 'stop')} after the base, and {reached.most} were reached in "
                           f"outcomes.parquet; {_AGAIN}")
+    for whose, driven in first.items():
+        planned = {(robot, leg, *ends) for robot, route in routes[whose].items() if len(set(route)) > 1
+                   for leg, ends in enumerate(pairwise(route))} if whose in files else driven
+        if different := sorted(planned ^ driven):
+            robot, leg, origin, destination = different[0]
+            raise BadFile(files[whose], None, f"routes.{robot}", "not the route that was driven in trial 0, where "
+                          f"nothing happened to react to: leg {leg} from {origin!r} to {destination!r} is in one of "
+                          f"this and legs.parquet alone; {_AGAIN}")

@@ -8,19 +8,23 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.choices import ENDS
 from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.reacted import Reacted
 from sva_bench.storage.tables import OUTCOMES
 
 
-def outcome_table(run: Executed, robots: Sequence[str], settings: Settings) -> pa.Table:
-    """One row per trial and robot, trial by trial."""
+def outcome_table(run: Executed | Reacted, robots: Sequence[str], settings: Settings) -> pa.Table:
+    """One row per trial or history and robot, trial by trial."""
     trials, count = run.incentive.shape
+    trial, history, weight = _numbers(run, settings)
     return pa.table({
         "scenario": constant(run.case.scenario.name, trials * count),
         "planner": constant(run.case.planner, trials * count),
         "policy": constant(run.case.policy, trials * count), "news": constant(run.case.news, trials * count),
-        "trial": np.repeat(settings.first + np.arange(trials), count), "rollout": np.repeat(run.rollout, count),
+        "trial": np.repeat(trial, count), "rollout": np.repeat(run.rollout, count),
+        "history": np.repeat(history, count), "weight": np.repeat(weight, count),
         "robot": _words(np.tile(np.arange(count, dtype=np.int32), trials), robots),
         "available": run.available.ravel(), "incentive": run.incentive.ravel(),
         "lost": run.lost.ravel(), "value": run.value.ravel(),
@@ -29,6 +33,14 @@ def outcome_table(run: Executed, robots: Sequence[str], settings: Settings) -> p
         "fuel_used_s": run.fuel_used_s.ravel(), "waited_s": run.waited_s.ravel(),
         "contacts": run.contacts.ravel(), "fidelity": constant(settings.fidelity, trials * count),
     }).cast(OUTCOMES)
+
+
+def _numbers(run: Executed | Reacted, settings: Settings) -> tuple[IntArray, IntArray, FloatArray]:
+    """Trial, history and weight of each row; trials that are sampled weigh 1 each."""
+    trials = len(run.incentive)
+    if isinstance(run, Executed):
+        return settings.first + np.arange(trials), np.full(trials, -1), np.ones(trials)
+    return run.trial, run.history, run.weight if run.enumerated else np.ones(trials)
 
 
 def constant(word: str, rows: int) -> pa.Array:

@@ -17,6 +17,7 @@ import pyarrow as pa
 from sva_bench import __version__
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.reacted import Reacted
 from sva_bench.files.atomic import draft_folder, remove_left_behind
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.records import Record, as_dict
@@ -70,6 +71,29 @@ def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
     return f"{scenario}{'+' if foreign else '-'}{planner}"
 
 
+def recording_stem(key: tuple[str, str, str, str], trial: int | None = None, *, foreign: bool) -> str:
+    """The unique name of a recording.
+
+    ``+`` ends the planner's name, as planners' own names have none. Given plans may have any name, which therefore
+    stands last, after what no name of a scenario has: ``@``.
+
+    Args:
+        key: Scenario, planner, policy and news.
+        trial: The trial that was replayed; ``None``: the one that the run recorded.
+        foreign: Whether the plan is from elsewhere.
+    """
+    scenario, planner, policy, news = key
+    which = "-".join([*([] if policy == "none" else [policy, news]), *([] if trial is None else [f"trial{trial}"])])
+    if not which:
+        return stem_of(scenario, planner, foreign=foreign)
+    return f"{scenario}@{which}+{planner}" if foreign else f"{scenario}-{planner}+{which}"
+
+
+def made_for(planner: str, news: str) -> str:
+    """What a plan that was made for a reaction is called in the names of files."""
+    return f"{planner}-{news}"
+
+
 def write_record(path: Path, record: Record) -> None:
     """Write a record as a JSON file that a person can read."""
     # A name that is no UTF-8 becomes an escape as JSON has it.
@@ -115,6 +139,7 @@ class Legs:
     planner: Sequence[str]
     policy: Sequence[str]
     news: Sequence[str]
+    trial: Sequence[int]
     rollout: Sequence[int]
     robot: Sequence[str]
     leg: Sequence[int]
@@ -125,14 +150,23 @@ class Legs:
     waited_s: FloatArray
 
 
-def legs_of(executed: Sequence[Executed]) -> Legs:
+    def without_reaction(self) -> Legs:
+        """Those of teams that keep their plans."""
+        kept = [k for k, policy in enumerate(self.policy) if policy == "none"]
+        columns: dict[str, Any] = {
+            name: column[kept] if isinstance(column, np.ndarray) else [column[k] for k in kept]
+            for name, column in vars(self).items()}
+        return Legs(**columns)
+
+
+def legs_of(executed: Sequence[Executed | Reacted]) -> Legs:
     """All legs driven in some runs."""
     rows = [(run.case, leg) for run in executed for leg in run.legs]
     return Legs(
         scenario=[case.scenario.name for case, _ in rows], planner=[case.planner for case, _ in rows],
         policy=[case.policy for case, _ in rows], news=[case.news for case, _ in rows],
-        rollout=[leg.rollout for _, leg in rows], robot=[leg.robot for _, leg in rows],
-        leg=[leg.leg for _, leg in rows], origin=[leg.origin for _, leg in rows],
+        trial=[leg.trial for _, leg in rows], rollout=[leg.rollout for _, leg in rows],
+        robot=[leg.robot for _, leg in rows], leg=[leg.leg for _, leg in rows], origin=[leg.origin for _, leg in rows],
         destination=[leg.destination for _, leg in rows],
         planned_s=np.array([leg.planned_s for _, leg in rows], dtype=np.float64),
         driven_s=np.array([leg.driven_s for _, leg in rows], dtype=np.float64),
@@ -144,6 +178,7 @@ def write_legs(path: Path, legs: Legs) -> None:
     write_table(path, LEGS, [pa.table(vars(legs), schema=LEGS)])
 
 
-def write_outcomes(path: Path, executed: Sequence[Executed], robots: Sequence[str], settings: Settings) -> None:
-    """Write ``outcomes.parquet``: a row per scenario, plan, trial and robot."""
+def write_outcomes(path: Path, executed: Sequence[Executed | Reacted], robots: Sequence[str], settings: Settings
+                   ) -> None:
+    """Write ``outcomes.parquet``: a row per scenario, plan, reaction, trial and robot."""
     write_table(path, OUTCOMES, (outcome_table(run, robots, settings) for run in executed))

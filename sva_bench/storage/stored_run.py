@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
+from sva_bench.analysis.reaction_table import REACTION_COLUMNS, reaction_rows
 from sva_bench.analysis.results import SUMMARY
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, summary_form
 from sva_bench.choices import ENDS, NEWS, POLICY_NAMES
 from sva_bench.errors import BadFile, BadInput
@@ -24,9 +26,9 @@ from sva_bench.files.printable import counted
 from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
-from sva_bench.storage.agreement import check_outcomes, check_routes
+from sva_bench.storage.agreement import Claim, Key, check_outcomes, check_routes
 from sva_bench.storage.manifest import MANIFEST, Manifest
-from sva_bench.storage.run_folder import MAP, Legs, stem_of
+from sva_bench.storage.run_folder import MAP, Legs, made_for, recording_stem, stem_of
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
 from sva_bench.storage.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
@@ -42,8 +44,10 @@ class Content:
 
     Attributes:
         summary: The summary.
-        routes: Route of each robot, by scenario and planner.
+        routes: Route of each robot, by scenario and planner; of a plan made for a reaction, by what ``made_for``
+            calls it.
         stems: Names of a plan's files, by scenario and planner.
+        reaction_stems: Names of the recordings of teams that react, by scenario, planner, policy and news.
         legs: The legs that were driven.
         world: The world, for its picture.
         manifest: What was run.
@@ -57,6 +61,7 @@ class Content:
     world: World
     manifest: Manifest
     lacking: tuple[str, ...] = ()
+    reaction_stems: Mapping[Key, str] = field(default_factory=dict)
 
 
 def run_folder_at(path: Path) -> Path:
@@ -123,7 +128,7 @@ def is_batch(folder: Path) -> bool:
 
 
 def write_csv(folder: Path) -> list[Path]:
-    """Write each table of a run folder, and the statistics of its plans, as CSV: the files written.
+    """Write each table of a run folder, and the statistics of its plans and reactions, as CSV: the files written.
 
     Raises:
         BadFile: If one can't be read.
@@ -136,13 +141,20 @@ def write_csv(folder: Path) -> list[Path]:
             write_table_as_csv(folder / f"{name}.parquet", draft, schema)
         written.append(path)
     _, summary = _summary_in(folder)
-    path = folder / "statistics.csv"
+    plans = [[scenario.name, name, *csv_cells(plan)]
+             for scenario in summary.scenarios for name, plan in scenario.plans.items()]
+    written.append(_write_rows(folder / "statistics.csv", ["scenario", "planner", *csv_columns()], plans))
+    if reactions := reaction_rows(summary):
+        written.append(_write_rows(folder / "reactions.csv", REACTION_COLUMNS, reactions))
+    return written
+
+
+def _write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Path:
     with draft_file(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["scenario", "planner", *csv_columns()])
-        table.writerows([scenario.name, name, *csv_cells(plan)]
-                        for scenario in summary.scenarios for name, plan in scenario.plans.items())
-    return [*written, path]
+        table.writerow(columns)
+        table.writerows(rows)
+    return path
 
 
 def _summary_in(folder: Path) -> tuple[Document, AnySummary]:
@@ -177,18 +189,61 @@ def _content(folder: Path) -> Content:
     for number, (told_of, scenario) in enumerate(zip(summary.scenarios, world.scenarios, strict=True)):
         if told_of.availability != dict(scenario.availability):
             raise document.error(("scenarios", number, "availability"), "not that of the world in manifest.json")
-    plans = {(s.name, name): plan.executed.mean for s in summary.scenarios for name, plan in s.plans.items()}
-    words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(first.plans),
+    claims = _claims(summary, world)
+    words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(key[1] for key in claims),
              "robot": frozenset(first.availability), "end": frozenset(ENDS), "policy": frozenset(POLICY_NAMES),
              "news": frozenset(NEWS), "fidelity": frozenset((summary.fidelity,))}
-    reached = check_outcomes(folder / "outcomes.parquet", plans, summary.trials, len(first.availability), words)
-    stems = {(scenario, name): stem_of(scenario, name, foreign=isinstance(summary, ComparisonSummary))
-             for scenario, name in plans}
-    routes, legs = _routes(folder, world, stems), _legs(folder / "legs.parquet", world, words)
-    check_routes({key: folder / "plans" / f"{stem}.json" for key, stem in stems.items()
-                  if isinstance(summary, ComparisonSummary) or key[1] != "informed"}, routes, legs, reached)
+    driven = check_outcomes(folder / "outcomes.parquet", claims,
+                            {robot.name: robot.loss_cost for robot in world.robots}, words)
+    foreign = isinstance(summary, ComparisonSummary)
+    stems = {(scenario, name): stem_of(scenario, name, foreign=foreign)
+             for scenario, name, policy, _ in claims if policy == "none"}
+    files = {key: (key[0], key[1] if key[:2] in stems else made_for(key[1], key[3])) for key in claims}
+    routes = _routes(folder, world, {plan: stem_of(*plan, foreign=foreign) for plan in [*stems, *files.values()]})
+    legs = _legs(folder / "legs.parquet", world, words)
+    paths = {key: folder / "plans" / f"{stem_of(*plan, foreign=foreign)}.json" for key, plan in files.items()
+             if foreign or key[1] != "informed"}
+    check_routes(paths, {key: routes[plan] for key, plan in files.items()}, legs, driven)
+    told: dict[Key, str] = {
+        (s.name, name, r.policy, r.news): recording_stem((s.name, name, r.policy, r.news), foreign=foreign)
+        for s in summary.scenarios for r in s.reactions or () for name, plan in r.plans.items() if plan.reacted > 0}
     return Content(summary=summary, routes=routes, stems=stems, manifest=manifest, world=world, legs=legs,
-                   lacking=_lacking(folder, [scenario.name for scenario in world.scenarios], stems.values()))
+                   reaction_stems=told, lacking=_lacking(
+                       folder, [scenario.name for scenario in world.scenarios], [*stems.values(), *told.values()]))
+
+
+def _claims(summary: AnySummary, world: World) -> dict[Key, Claim]:
+    """What a summary says of the rows of each plan, without reaction and with each."""
+    claims: dict[Key, Claim] = {}
+    scenarios: Sequence[ScenarioSummary | ComparedScenario] = summary.scenarios
+    for told, scenario in zip(scenarios, world.scenarios, strict=True):
+        for name, plan in told.plans.items():
+            claims[told.name, name, "none", "never"] = Claim(mean=plan.executed.mean, trials=summary.trials)
+        # The first history is that without failures, but for those that are certain.
+        safe = scenario.joint is None and all(told.availability.values())
+        for reaction in told.reactions or ():
+            all_of_them = reaction.histories == "enumerated"
+            for name, reacting in reaction.plans.items():
+                claims[told.name, name, reaction.policy, reaction.news] = Claim(
+                    mean=reacting.executed.mean, trials=None if all_of_them else summary.trials,
+                    begins_whole=all_of_them and safe)
+    return claims
+
+
+def find_row(path: Path, key: Key, trial: int) -> tuple[int, int] | None:
+    """Noise draw and history of one trial of outcomes; ``None`` where there is no such trial.
+
+    Raises:
+        BadFile: If they can't be read.
+    """
+    for piece in pieces_of(path, OUTCOMES):
+        mask = pc.equal(piece.column("trial"), trial)
+        for column, word in zip(("scenario", "planner", "policy", "news"), key, strict=True):
+            mask = pc.and_(mask, pc.equal(pc.cast(piece.column(column), pa.string()), word))
+        found = piece.filter(mask)
+        if found.num_rows:
+            return int(found.column("rollout")[0].as_py()), int(found.column("history")[0].as_py())
+    return None
 
 
 def _lacking(folder: Path, scenarios: Iterable[str], stems: Iterable[str]) -> tuple[str, ...]:

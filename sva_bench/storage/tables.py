@@ -38,21 +38,26 @@ def _schema(columns: Mapping[str, tuple[pa.DataType, str]]) -> pa.Schema:
 
 OUTCOMES = _schema({
     "scenario": (_WORD, ""), "planner": (_WORD, ""), "policy": (_WORD, ""), "news": (_WORD, ""),
-    "trial": (_COUNT, "1"), "rollout": (_COUNT, "1"), "robot": (_WORD, ""), "available": (pa.bool_(), ""),
+    "trial": (_COUNT, "1"), "rollout": (_COUNT, "1"), "history": (_COUNT, "1"), "weight": (_FIGURE, "1"),
+    "robot": (_WORD, ""), "available": (pa.bool_(), ""),
     "incentive": (_FIGURE, "incentive of the world file"), "lost": (pa.bool_(), ""),
     "value": (_FIGURE, "incentive of the world file"), "pois_reached": (_COUNT, "1"), "stops_reached": (_COUNT, "1"),
     "end": (_WORD, ""), "end_time_s": (_FIGURE, "s"), "fuel_used_s": (_FIGURE, "s of driving"),
     "waited_s": (_FIGURE, "s"), "contacts": (_COUNT, "1"), "fidelity": (_WORD, "")})
-"""A row per scenario, plan, trial and robot: of runs and, with what they belong to, of batches."""
+"""A row per scenario, plan, reaction, trial and robot: of runs and, with what they belong to, of batches.
+
+Where histories of failures are enumerated, each under each noise draw is a trial, ``history`` is its number there and
+``weight`` its probability, which add up to 1. Where they are sampled, these are -1 and 1. So means are weighted.
+"""
 
 SHARDS = pa.schema([*OUTCOMES, pa.field("world", _WORD), pa.field("seed", _COUNT), pa.field("variant", _WORD)])
 
 LEGS = _schema({
     "scenario": (_WORD, ""), "planner": (_WORD, ""), "policy": (_WORD, ""), "news": (_WORD, ""),
-    "rollout": (_COUNT, "1"), "robot": (_WORD, ""), "leg": (_COUNT, "1"), "origin": (_WORD, ""),
-    "destination": (_WORD, ""), "planned_s": (_FIGURE, "s"), "driven_s": (_FIGURE, "s"),
+    "trial": (_COUNT, "1"), "rollout": (_COUNT, "1"), "robot": (_WORD, ""), "leg": (_COUNT, "1"),
+    "origin": (_WORD, ""), "destination": (_WORD, ""), "planned_s": (_FIGURE, "s"), "driven_s": (_FIGURE, "s"),
     "waited_s": (_FIGURE, "s")})
-"""A row per leg driven."""
+"""A row per leg driven, with the first trial that it belongs to."""
 
 TRAVEL_TIMES = _schema({
     "origin": (_WORD, ""), "destination": (_WORD, ""), "model": (_WORD, ""), "raw_s": (_FIGURE, "s"),

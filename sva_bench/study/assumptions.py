@@ -49,7 +49,8 @@ def cross_table(
     The loss of a plan is what the plan for the failures executed collects beyond it, trial by trial.
     """
     rows: dict[str, list[AssumptionRow]] = {scenario.name: [] for scenario in world.scenarios}
-    for process in PROCESSES:
+    known = plans[world.scenarios[0].name].stochastic
+    for process in (name for name in PROCESSES if name in known):
         cases = [made.case(scenario) for scenario in world.scenarios for made in _all_of(plans[scenario.name])]
         executed = iter(execute(replace(world, execute_failure=process), costs, cases, settings, executor, None,
                                 drives))
@@ -78,5 +79,6 @@ def _row(process: FailureProcess, plans: PlansByProcess, made: _MadeFor, run: Ex
 
 def _all_of(plans: PlansByProcess) -> list[_MadeFor]:
     """All plans of a scenario."""
-    return [*(_MadeFor(process=process, plan=plan) for process, plan in plans.stochastic.items()),
+    made = plans.stochastic
+    return [*(_MadeFor(process=process, plan=made[process]) for process in PROCESSES if process in made),
             _MadeFor(process=None, plan=plans.deterministic)]

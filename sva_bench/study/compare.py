@@ -9,8 +9,11 @@ from pathlib import Path
 
 from sva_bench.analysis.comparison import comparison_summary
 from sva_bench.analysis.over_trials import Judged
+from sva_bench.analysis.reactions import compared_reaction
 from sva_bench.analysis.summaries import ComparisonSummary
+from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import Case, Executed, execute
+from sva_bench.execution.react import Reacted
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
@@ -18,6 +21,7 @@ from sva_bench.study.costs import instance_of, reach_of
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import unlimited
 from sva_bench.study.publish import Run, Stopwatch, publish
+from sva_bench.study.recourse import Stage, react_in_scenarios
 from sva_bench.study.run import refuse_too_many_rows
 from sva_bench.study.summing import by_case, head_of
 from sva_bench.travel.fuel import FuelCosts
@@ -33,6 +37,7 @@ class Compared:
     executed: list[Executed]
     summary: ComparisonSummary
     clock: Stopwatch
+    reacted: tuple[Reacted, ...] = ()
 
 
 def execute_plans(
@@ -62,9 +67,10 @@ def measure_plans(
     settings = settings_of(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
              for name, plan in plans.items()]
+    drives = Drives()
     with clock.phase("execution"):
         executed = execute(world, costs, cases, settings, executor,
-                           lambda done, of: progress("driving routes", done, of))
+                           lambda done, of: progress("driving routes", done, of), drives)
     runs, instances = by_case(executed), {s.name: instance_of(world, costs, s) for s in world.scenarios}
     robots = [robot.name for robot in world.robots]
     summary = ComparisonSummary(
@@ -72,7 +78,15 @@ def measure_plans(
         scenarios=tuple(comparison_summary(
             [_judged(world, instances[s.name], plan, runs[s.name, name]) for name, plan in plans.items()], robots,
             noisy=not world.noise.silent) for s in world.scenarios))
-    return Compared(instances=instances, executed=executed, summary=summary, clock=clock)
+    with clock.phase("reactions"):
+        reactions = react_in_scenarios(Stage(
+            world=world, costs=costs, instances=instances, executed=executed, settings=settings, executor=executor,
+            drives=drives), options, compared_reaction, progress)
+    if reactions:
+        summary = replace(summary, scenarios=tuple(
+            replace(scenario, reactions=reactions[scenario.name].results) for scenario in summary.scenarios))
+    return Compared(instances=instances, executed=executed, summary=summary, clock=clock,
+                    reacted=tuple(run for found in reactions.values() for run in found.reacted))
 
 
 def publish_plans(
@@ -82,7 +96,8 @@ def publish_plans(
     """Write the run folder of plans that were compared; ``command``: as for ``publish``."""
     return publish(world, options, costs, done.instances, done.executed, done.summary, out, done.clock, progress,
                    identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
-                                       for name, plan in plans.items()}}, command=command)
+                                       for name, plan in plans.items()}}, command=command,
+                   reacted=done.reacted)
 
 
 def _judged(world: World, instance: Instance, plan: Plan, run: Executed) -> Judged:

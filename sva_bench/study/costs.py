@@ -5,23 +5,21 @@ Apart from ``planning``, since a check of a world needs neither solvers nor phys
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from sva_bench.analysis.reach import reached
 from sva_bench.analysis.summaries import Reach
-from sva_bench.choices import PathPlanner
+from sva_bench.choices import FailureProcess, PathPlanner
+from sva_bench.mission.failures import Reliability, fails_by_driving, mtbf_s
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.study.given_plans import instance_name
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.travel.times import TravelTimes, plan_travel_times
 from sva_bench.workers.progress import OnProgress
-from sva_bench.world.model import Scenario, World
-
-NOMINAL = "nominal"
-"""The scenario of the availabilities under ``robots:``."""
+from sva_bench.world.model import NOMINAL, Scenario, World, nominal_of
 
 
 def plan_times(world: World, planner: PathPlanner, progress: OnProgress) -> dict[str, TravelTimes]:
@@ -40,8 +38,17 @@ def plan_costs(world: World, planner: PathPlanner, progress: OnProgress) -> dict
     return {name: fuel_costs(times, world.margin) for name, times in plan_times(world, planner, progress).items()}
 
 
-def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario) -> Instance:
-    """The optimisation instance of one scenario of a world."""
+def instance_of(
+    world: World, costs: Mapping[str, FuelCosts], scenario: Scenario, processes: Iterable[FailureProcess] = ()
+) -> Instance:
+    """The optimisation instance of one scenario of a world.
+
+    Args:
+        world, costs: The world, and its fuel costs.
+        scenario: The scenario.
+        processes: Failure processes beside the world's that values are computed under.
+    """
+    wanted = (world.plan_failure, world.execute_failure, *processes)
     sites = tuple(site.name for site in world.sites)
     return Instance(
         name=instance_name(world, None if scenario.name == NOMINAL else scenario.name), sites=sites, base=0,
@@ -49,14 +56,26 @@ def instance_of(world: World, costs: Mapping[str, FuelCosts], scenario: Scenario
         stop_s=np.array([site.stop_s for site in world.sites]), failure=world.plan_failure, joint=scenario.joint,
         vehicles=tuple(Vehicle(
             name=robot.name, fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s,
-            availability=scenario.availability[robot.name], fuel_s=costs[robot.model.name].cost_s,
+            availability=scenario.availability[robot.name], loss_cost=robot.loss_cost,
+            mtbf_s=_planning_mtbf_s(world, scenario.reliability(robot), wanted), fuel_s=costs[robot.model.name].cost_s,
             incentives=np.array([robot.incentives.get(site, 0.0) for site in sites])) for robot in world.robots),
     )
 
 
+def _planning_mtbf_s(world: World, reliability: Reliability, processes: Sequence[FailureProcess]) -> float | None:
+    """Mean time to failure in seconds of the planning costs; ``None`` where no process needs it and it isn't given.
+
+    Robots fail by the time that they drive, which is predicted without the margin that planning costs hold. Costs and
+    mean both times (1 + margin) give the same probabilities to survive.
+    """
+    if reliability.mtbf_s is None and not any(fails_by_driving(name, reliability) for name in processes):
+        return None
+    return mtbf_s(reliability) * (1 + world.margin)
+
+
 def nominal_scenario(world: World) -> Scenario:
     """The scenario of the availabilities under ``robots:``."""
-    return Scenario(name=NOMINAL, availability={robot.name: robot.availability for robot in world.robots})
+    return nominal_of(world.robots)
 
 
 def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list[str]]:

@@ -47,7 +47,8 @@ def combined_trials(parts: Mapping[frozenset[str], Executed]) -> Executed:
         lost=pick("lost").astype(np.bool_), contacts=pick("contacts").astype(np.int64),
         pois_reached=pick("pois_reached").astype(np.int64), stops_reached=pick("stops_reached").astype(np.int64),
         end=ends, end_time_s=pick("end_time_s"),
-        fuel_used_s=pick("fuel_used_s"), planned_incentive=planned, drawn_incentive=pick("drawn_incentive"),
+        fuel_used_s=pick("fuel_used_s"), planned_incentive=planned, drawn_value=pick("drawn_value"),
+        drawn_failed=pick("drawn_failed").astype(np.bool_), terms=first_run.terms, value=pick("value"),
         margins=tuple({(margin.robot, margin.route): margin for part in runs for margin in part.margins}.values()),
         legs=tuple(dict.fromkeys(leg for k in sorted(set(chosen.tolist())) for leg in runs[k].legs)),
         traces=first.traces)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sva_bench.analysis.precision import Precision
-from sva_bench.choices import Fidelity, PathPlanner
+from sva_bench.choices import Fidelity, News, PathPlanner, PolicyName
 from sva_bench.execution.execute import Settings
 from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.study.reacting import Reaction, pairs_of
 from sva_bench.world.model import World
 
 
@@ -27,6 +28,9 @@ class Options:
         evpi: Compute the value of perfect information for any number of outcomes.
         informed: Execute the perfect-information plans too.
         assumptions: Execute the plans for each failure process under each.
+        policies: What the team does about failures, each measured; empty = what the world says.
+        news: When it learns of one, each measured with each policy; empty = what the world says.
+        anticipate: Make a plan for each reaction too.
         precision: Stopping rule, by which trials and noise draws grow; ``None`` = fixed numbers.
     """
 
@@ -39,12 +43,17 @@ class Options:
     evpi: bool = False
     informed: bool = False
     assumptions: bool = False
+    policies: tuple[PolicyName, ...] = ()
+    news: tuple[News, ...] = ()
+    anticipate: bool = False
     precision: Precision | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything that changes results."""
-        asked = {} if self.precision is None else {"precision_pct": self.precision.pct,
-                                                   "max_trials": self.precision.max_trials}
+        """Everything that changes results; what isn't asked for is left out, so that names of runs stay theirs."""
+        asked: dict[str, Any] = {} if self.precision is None else {
+            "precision_pct": self.precision.pct, "max_trials": self.precision.max_trials}
+        asked |= {key: list(words) for key, words in (("policies", self.policies), ("news", self.news)) if words}
+        asked |= {"anticipate": True} if self.anticipate else {}
         return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
                 "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
                 "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
@@ -58,7 +67,14 @@ class Options:
         return cls(
             seed=seed, trials=told["trials"], rollouts=told["rollouts"], fidelity=told["fidelity"],
             planner=told["planner"], limits=SolveLimits(time_limit_s=told["time_limit_s"], gap=told["gap"]),
-            evpi=told["evpi"], informed=told["informed"], assumptions=told["assumptions"], precision=precision)
+            evpi=told["evpi"], informed=told["informed"], assumptions=told["assumptions"], precision=precision,
+            policies=tuple(told.get("policies", ())), news=tuple(told.get("news", ())),
+            anticipate=told.get("anticipate", False))
+
+
+def reactions_of(world: World, options: Options) -> tuple[Reaction, ...]:
+    """Policy and news of each reaction to be measured beside none; empty if there is none."""
+    return pairs_of(world, options.policies, options.news)
 
 
 def settings_of(world: World, options: Options) -> Settings:

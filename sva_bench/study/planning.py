@@ -13,7 +13,7 @@ from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.mission.certify import certify, expected_value
-from sva_bench.mission.failures import MODEL, PROCESSES
+from sva_bench.mission.failures import MODEL, PROCESSES, undefined_under, without_joint
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.solver.outcomes import possible
@@ -129,7 +129,8 @@ def plan_scenarios(
     planned: dict[str, Planned] = {}
     for number, scenario in enumerate(world.scenarios):
         progress("solving", number, len(world.scenarios))
-        instance = replace(instance_of(world, costs, scenario), failure=MODEL)
+        others = _other_processes(world, options)
+        instance = replace(instance_of(world, costs, scenario, others), failure=MODEL)
         if known is None or nominal is None:
             known = knowledge_of(instance)
             nominal = unless_interrupted(plan_nominal(instance, options.limits, known=known))
@@ -139,7 +140,6 @@ def plan_scenarios(
         rp = expected_value(instance, pair.stochastic)
         foresight = wait_and_see(instance, options.limits, known, force=options.evpi)
         process = by_process = None
-        others = _other_processes(world, options)
         if others:
             best = {name: unless_interrupted(plan_stochastic(
                 replace(instance, failure=name), options.limits, pair.stochastic, known)) for name in others}
@@ -149,7 +149,7 @@ def plan_scenarios(
             process = max(expected_value(truth, best[others[0]]) - expected_value(truth, pair.stochastic), 0.0)
             pair = replace(pair, stochastic=by_process.stochastic[world.plan_failure])
         planned[scenario.name] = Planned(
-            instance=instance, stochastic=pair.stochastic, deterministic=pair.plan,
+            instance=replace(instance, failure=world.plan_failure), stochastic=pair.stochastic, deterministic=pair.plan,
             vss_range=(rp - pair.most, rp - pair.least), worst=pair.worst,
             ws=None if foresight is None else max(foresight, rp),
             evpi=None if foresight is None else max(foresight - rp, 0.0), value_of_process=process,
@@ -162,7 +162,20 @@ def plan_scenarios(
 def _other_processes(world: World, options: Options) -> list[FailureProcess]:
     """Failure processes beside the model's that plans are made for, the one that is executed first."""
     asked = [world.execute_failure, world.plan_failure, *(PROCESSES if options.assumptions else ())]
-    return [name for name in dict.fromkeys(asked) if name != MODEL]
+    others = [name for name in dict.fromkeys(asked) if name != MODEL]
+    apart = [name for name in others if not _defined(world, name)]
+    if apart:
+        _log.warning("%s: no assumption of %s failures, under which its availabilities have no meaning (they have a "
+                     "joint distribution, or robots have no mission limit)", world.name, " and ".join(apart))
+    return [name for name in others if name not in apart]
+
+
+def _defined(world: World, process: FailureProcess) -> bool:
+    """Whether a world says all that a process has to know."""
+    joint = any(scenario.joint is not None for scenario in world.scenarios)
+    return not (joint and without_joint([process])) and not any(
+        undefined_under([process], scenario.reliability(robot))
+        for scenario in world.scenarios for robot in world.robots)
 
 
 def two_cases(scenario: Scenario, planned: Planned) -> list[Case]:

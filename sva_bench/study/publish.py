@@ -12,16 +12,22 @@ from pathlib import Path
 from typing import Any
 
 from sva_bench.analysis.summaries import AnySummary
+from sva_bench.execution.case import Case
 from sva_bench.execution.execute import Executed
+from sva_bench.execution.reacted import Reacted
+from sva_bench.execution.team_trace import TeamTrace
 from sva_bench.files.atomic import draft_file
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.instance_file import write_instance
 from sva_bench.mission.plan_file import write_plan
 from sva_bench.recording.rerun import record
 from sva_bench.report.run_page import write_report
+from sva_bench.storage.agreement import Key
 from sva_bench.storage.manifest import manifest_of
 from sva_bench.storage.run_folder import (
     legs_of,
+    made_for,
+    recording_stem,
     run_folder,
     run_name,
     stem_of,
@@ -52,8 +58,8 @@ class Run:
 
 def publish(
     world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
-    executed: list[Executed], summary: AnySummary, out: Path, clock: Stopwatch, progress: OnProgress,
-    identity: Mapping[str, Any] | None = None, command: Sequence[str] | None = None,
+    executed: Sequence[Executed], summary: AnySummary, out: Path, clock: Stopwatch, progress: OnProgress,
+    identity: Mapping[str, Any] | None = None, command: Sequence[str] | None = None, reacted: Sequence[Reacted] = (),
 ) -> Run:
     """Write the run folder.
 
@@ -63,11 +69,15 @@ def publish(
         clock, progress: How long it took so far; told how far the recording is.
         identity: What results of plans from elsewhere depend on beside the rest.
         command: What was called; ``None`` = the command line of this process.
+        reacted: What came of the plans with each reaction.
     """
+    foreign = identity is not None
     resolved = world_as_dict(world)
     name = run_name(world.name, options.seed,
                     {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
-    stems = {key: stem_of(*key, foreign=identity is not None) for key in by_case(executed)}
+    stems = {key: stem_of(*key, foreign=foreign) for key in by_case(executed)}
+    routes = {key: run.case.plan.routes for key, run in by_case(executed).items()}
+    told: dict[Key, str] = {}
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
@@ -83,18 +93,33 @@ def publish(
                 write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
                 record(folder / "recordings" / f"{stem}.rrd", world, done.traces,
                        title=f"{world.name}, {scenario}, {planner}")
-                progress("recording", number + 1, len(executed))
-        legs = legs_of(executed)
+                progress("recording", number + 1, len(executed) + len(reacted))
+            for number, team in enumerate(reacted):
+                case = team.case
+                if case.role == "anticipative":
+                    plan = case.scenario.name, made_for(case.planner, case.news)
+                    routes[plan] = case.plan.routes
+                    write_plan(folder / "plans" / f"{stem_of(*plan, foreign=foreign)}.json", case.plan)
+                if team.shown is not None:
+                    told[case.key] = stem = recording_stem(case.key, foreign=foreign)
+                    record_team(folder / "recordings" / f"{stem}.rrd", world, case, team.shown)
+                progress("recording", len(executed) + number + 1, len(executed) + len(reacted))
+        legs = legs_of([*executed, *reacted])
         write_legs(folder / "legs.parquet", legs)
-        write_outcomes(folder / "outcomes.parquet", executed, [r.name for r in world.robots],
+        write_outcomes(folder / "outcomes.parquet", [*executed, *reacted], [r.name for r in world.robots],
                        settings_of(world, options))
         write_record(folder / "summary.json", summary)
         manifest = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds, command)
         write_record(folder / "manifest.json", manifest)
         write_report(folder / "report.html", Content(
-            summary=summary, routes={k: v.case.plan.routes for k, v in by_case(executed).items()}, stems=stems,
-            legs=legs, world=world, manifest=manifest))
+            summary=summary, routes=routes, stems=stems, reaction_stems=told, legs=legs, world=world,
+            manifest=manifest))
     return Run(folder=out / name, summary=summary)
+
+
+def record_team(path: Path, world: World, case: Case, team: TeamTrace) -> None:
+    """Write the recording of a mission in which a team reacts."""
+    record(path, world, team.traces, news=team.news, title=f"{world.name}, {case.title}, trial {team.trial}")
 
 
 def report_again(folder: Path) -> Path:

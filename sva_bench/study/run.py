@@ -7,11 +7,13 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from sva_bench.analysis.reactions import reaction_result
 from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.react import Reacted
 from sva_bench.files.printable import counted
 from sva_bench.study.assumptions import cross_table
 from sva_bench.study.costs import plan_costs, reach_of
@@ -19,6 +21,7 @@ from sva_bench.study.informed import cases_of, combined_trials
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, plan_scenarios, two_cases
 from sva_bench.study.publish import Run, Stopwatch, publish
+from sva_bench.study.recourse import Stage, react_in_scenarios
 from sva_bench.study.summing import head_of, proved, summarise
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -37,6 +40,7 @@ class Measured:
     executed: list[Executed]
     summary: Summary
     clock: Stopwatch
+    reacted: tuple[Reacted, ...] = ()
 
 
 def run(world: World, options: Options, out: Path, executor: Executor | None, progress: OnProgress) -> Run:
@@ -55,7 +59,7 @@ def publish_run(
 ) -> Run:
     """Write the run folder of what was measured; ``command``: as for ``publish``."""
     return publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
-                   done.summary, out, done.clock, progress, command=command)
+                   done.summary, out, done.clock, progress, command=command, reacted=done.reacted)
 
 
 def measure(world: World, options: Options, executor: Executor | None, progress: OnProgress) -> Measured:
@@ -91,7 +95,16 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
             rows = cross_table(world, costs, plans, settings, executor, drives)
         summary = replace(summary, scenarios=tuple(
             replace(scenario, assumptions=tuple(rows[scenario.name])) for scenario in summary.scenarios))
+    with clock.phase("reactions"):
+        reactions = react_in_scenarios(Stage(
+            world=world, costs=costs, instances={name: p.instance for name, p in planned.items()}, settings=settings,
+            executed=[run for run in executed if run.case.role in ("stochastic", "deterministic")], executor=executor,
+            drives=drives), options, reaction_result, progress)
+    if reactions:
+        summary = replace(summary, scenarios=tuple(
+            replace(scenario, reactions=reactions[scenario.name].results) for scenario in summary.scenarios))
     return Measured(costs=costs, planned=planned, clock=clock, summary=summary,
+                    reacted=tuple(run for found in reactions.values() for run in found.reacted),
                     executed=[run for run in executed if run.case.role != "worst_tie"])
 
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sva_bench.choices import SiteKind
+from sva_bench.choices import USUAL_NEWS, FailureProcess, SiteKind
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.documents import Document, read_yaml, validate
 from sva_bench.geometry.buckets import longest_view_heading, sight_checker
 from sva_bench.geometry.cells import MAX_BOXES, TooManyBoxes, bounds_of, boxes_of
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.mission.failures import JointState, marginals, without_joint
+from sva_bench.mission.failures import JointState, availability_by, marginals, undefined_under, without_joint
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World
+from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World, WorldReaction, nominal_of
 from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
 from sva_bench.world.schema import (
     KIND,
@@ -29,6 +30,7 @@ from sva_bench.world.schema import (
     Joint,
     Map,
     RandomPois,
+    ReactionEntry,
     RobotEntry,
     Shapes,
     SiteEntry,
@@ -71,14 +73,16 @@ def world_of(
     sites = _sites(document, file, obstacles, widest)
     plan, execute = (
         (file.failure, file.failure) if isinstance(file.failure, str) else (file.failure.plan, file.failure.execute))
-    scenarios = _scenarios(document, file)
+    scenarios = _scenarios(document, file, robots)
     if (other := without_joint([plan, execute])) and (correlated := [s.name for s in scenarios if s.joint is not None]):
         raise document.error(("scenarios", correlated[0], "joint"), f"under {other} robots fail independently; give "
                              "their availabilities, or choose another failure process")
+    _refuse_unknown_failures(document, file, robots, scenarios, (plan, execute))
     return World(
         name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=scenarios,
         plan_failure=plan, execute_failure=execute, margin=file.margin,
         noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd), map_source=source,
+        reaction=_reaction(document, file.reaction, stations=any(site.kind == "station" for site in sites)),
     )
 
 
@@ -207,10 +211,11 @@ def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) ->
         for poi in incentives:
             if poi not in pois:
                 raise document.error((*loc, "incentives", poi), f"there is no POI {poi!r}; {nearest(poi, pois)}")
+    limit_s = math.inf if entry.mission_limit_s is None else entry.mission_limit_s
     return Robot(
-        name=name, model=model, availability=entry.availability, incentives=incentives,
-        fuel_capacity_s=math.inf if entry.fuel_capacity_s is None else entry.fuel_capacity_s,
-        mission_limit_s=math.inf if entry.mission_limit_s is None else entry.mission_limit_s,
+        name=name, model=model, incentives=incentives, mtbf_s=entry.mtbf_s, loss_cost=entry.loss_cost,
+        fuel_capacity_s=math.inf if entry.fuel_capacity_s is None else entry.fuel_capacity_s, mission_limit_s=limit_s,
+        availability=availability_by(entry.mtbf_s, limit_s) if entry.availability is None else entry.availability,
     )
 
 
@@ -227,10 +232,10 @@ def draw_incentives(drawn: Drawn, pois: list[str]) -> dict[str, float]:
     return {poi: float(value) for poi, value in zip(pois, values, strict=True)}
 
 
-def _scenarios(document: Document, file: WorldFile) -> tuple[Scenario, ...]:
-    robots = {name: entry.availability for name, entry in file.robots.items()}
+def _scenarios(document: Document, file: WorldFile, own: Sequence[Robot]) -> tuple[Scenario, ...]:
+    robots = {robot.name: robot.availability for robot in own}
     if file.scenarios is None:
-        return (Scenario(name="nominal", availability=robots),)
+        return (nominal_of(own),)
     scenarios = []
     for name, entry in file.scenarios.items():
         loc: tuple[str | int, ...] = ("scenarios", name)
@@ -247,8 +252,34 @@ def _scenarios(document: Document, file: WorldFile) -> tuple[Scenario, ...]:
         else:
             for robot in entry:
                 _known(document, (*loc, robot), robot, robots)
-            scenarios.append(Scenario(name=name, availability=robots | entry))
+            scenarios.append(Scenario(name=name, availability=robots | entry, mtbf_s={
+                robot: mtbf for robot, mtbf in nominal_of(own).mtbf_s.items() if robot not in entry}))
     return tuple(scenarios)
+
+
+def _refuse_unknown_failures(document: Document, file: WorldFile, robots: Sequence[Robot],
+                             scenarios: Sequence[Scenario], processes: Sequence[FailureProcess]) -> None:
+    """Refuse robots of which a process doesn't know how they fail, at the key that says their availability."""
+    for scenario in (nominal_of(robots), *scenarios):
+        for robot in robots:
+            if problem := undefined_under(processes, scenario.reliability(robot)):
+                named = (file.scenarios or {}).get(scenario.name)
+                loc: tuple[str | int, ...] = ("robots", robot.name, "availability")
+                if isinstance(named, dict) and robot.name in named:
+                    loc = ("scenarios", scenario.name, robot.name)
+                raise document.error(loc, f"{problem} of the robot")
+
+
+def _reaction(document: Document, entry: ReactionEntry, *, stations: bool) -> WorldReaction:
+    if entry.policy == "none":
+        if entry.news not in (None, "never"):
+            raise document.error(("reaction", "news"), "the policy is 'none', as it is by default, and has no use for "
+                                 "news; leave it out, or choose 'policy: resolve'")
+        return WorldReaction()
+    if entry.news == "station" and not stations:
+        raise document.error(("reaction", "news"), "there is no station to hear it at; place one under sites.stations, "
+                             "or choose 'report' or 'instant'")
+    return WorldReaction(policy=entry.policy, news=entry.news or USUAL_NEWS)
 
 
 def _known(document: Document, loc: tuple[str | int, ...], robot: str, robots: Mapping[str, float]) -> None:
@@ -283,6 +314,7 @@ def world_as_dict(world: World) -> dict[str, Any]:
     shapes: list[dict[str, Any]] = [
         {"box": [b[0], b[1]], "size_m": [2 * b[2], 2 * b[3]], "yaw_deg": _degrees(b[4])} for b in o.boxes.tolist()]
     shapes += [{"cylinder": [c[0], c[1]], "radius_m": c[2]} for c in o.cylinders.tolist()]
+    reacts = world.reaction.policy != "none"
     return {
         "format": KIND, "name": world.name,
         "map": map_section(),
@@ -292,10 +324,15 @@ def world_as_dict(world: World) -> dict[str, Any]:
             "model": r.model.name if BUILT_IN.get(r.model.name) == r.model else
             {k: v for k, v in r.model.figures().items() if k != "name"},
             "fuel_capacity_s": limit(r.fuel_capacity_s), "mission_limit_s": limit(r.mission_limit_s),
-            "availability": r.availability, "incentives": dict(r.incentives)} for r in world.robots},
-        "scenarios": {s.name: dict(s.availability) if s.joint is None else {"joint": [
+            "availability": r.availability, **({} if r.mtbf_s is None else {"mtbf_s": r.mtbf_s}),
+            **({"loss_cost": r.loss_cost} if r.loss_cost else {}), "incentives": dict(r.incentives)}
+            for r in world.robots},
+        # An availability replaces a robot's mtbf_s, so those it holds for have none here.
+        "scenarios": {s.name: {r: p for r, p in s.availability.items() if r not in s.mtbf_s} if s.joint is None else {
+            "joint": [
             {"probability": j.probability, "available": sorted(j.available)} for j in s.joint]}
             for s in world.scenarios},
         "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
+        **({"reaction": asdict(world.reaction)} if reacts else {}),  # else absent: names of runs depend on it
         "margin": world.margin, "noise": {"wheel_gain_sd": world.noise.wheel_gain_sd},
     }

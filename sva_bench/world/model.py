@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
-from sva_bench.choices import FailureProcess, SiteKind
+from sva_bench.choices import FailureProcess, News, PolicyName, SiteKind
 from sva_bench.errors import UnknownName, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.mission.failures import JointState
+from sva_bench.mission.failures import JointState, Reliability
 from sva_bench.robot.model import RobotModel
 from sva_bench.world.maps.files import MapFile
 
@@ -46,6 +46,8 @@ class Robot:
         mission_limit_s: Longest mission [s]; ``inf`` = no limit.
         availability: Default of its availability in scenarios.
         incentives: Incentive of its visit to each POI, by name.
+        mtbf_s: Default of its mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and limit.
+        loss_cost: Cost if it leaves the base and doesn't come home [incentive].
     """
 
     name: str
@@ -54,6 +56,8 @@ class Robot:
     mission_limit_s: float
     availability: float
     incentives: Mapping[str, float]
+    mtbf_s: float | None = None
+    loss_cost: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,11 +68,28 @@ class Scenario:
         name: Its name.
         availability: Availability by robot; the marginals of ``joint`` where there is one.
         joint: Joint distribution of the availabilities; ``None`` = independent.
+        mtbf_s: Mean driving time to failure under ``hazard`` [s], by robot, of those whose availability doesn't say it.
     """
 
     name: str
     availability: Mapping[str, float]
     joint: tuple[JointState, ...] | None = None
+    mtbf_s: Mapping[str, float] = field(default_factory=dict)
+
+    def reliability(self, robot: Robot) -> Reliability:
+        """What a failure process has to know of a robot."""
+        return Reliability(availability=self.availability[robot.name], mission_limit_s=robot.mission_limit_s,
+                           mtbf_s=self.mtbf_s.get(robot.name), loss_cost=robot.loss_cost)
+
+
+NOMINAL = "nominal"
+"""The scenario of the availabilities under ``robots:``."""
+
+
+def nominal_of(robots: Sequence[Robot]) -> Scenario:
+    """The scenario of the robots' own availabilities and lifetimes."""
+    return Scenario(name=NOMINAL, availability={robot.name: robot.availability for robot in robots},
+                    mtbf_s={robot.name: robot.mtbf_s for robot in robots if robot.mtbf_s is not None})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +106,19 @@ class Noise:
     def silent(self) -> bool:
         """Whether all rollouts are equal."""
         return self.wheel_gain_sd == 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldReaction:
+    """What a team does about failures.
+
+    Attributes:
+        policy: What it does about news of one.
+        news: When it learns of one; ``never`` under the policy ``none``, which has no use for it.
+    """
+
+    policy: PolicyName = "none"
+    news: News = "never"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -119,6 +153,7 @@ class World:
         margin: Planning costs are the kinematic twin's times x (1 + margin).
         noise: Noise of the execution.
         map_source: Origin of the occupancy grid; ``None`` if the obstacles are shapes.
+        reaction: What the team does about failures, unless a run asks for something else.
     """
 
     name: str
@@ -131,6 +166,7 @@ class World:
     margin: float
     noise: Noise
     map_source: MapSource | None = None
+    reaction: WorldReaction = WorldReaction()
 
     def __repr__(self) -> str:
         counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
-from sva_bench.choices import FailureProcess
-from sva_bench.files.fields import Bounded, Name, NonNegativeInt, Number, Positive, Probability, Section
+from sva_bench.choices import FailureProcess, News, PolicyName
+from sva_bench.files.fields import Bounded, MeanTime, Name, NonNegativeInt, Number, Positive, Probability, Section
 from sva_bench.seeds import MOST_SEED
 from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
@@ -172,7 +172,9 @@ class RobotEntry(Section):
     model: Name | Figures
     fuel_capacity_s: Bounded | None = None
     mission_limit_s: Bounded | None = None
-    availability: Probability = 1.0
+    availability: Probability | None = None
+    mtbf_s: MeanTime | None = None
+    loss_cost: Bounded = 0.0
     incentives: dict[Name, Bounded] | Drawn
 
 
@@ -190,6 +192,11 @@ class FailureEntry(Section):
     execute: FailureProcess
 
 
+class ReactionEntry(Section):
+    policy: PolicyName = "none"
+    news: News | None = None
+
+
 class NoiseEntry(Section):
     wheel_gain_sd: Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)] = 0.0
 
@@ -204,6 +211,7 @@ class WorldFile(Section):
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
     scenarios: Annotated[dict[Name, dict[Name, Probability] | Joint], Field(min_length=1)] | None = None
     failure: FailureProcess | FailureEntry = "mission"
+    reaction: Annotated[ReactionEntry, _EMPTY_IS_NONE] = Field(default_factory=ReactionEntry)
     interaction: Literal["independent"] = "independent"
     margin: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] = 0.01
     noise: Annotated[NoiseEntry, _EMPTY_IS_NONE] = Field(default_factory=NoiseEntry)

@@ -10,9 +10,9 @@ from typing import Any
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.documents import Document, Loc
-from sva_bench.mission.failures import without_joint
+from sva_bench.mission.failures import undefined_under, without_joint
 from sva_bench.world.load import world_of
-from sva_bench.world.model import World
+from sva_bench.world.model import World, nominal_of
 
 Blame = Callable[[str, str], SvaBenchError]
 """Makes the error for a key and the problem with its value."""
@@ -103,6 +103,10 @@ def adapted(
     if correlated and (other := without_joint([world.plan_failure, world.execute_failure])):
         raise BadInput(f"scenario {correlated[0]}: under {other} robots fail independently, and this scenario has a "
                        "joint distribution; choose other scenarios, or another failure process")
+    for scenario in (nominal_of(world.robots), *world.scenarios):
+        for robot in world.robots:
+            if problem := undefined_under([world.plan_failure, world.execute_failure], scenario.reliability(robot)):
+                raise BadInput(f"robots.{robot.name}, scenario {scenario.name}: {problem} of the robot")
     return world
 
 

@@ -22,12 +22,14 @@ from sva_bench.analysis.over_trials import (
     promise_of,
     scenario_summary,
 )
-from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, ScenarioSummary, Share
+from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFacts, Share
+from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.statistics import bounded_mean, estimate
 from sva_bench.choices import ENDS, End
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.execution.margins import Margins
 from sva_bench.files.records import as_dict
+from sva_bench.mission.failures import Reliability, process_of
 from sva_bench.mission.plan import Plan
 from sva_bench.world.model import Scenario
 
@@ -47,7 +49,9 @@ def executed(incentive: list[list[float]], ends: list[list[End]], planned: list[
         pois_reached=zeros, stops_reached=zeros, end=end, end_time_s=np.zeros(earned.shape),
         fuel_used_s=np.zeros(earned.shape), lost=np.isin(end, [ENDS.index("out_of_fuel"), ENDS.index("stuck")]),
         contacts=zeros, planned_incentive=np.array(planned),
-        drawn_incentive=np.where(end == ENDS.index("failed"), 0.0, np.array(planned)),
+        drawn_value=np.where(end == ENDS.index("failed"), 0.0, np.array(planned)), value=earned,
+        drawn_failed=end == ENDS.index("failed"),
+        terms=process_of("mission").terms([Reliability(availability=p) for p in SCENARIO.availability.values()]),
         margins=tuple(route_of(m, f"{planner}-p{m}", worth, rollouts, near=near) for m, worth in enumerate(planned)),
         legs=(), traces=())
 
@@ -178,7 +182,7 @@ def test_equal_plans_are_not_distinguishable_and_per_cent_of_nothing_is_none() -
 def test_the_executed_range_goes_to_the_least_fortunate_of_the_tied_plans() -> None:
     other = executed([[90, 60], [90, 0], [60, 20], [30, 60]], ENDED, [90, 60], promised=150.0, planner="deterministic",
                      near=False)
-    worst = replace(other, incentive=other.incentive - [5.0, 0.0])
+    worst = replace(other, value=other.value - [5.0, 0.0])
     summary = summary_of(Judged(expected=130.0, executed=CLEAR), Judged(expected=120.0, executed=other), worst=worst,
                          modelled_range=(10.0, 15.0), ws=140.0, evpi=10.0)
     assert summary.vss.executed_range == pytest.approx((10.0, 15.0))
@@ -198,9 +202,9 @@ def test_ends_are_counted_by_robot_with_their_intervals() -> None:
 
 def test_an_end_that_cannot_happen_has_no_interval_to_speak_of() -> None:
     # uv1 is always available: it can't fail by draw, whatever noise does. uv2 never is: it can't run dry.
-    certain = Scenario(name="S4", availability={"uv1": 1.0, "uv2": 0.0})
+    certain = process_of("mission").terms([Reliability(availability=1.0), Reliability(availability=0.0)])
     run = executed([[100, 0]] * 8, [["home", "failed"]] * 8, [100.0, 60.0], promised=100.0, rollouts=8)
-    figures = [end_figures(replace(run, case=replace(run.case, scenario=certain)), m, noisy=True) for m in (0, 1)]
+    figures = [end_figures(replace(run, terms=certain), m, noisy=True) for m in (0, 1)]
     assert estimate(figures[0]["failed"]).ci95 == (0.0, 0.0)
     assert estimate(figures[1]["failed"]).ci95 == (1.0, 1.0)
     assert estimate(figures[1]["out_of_fuel"]).ci95 == (0.0, 0.0)

@@ -48,7 +48,7 @@ def test_a_team_has_margins_of_whole_routes_one_for_each_draw() -> None:
     assert none.leg_s.shape == (0, 4)
     # Nothing is known of a route that no trial had driven: all of its 80 may be lost, to any end.
     for noisy in (True, False):
-        assert exposure_of([none], 1, noisy=noisy).incentive.tolist() == [80.0]
+        assert exposure_of([none], 1, noisy=noisy).value.tolist() == [80.0]
         assert exposure_of([none], 1, noisy=noisy).ends.tolist() == [[1.0, 1.0, 1.0]]
 
 
@@ -83,7 +83,7 @@ def test_the_bound_holds_in_97_per_cent_of_normal_samples(draws: int, distance: 
 
 def exposed(drives: list[Driven], *, noisy: bool = True) -> tuple[float, dict[str, float]]:
     found = exposure_of([margins_of(0, ORDERS, drives)], 1, noisy=noisy)
-    return float(found.incentive[0]), dict(zip(EXECUTION_LOSSES, found.ends[0].tolist(), strict=True))
+    return float(found.value[0]), dict(zip(EXECUTION_LOSSES, found.ends[0].tolist(), strict=True))
 
 
 def test_a_robot_that_is_far_from_every_end_has_nothing_to_lose() -> None:
@@ -114,4 +114,4 @@ def test_without_noise_a_single_drive_determines_the_shares() -> None:
 def test_of_several_routes_of_one_robot_the_worst_counts() -> None:
     risky = margins_of(0, ORDERS, [driven(8, 13, 10, 5)])
     safe: Margins = margins_of(0, ORDERS, [driven(8, 9, 10, 5)])
-    assert exposure_of([safe, risky], 2, noisy=False).incentive.tolist() == [50.0, 0.0]
+    assert exposure_of([safe, risky], 2, noisy=False).value.tolist() == [50.0, 0.0]

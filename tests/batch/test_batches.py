@@ -220,9 +220,9 @@ def test_shards_have_the_columns_of_a_run_and_their_world_seed_and_variant(tmp_p
     assert len(shards) == 4
     table = pq.read_table(shards[0])
     assert table.column_names == [
-        "scenario", "planner", "policy", "news", "trial", "rollout", "robot", "available", "incentive", "lost", "value",
-        "pois_reached", "stops_reached", "end", "end_time_s", "fuel_used_s", "waited_s", "contacts", "fidelity",
-        "world", "seed", "variant"]
+        "scenario", "planner", "policy", "news", "trial", "rollout", "history", "weight", "robot", "available",
+        "incentive", "lost", "value", "pois_reached", "stops_reached", "end", "end_time_s", "fuel_used_s", "waited_s",
+        "contacts", "fidelity", "world", "seed", "variant"]
     assert set(table["seed"].to_pylist()) < {3, 4}
     assert table.schema.field("end_time_s").metadata == {b"unit": b"s"}
     with (tmp_path / "out" / "maps.csv").open(newline="", encoding="utf-8") as file:

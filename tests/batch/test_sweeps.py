@@ -14,8 +14,9 @@ from sva_bench.batch.estimates import estimates
 from sva_bench.batch.folder import begin, settings_in
 from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
-from sva_bench.choices import PathPlanner
+from sva_bench.choices import News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.files.records import as_dict
 from tests.cli.test_commands import sva_bench
 from tests.worlds_for_tests import SMALL
 
@@ -214,6 +215,77 @@ def test_batches_offer_the_planners_and_failures_of_runs(tmp_path: Path) -> None
     (tmp_path / "out").mkdir()
     begin(tmp_path / "out", grid.settings(), resume=False)
     assert grid_from(*settings_in(tmp_path / "out")).settings() == grid.settings()
+
+
+REACTING = [
+    ("policy: resolve\n", ("resolve",), (), False), ("policy: [none, resolve]\n", ("none", "resolve"), (), False),
+    ("policy: 'none, resolve'\nnews: instant,report\n", ("none", "resolve"), ("instant", "report"), False),
+    ("policy: resolve\nnews: [never, report]\nanticipate: true\n", ("resolve",), ("never", "report"), True)]
+
+
+@pytest.mark.parametrize(("lines", "policies", "news", "anticipate"), REACTING)
+def test_reactions_of_a_sweep_file_are_kept_in_the_folder_and_overridden_by_options(
+    lines: str, policies: tuple[PolicyName, ...], news: tuple[News, ...], anticipate: bool, tmp_path: Path
+) -> None:
+    world(tmp_path)
+    path = tmp_path / "sweep.yaml"
+    path.write_text(SWEEP + lines, encoding="utf-8")
+    grid = grid_of(sweep_of([path], Sweep()))
+    assert (grid.options.policies, grid.options.news, grid.options.anticipate) == (policies, news, anticipate)
+    (tmp_path / "out").mkdir()
+    begin(tmp_path / "out", grid.settings(), resume=False)
+    again = grid_from(*settings_in(tmp_path / "out"))
+    assert again.settings() == grid.settings()
+    assert (again.options.policies, again.options.news, again.options.anticipate) == (policies, news, anticipate)
+    other = grid_of(sweep_of([path], Sweep(policies=("resolve",), news=("station",)))).options
+    assert (other.policies, other.news, other.anticipate) == (("resolve",), ("station",), anticipate)
+
+
+def test_a_batch_without_reactions_has_the_settings_that_it_had_before_there_were_any(tmp_path: Path) -> None:
+    settings = as_dict(grid_of(Sweep(worlds=(world(tmp_path),))).settings())
+    assert not {"policies", "news", "anticipate"} & set(settings["options"])
+    assert "reaction" not in settings["points"]["small"]["world"]
+
+
+@pytest.mark.parametrize(("lines", "says"), [
+    ("policy: resolv\n", r":10: policy: 'resolv': there is no such policy; did you mean 'resolve'"),
+    ("policy: [resolve, resolve]\n", r":10: policy: resolve: given twice"),
+    ("policy: []\n", r":10: policy: "), ("policy: 3\n", r":10: policy"), ("policy: 'none,'\n", ":10: policy: .*empty"),
+    ("policy: resolve\nnews: [report, soon]\n", r":11: news: 'soon': there is no such kind of news"),
+    ("news: instant\n", ":10: news: no policy reacts to it"),
+    ("policy: none\nanticipate: true\n", ":11: anticipate: .*small has none"),
+    ("anticipate: perhaps\n", ":10: anticipate"),
+])
+def test_a_reaction_that_makes_no_sense_is_an_error_of_its_line(lines: str, says: str, tmp_path: Path) -> None:
+    world(tmp_path)
+    path = tmp_path / "sweep.yaml"
+    path.write_text(SWEEP + lines, encoding="utf-8")
+    with pytest.raises(BadFile, match=rf"sweep\.yaml{says}") as caught:
+        grid_of(sweep_of([path], Sweep()))
+    assert "--" not in str(caught.value)
+
+
+def test_a_reaction_of_an_option_is_complained_of_by_the_option_even_beside_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "small.world.yaml"
+    path.write_text(SMALL.replace("    r1: {at_m: [3.2, 5.2], stop_s: 4}\n", ""), encoding="utf-8")
+    sweep = tmp_path / "sweep.yaml"
+    sweep.write_text(SWEEP + "policy: resolve\nnews: report\n", encoding="utf-8")
+    grid_of(sweep_of([sweep], Sweep()))
+    with pytest.raises(BadInput, match=r"^--news: small has no station to hear it at"):
+        grid_of(sweep_of([sweep], Sweep(news=("station",))))
+
+
+def test_varied_reactions_have_an_effect_unless_an_option_says_otherwise(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path, vary = world(tmp_path), {"reaction.policy": ["none", "resolve"]}
+    grid = grid_of(Sweep(worlds=(path,), vary=vary))
+    assert [point.world.reaction.policy for point in grid.points] == ["none", "resolve"]
+    assert caplog.messages == []
+    grid_of(Sweep(worlds=(path,), vary=vary, policies=("none",)))
+    assert "reaction.policy=\"resolve\" changes nothing" in caplog.text
+    with pytest.raises(BadInput, match=r'^--set reaction.news="soon": input should be'):
+        grid_of(Sweep(worlds=(path,), vary={"reaction.policy": ["resolve"], "reaction.news": ["soon"]}))
 
 
 def test_varied_noise_without_effect_gives_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -29,8 +29,10 @@ SWEEP = "format: sva-bench/sweep@1\nworlds: [small.yaml]\n"
     (("plan",), "plan [OPTIONS] WORLD-or-INSTANCE"), (("certify",), "certify [OPTIONS] INSTANCE PLAN"),
     (("batch",), "batch [OPTIONS] WORLD..."), (("batch", "status"), "batch status [OPTIONS] DIR"),
     (("batch", "retry"), "batch retry [OPTIONS] DIR"), (("report",), "report [OPTIONS] RUN"),
+    (("replay",), "replay [OPTIONS] RUN"),
     (("reproduce",), "reproduce [OPTIONS] PART [ARGS]..."),
     (("reproduce", "simulation"), "reproduce simulation [OPTIONS] [WORLD...]"),
+    (("reproduce", "reaction"), "reproduce reaction [OPTIONS] [WORLD...]"),
     (("view",), "view [OPTIONS] RUN-or-RRD"),
     (("world",), "world [OPTIONS] COMMAND [ARGS]..."), (("world", "draw"), "world draw [OPTIONS] WORLD"),
     (("world", "from-map"), "world from-map [OPTIONS] MAP.yaml|MAP.map"),
@@ -184,7 +186,7 @@ def test_an_empty_value_is_refused_by_the_name_of_its_option(
     parameter.param_type_name == "argument" for parameter in command.params)], ids=" ".join)
 def test_an_empty_argument_is_refused(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line([*words, "", ""]) == 2
-    assert "its value is empty" in capsys.readouterr().err or words in (("view",), ("report",))
+    assert "its value is empty" in capsys.readouterr().err or words in (("view",), ("report",), ("replay",))
 
 
 SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
@@ -192,7 +194,8 @@ SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
 
 def test_every_command_that_draws_takes_a_seed() -> None:
     assert {" ".join(words) for words in SEEDED} == {
-        "run", "execute", "reproduce simulation", "batch over", "world random", "world from-map", "instance random"}
+        "run", "execute", "reproduce simulation", "reproduce reaction",
+        "batch over", "world random", "world from-map", "instance random"}
     assert bounds.MOST_SEED == seeds.MOST_SEED
 
 

@@ -18,8 +18,10 @@ from sva_bench.choices import ENDS, FailureProcess, Fidelity
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.execute import Executed, execute
 from sva_bench.execution.noise import UNDISTURBED, draw_disturbance
+from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import JointState, route_value
 from sva_bench.mission.plan import Plan
+from sva_bench.study.costs import instance_of
 from sva_bench.world.model import Noise, Scenario, World
 from tests.execution.conftest import Planned
 
@@ -189,6 +191,42 @@ def test_the_executed_mean_is_the_closed_form(small: Planned, process: FailurePr
     found = estimate(value_figure(done, noisy=False))
     assert found.ci95 is not None
     assert found.ci95[0] < expected < found.ci95[1]  # holds for this seed
+
+
+@pytest.mark.parametrize("process", ["mission", "per_leg", "hazard"])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_the_executed_mean_value_is_the_closed_form_where_lost_robots_cost(
+        small: Planned, process: FailureProcess, noise: float) -> None:
+    robots = tuple(replace(robot, loss_cost=25.0, mtbf_s=60.0) for robot in small.world.robots)
+    world = replace(small.world, execute_failure=process, robots=robots, noise=Noise(wheel_gain_sd=noise))
+    scenario = Scenario(name="s", availability={"uv1": 0.9, "uv2": 0.6}, mtbf_s={"uv1": 60.0})
+    (done,) = run(small, [APART], trials=20_000, rollouts=8 if noise else 1, seed=5, world=world, scenario=scenario)
+    assert_array_equal(done.value, done.incentive - 25.0 * done.lost)
+    expected = expected_value(replace(instance_of(world, small.costs, scenario), failure=process), APART)
+    half = 4 * done.drawn_value.sum(axis=1).std() / np.sqrt(20_000)  # four standard errors
+    assert done.drawn_value.sum(axis=1).mean() == pytest.approx(expected, abs=half)
+    if not noise:  # the twin drives as planned, to a control step a leg
+        assert done.value.sum(axis=1).mean() == pytest.approx(expected, abs=half + 0.05)
+    figure = value_figure(done, noisy=bool(noise))
+    found = estimate(figure)
+    assert found.mean == pytest.approx(done.value.sum(axis=1).mean())
+    assert found.ci95 is not None
+    assert found.ci95[0] < found.mean < found.ci95[1]
+    observed = (done.drawn_value if noise else done.value).sum(axis=1)  # without noise the drawn part is the whole
+    assert figure.drawn_bounds[0] <= observed.min()
+    assert observed.max() <= figure.drawn_bounds[1]
+
+
+def test_a_trial_under_hazard_is_the_same_alone_and_among_many(small: Planned) -> None:
+    world = replace(small.world, execute_failure="hazard")
+    case = Case(scenario=small.world.scenarios[0], planner="a", plan=APART)
+    settings = Settings(seed=0, trials=40, rollouts=4, fidelity="kinematic", recorded=False)
+    (many,) = execute(world, small.costs, [case], settings)
+    for trial in range(0, 40, 7):
+        (one,) = execute(world, small.costs, [case], replace(settings, first=trial, trials=1))
+        for name in (*ARRAYS, "value", "lost", "drawn_value", "drawn_failed"):
+            of_many = getattr(many, name)[trial]
+            assert_array_equal(getattr(one, name)[0], of_many, err_msg=name)
 
 
 def test_a_joint_distribution_is_executed_as_drawn(small: Planned) -> None:

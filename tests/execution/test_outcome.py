@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, trace_of
+from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, RobotFate, trace_of
 from sva_bench.execution.rules import settle
 from sva_bench.mission.failures import NEVER
 
@@ -57,28 +57,28 @@ def test_a_whole_mission_earns_everything_and_ends_home() -> None:
 
 
 def test_a_robot_that_fails_at_the_base_never_leaves() -> None:
-    outcome = settle(orders(), driven(), 0)
+    outcome = settle(orders(), driven(), RobotFate(0))
     assert told(outcome) == ("failed", 0.0, 0.0, 0.0, 0, 0)
     assert not outcome.available
     # It needs no drive for that.
     nothing = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
-    assert told(settle(orders(), nothing, 0)) == told(outcome)
+    assert told(settle(orders(), nothing, RobotFate(0))) == told(outcome)
 
 
 def test_a_robot_that_fails_before_its_first_poi_stands_at_the_base() -> None:
-    assert told(settle(orders(), driven(), 1)) == ("failed", 0.0, 0.0, 0.0, 0, 0)
+    assert told(settle(orders(), driven(), RobotFate(1))) == ("failed", 0.0, 0.0, 0.0, 0, 0)
 
 
 def test_a_robot_that_fails_before_its_second_poi_keeps_the_first_and_has_refuelled() -> None:
     # No draw for the leg to the station: it fails on leaving r1, at 23 s, with 18 s driven.
-    outcome = settle(orders(), driven(), 2)
+    outcome = settle(orders(), driven(), RobotFate(2))
     assert told(outcome) == ("failed", 23.0, 18.0, 5.0, 1, 2)
     assert outcome.events[-2:] == (Event(time_s=23, kind="refuelled", site="r1"),
                                    Event(time_s=23, kind="failed", site="r1"))
 
 
 def test_a_failure_before_a_poi_that_is_not_on_the_route_changes_nothing_but_the_draw() -> None:
-    outcome = settle(orders(), driven(), 3)
+    outcome = settle(orders(), driven(), RobotFate(3))
     assert told(outcome) == told(settle(orders(), driven()))
 
 
@@ -121,7 +121,7 @@ def test_a_late_robot_earns_nothing_more_and_ends_late_when_home() -> None:
 
 def test_a_late_robot_that_runs_dry_or_fails_does_not_end_late() -> None:
     assert settle(orders(limit=5, fuel=15), driven()).end == "out_of_fuel"
-    assert settle(orders(limit=5), driven(), 2).end == "failed"
+    assert settle(orders(limit=5), driven(), RobotFate(2)).end == "failed"
 
 
 def test_a_robot_that_gets_stuck_keeps_what_it_has() -> None:
@@ -132,7 +132,7 @@ def test_a_robot_that_gets_stuck_keeps_what_it_has() -> None:
 
 
 def test_a_robot_fails_before_it_would_get_stuck() -> None:
-    assert settle(orders(), driven((10.0, 8.0, 9.0), stuck=True), 2).end == "failed"
+    assert settle(orders(), driven((10.0, 8.0, 9.0), stuck=True), RobotFate(2)).end == "failed"
 
 
 def test_stops_burn_no_fuel_but_count_to_the_clock() -> None:
@@ -145,7 +145,7 @@ def test_stops_burn_no_fuel_but_count_to_the_clock() -> None:
 
 @pytest.mark.parametrize("fails", [0, 1, 5, NEVER])
 def test_an_empty_route_ends_home_whatever_the_draw(fails: int) -> None:
-    outcome = settle(orders(route=()), driven(()), fails)
+    outcome = settle(orders(route=()), driven(()), RobotFate(fails))
     assert told(outcome) == ("home", 0.0, 0.0, 0.0, 0, 0)
     assert outcome.available == (fails == NEVER)
 
@@ -158,7 +158,7 @@ durations = st.floats(0.001, 30)
 def test_laws_of_every_outcome(legs: tuple[float, ...], fuel: float, limit: float, fails: int, stuck: bool, reached: int
                                ) -> None:
     mine, drive = orders(fuel=fuel, limit=limit), driven(legs[:reached] if stuck else legs, stuck=stuck)
-    outcome = settle(mine, drive, fails)
+    outcome = settle(mine, drive, RobotFate(fails))
     assert 0 <= outcome.fuel_used_s <= min(sum(legs), 2 * fuel) + 2e-6  # two fillings at most
     assert outcome.fuel_used_s <= outcome.end_time_s + 1e-9
     assert 0 <= outcome.incentive <= 12
@@ -169,15 +169,15 @@ def test_laws_of_every_outcome(legs: tuple[float, ...], fuel: float, limit: floa
     assert outcome.events[-1].time_s == outcome.end_time_s
     assert (outcome.end == "home") <= (outcome.end_time_s <= limit + 1e-6)
     # More of everything is never worse.
-    assert settle(orders(fuel=fuel + 5, limit=limit + 5), drive, fails).incentive >= outcome.incentive
-    assert settle(mine, drive, NEVER).incentive >= outcome.incentive
+    assert settle(orders(fuel=fuel + 5, limit=limit + 5), drive, RobotFate(fails)).incentive >= outcome.incentive
+    assert settle(mine, drive, RobotFate(NEVER)).incentive >= outcome.incentive
 
 
 # Traces
 
 
 def traced(mine: Assignment, drive: Driven, fails: int = NEVER) -> tuple[Outcome, FloatArray, FloatArray, FloatArray]:
-    outcome = settle(mine, drive, fails)
+    outcome = settle(mine, drive, RobotFate(fails))
     trace = trace_of(mine, drive, outcome, START, np.empty((0, 2)))
     return outcome, trace.time_s, trace.pose, trace.fuel_s
 

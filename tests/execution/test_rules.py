@@ -1,21 +1,16 @@
-"""The rules of one mission, each by hand, and teams whose policy may change their orders."""
+"""The rules of one mission, each by hand."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from dataclasses import replace
 from itertools import pairwise
-from typing import get_args
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from sva_bench.choices import PolicyName
-from sva_bench.execution.outcome import Assignment, Driven, Outcome
-from sva_bench.execution.policies.policy import TeamState
-from sva_bench.execution.policies.registry import POLICIES
-from sva_bench.execution.rules import LegDriven, RobotMission, play, settle
+from sva_bench.execution.outcome import Assignment, Driven, RobotFate
+from sva_bench.execution.rules import LegDriven, RobotMission, settle
 from sva_bench.mission.failures import NEVER
 
 ROUTE = ("base", "p1", "r1", "p2", "base")
@@ -30,9 +25,10 @@ def orders(robot: str = "uv1", route: tuple[str, ...] = ROUTE, *, fuel: float = 
                       mission_limit_s=limit)
 
 
-def begun(*legs: float, fuel: float = 20.0, limit: float = 50.0, fails: int = NEVER) -> RobotMission:
+def begun(*legs: float, fuel: float = 20.0, limit: float = 50.0, fails: int = NEVER, lifetime: float = math.inf
+          ) -> RobotMission:
     """A mission after some legs."""
-    mission = RobotMission(orders(fuel=fuel, limit=limit), fails)
+    mission = RobotMission(orders(fuel=fuel, limit=limit), RobotFate(fails, lifetime))
     for time_s in legs:
         assert mission.depart() is not None
         mission.drive(LegDriven(time_s))
@@ -43,6 +39,51 @@ def test_a_robot_departs_for_the_next_stop_of_its_orders() -> None:
     mission = begun()
     assert mission.depart() == "p1"
     assert (mission.site, mission.clock_s, mission.ahead) == ("base", 0.0, ("p1", "r1", "p2", "base"))
+
+
+def test_it_fails_where_its_driven_time_reaches_its_lifetime_on_any_leg() -> None:
+    # Driven to p1 at 10 s, r1 at 18, p2 at 24, home at 36; stops of 1 s, 4 s and 2 s age nobody.
+    for lifetime, stops, incentive, clock in ((3.0, 0, 0.0, 3.0), (12.0, 1, 5.0, 13.0), (20.0, 2, 5.0, 25.0),
+                                              (30.0, 3, 12.0, 37.0)):
+        outcome = begun(*(10.0, 8.0, 6.0, 12.0)[: stops + 1], lifetime=lifetime).outcome()
+        assert (outcome.end, outcome.lost, outcome.available) == ("failed", True, False)
+        assert (outcome.stops_reached, outcome.incentive) == (stops, incentive)
+        assert (outcome.end_time_s, outcome.fuel_used_s) == (clock, lifetime)
+    assert begun(10.0, 8.0, 6.0, 12.0, lifetime=36.5).outcome().end == "home"
+
+
+def test_without_any_lifetime_it_fails_at_once_on_its_first_leg_and_is_lost() -> None:
+    outcome = begun(10.0, lifetime=0.0).outcome()
+    assert (outcome.end, outcome.lost, outcome.end_time_s, outcome.fuel_used_s) == ("failed", True, 0.0, 0.0)
+
+
+def test_it_collects_where_its_lifetime_ends_on_arrival_and_fails_on_setting_off() -> None:
+    outcome = begun(10.0, 8.0, lifetime=10.0).outcome()
+    assert (outcome.end, outcome.incentive, outcome.end_time_s, outcome.fuel_used_s) == ("failed", 5.0, 11.0, 10.0)
+
+
+def test_what_comes_first_on_a_leg_ends_it() -> None:
+    # The tank of 15 s is empty 5 s after p1.
+    assert begun(10.0, 8.0, fuel=15.0, lifetime=14.0).outcome().end == "failed"
+    assert begun(10.0, 8.0, fuel=15.0, lifetime=16.0).outcome().end == "out_of_fuel"
+    for lifetime, end in ((12.0, "failed"), (14.0, "stuck")):
+        mission = begun(10.0, lifetime=lifetime)
+        mission.drive(LegDriven(3.0, stuck=True))
+        assert mission.outcome().end == end
+
+
+def test_a_lost_robot_costs_and_one_that_never_left_does_not() -> None:
+    def value(fate: RobotFate, fuel: float = 20.0, limit: float = 50.0) -> float:
+        priced = replace(orders(fuel=fuel, limit=limit), loss_cost=100.0)
+        return settle(priced, driven(0, ROUTE), fate).value
+
+    assert value(RobotFate()) == 12.0
+    assert value(RobotFate(), limit=30.0) == 5.0  # late: it comes home
+    assert value(RobotFate(before_poi=0)) == 0.0
+    assert value(RobotFate(before_poi=1)) == -100.0
+    assert value(RobotFate(before_poi=2)) == -95.0
+    assert value(RobotFate(lifetime_s=30.0)) == -88.0
+    assert value(RobotFate(), fuel=15.0) == -95.0  # out of fuel
 
 
 def test_it_arrives_and_its_stop_takes_time_but_no_fuel() -> None:
@@ -94,82 +135,6 @@ def test_a_mission_that_goes_on_has_no_outcome() -> None:
         begun(10.0).outcome()
 
 
-# Teams and policies
-
-
-def legs_of(number: int, origin: str, destination: str) -> LegDriven:
-    return LegDriven(TIMES[origin, destination] + number)
-
-
 def driven(number: int, route: tuple[str, ...]) -> Driven:
     times = [TIMES[leg] + number for leg in pairwise(route)]
     return Driven(leg_s=np.array(times), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
-
-
-def test_every_policy_is_registered() -> None:
-    assert set(POLICIES) == set(get_args(PolicyName))
-
-
-fuels, fates = st.floats(0, 40), st.sampled_from([0, 1, 2, NEVER])
-routes = st.sampled_from([ROUTE, ("base", "p1", "base"), ("base", "p1", "p2", "base"), ()])
-
-
-@given(routes, routes, fuels, fuels, st.floats(0, 60), fates, fates)
-def test_under_none_a_team_fares_as_its_robots_do_alone(
-        one: tuple[str, ...], two: tuple[str, ...], fuel: float, other: float, limit: float, fails: int, fails_too: int
-) -> None:
-    team = [orders("uv1", one, fuel=fuel, limit=limit), orders("uv2", two, fuel=other, limit=limit)]
-    found = play(team, [fails, fails_too], legs_of, POLICIES["none"])
-    assert found == [settle(team[0], driven(0, one), fails), settle(team[1], driven(1, two), fails_too)]
-
-
-@pytest.mark.parametrize("name", sorted(POLICIES))
-@given(fails=fates, fails_too=fates)
-def test_a_policy_gives_orders_that_end_at_the_base_and_the_same_for_the_same_state(
-        name: PolicyName, fails: int, fails_too: int) -> None:
-    seen: list[TeamState] = []
-
-    def watched(state: TeamState) -> Mapping[str, tuple[str, ...]]:
-        seen.append(state)
-        given = POLICIES[name](state)
-        assert given == POLICIES[name](state)
-        assert set(given) <= {robot.robot for robot in state.robots}
-        for robot in state.robots:
-            if robot.end is None and robot.robot in given:
-                assert given[robot.robot][-1] == "base"
-        return given
-
-    team = [orders("uv1"), orders("uv2", ("base", "p2", "base"))]
-    first: list[Outcome] = play(team, [fails, fails_too], legs_of, watched)
-    assert play(team, [fails, fails_too], legs_of, watched) == first
-    times = [state.time_s for state in seen[: len(seen) // 2]]
-    assert times == sorted(times)
-
-
-def test_a_policy_may_change_what_is_left_at_an_epoch() -> None:
-    # At p1, its stop over at 11 s, uv1 is sent home: 9 s more. It burns 19 s of its 20.
-    def homewards(state: TeamState) -> Mapping[str, tuple[str, ...]]:
-        return {"uv1": ("base",)} if state.robots[0].site == "p1" else {}
-
-    (outcome,) = play([orders()], [NEVER], legs_of, homewards)
-    assert (outcome.end, outcome.end_time_s, outcome.fuel_used_s, outcome.incentive) == ("home", 20.0, 19.0, 5.0)
-
-
-def test_at_an_epoch_a_policy_sees_who_stands_where_and_on_how_much() -> None:
-    seen: list[TeamState] = []
-
-    def watched(state: TeamState) -> Mapping[str, tuple[str, ...]]:
-        seen.append(state)
-        return {}
-
-    play([orders("uv1", ("base", "p1", "base")), orders("uv2", ("base", "p2", "base"))], [NEVER, 1], legs_of, watched)
-    # uv1 leaves at 0 and is at p1 until 11; uv2 fails on leaving, so it has one epoch.
-    assert [(s.time_s, s.at_epoch) for s in seen] == [(0.0, 0), (0.0, 1), (11.0, 0)]
-    first, second = seen[-1].robots
-    assert (first.site, first.ready_s, first.burnt_s, first.remaining, first.end) == ("p1", 11.0, 10.0, ("base",), None)
-    assert second.end == "failed"
-
-
-def test_orders_that_do_not_lead_home_are_refused() -> None:
-    with pytest.raises(ValueError, match="don't end at the base"):
-        play([orders()], [NEVER], legs_of, lambda _: {"uv1": ("p2",)})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -68,10 +69,22 @@ def test_the_mean_reward_of_a_route_is_its_closed_form(process: Process) -> None
 
 
 @every_process
+def test_the_cost_of_a_loss_is_charged_for_what_failed_along_the_route(process: Process) -> None:
+    priced = replace(RELIABILITY, loss_cost=10.0)
+    failed = drawn(process, reliability=priced)
+    before, lifetime = failed.before_poi[:, 0], failed.lifetime_s[:, 0]
+    lost = np.mean(((before > 0) & (before <= 3)) | (lifetime < 120.0))
+    # A share of 20000 trials, times 10: four standard deviations are 20 / sqrt(20000) = 0.15.
+    free = process.route_value(ROUTE, RELIABILITY)
+    assert free - process.route_value(ROUTE, priced) == pytest.approx(10.0 * lost, abs=0.15)
+
+
+@every_process
 def test_planning_terms_agree_with_the_closed_form(process: Process) -> None:
     terms = process.terms([Reliability(availability=1.0), RELIABILITY])
     survival = np.ones(2) if terms.survival is None else terms.survival
-    told = sum(terms.share[1] * survival[1]**k * e for k, e in enumerate(ROUTE.incentives, start=1))
+    left = np.exp(-terms.rate_of(1) * np.array(ROUTE.arrival_s))
+    told = sum(terms.share[1] * survival[1]**k * left[k - 1] * e for k, e in enumerate(ROUTE.incentives, start=1))
     assert told == pytest.approx(process.route_value(ROUTE, RELIABILITY), rel=1e-12)
 
 
@@ -79,7 +92,8 @@ def test_planning_terms_agree_with_the_closed_form(process: Process) -> None:
 def test_the_model_collapses_where_the_order_of_visits_makes_no_difference(process: Process) -> None:
     backwards = RouteProfile(incentives=ROUTE.incentives[::-1], arrival_s=ROUTE.arrival_s, home_s=ROUTE.home_s)
     same = process.route_value(backwards, RELIABILITY) == pytest.approx(process.route_value(ROUTE, RELIABILITY))
-    assert process.collapses == same == (process.terms([RELIABILITY]).survival is None)
+    terms = process.terms([RELIABILITY])
+    assert process.collapses == same == (terms.survival is None and terms.rate is None)
 
 
 @every_process
@@ -117,7 +131,8 @@ def test_trials_and_vehicles_are_drawn_by_key(process: Process) -> None:
     # Draws for more POIs than the route has leave its own as they are.
     assert_array_equal(np.where(whole.before_poi <= 3, whole.before_poi, NEVER),
                        np.where(longer.before_poi <= 3, longer.before_poi, NEVER))
-    assert not np.array_equal(whole.before_poi[:, 0], whole.before_poi[:, 1])
+    assert not (np.array_equal(whole.before_poi[:, 0], whole.before_poi[:, 1])
+                and np.array_equal(whole.lifetime_s[:, 0], whole.lifetime_s[:, 1]))
 
 
 @every_process

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from sva_bench.errors import BadFile
+from sva_bench.errors import BadFile, BadInput
 from sva_bench.mission.failures import JointState
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.instance_file import instance_as_dict, read_instance, write_instance
@@ -87,6 +88,10 @@ def test_an_instance_comes_back_from_its_file_as_it_was(tmp_path: Path, shared: 
     (lambda d: d["vehicles"].append(d["vehicles"][0]), "vehicles[1]", "is a duplicate"),
     (lambda d: d["vehicles"][0].update(availability=1.5), "vehicles[0].availability", "1"),
     (lambda d: d["vehicles"][0].pop("availability"), "vehicles[0]", "'availability' is missing"),
+    (lambda d: d["vehicles"][0].update(mtbf_s=-1), "vehicles[0].mtbf_s", "at least 0"),
+    (lambda d: d["vehicles"][0].update(loss_cost=-1), "vehicles[0].loss_cost", "at least 0"),
+    (lambda d: (d.update(failure="hazard"), d["vehicles"][0].update(availability=0.5, mission_limit_s=None)),
+     "vehicles[0].availability", "set mission_limit_s or mtbf_s of the vehicle"),
     (lambda d: d["vehicles"][0]["incentives"].update(r1=3), "vehicles[0].incentives.r1", "no POI"),
     (lambda d: d.update(base="bse"), "base", "did you mean 'base'?"),
     (lambda d: d.update(stations=["base"]), "stations", "never refuel there"),
@@ -108,6 +113,38 @@ def test_a_wrong_instance_is_refused_with_its_line_and_key(
     assert words in caught.value.problem
     assert caught.value.line is not None
     assert caught.value.line >= 1
+
+
+def test_lifetimes_and_costs_of_losses_are_read_and_written_where_given(tmp_path: Path) -> None:
+    plain = read_instance(written(tmp_path, TINY))
+    assert not {"mtbf_s", "loss_cost"} & set(instance_as_dict(plain)["vehicles"][0])
+    lasting = read_instance(written(tmp_path, changed(lambda d: (
+        d.update(failure="hazard"), d["vehicles"][0].update(mtbf_s=0, loss_cost=2.5)))))
+    vehicle = instance_as_dict(lasting)["vehicles"][0]
+    assert (vehicle["mtbf_s"], vehicle["loss_cost"]) == (0.0, 2.5)
+    write_instance(tmp_path / "again.json", lasting)
+    assert instance_as_dict(read_instance(tmp_path / "again.json")) == instance_as_dict(lasting)
+
+
+def test_a_mean_time_to_failure_says_the_availability_where_none_is_given(tmp_path: Path) -> None:
+    for limit, availability in ((None, 1.0), (30, math.exp(-0.5))):
+        def only_mean(data: dict[str, Any], limit_s: int | None = limit) -> None:
+            data["vehicles"][0].pop("availability")
+            data["vehicles"][0].update(mtbf_s=60, mission_limit_s=limit_s)
+
+        (vehicle,) = read_instance(written(tmp_path, changed(only_mean))).vehicles
+        assert vehicle.availability == pytest.approx(availability)
+
+
+def test_another_availability_replaces_the_mean_time_to_failure(tmp_path: Path) -> None:
+    lasting = read_instance(written(tmp_path, changed(lambda d: (
+        d.update(failure="hazard"), d["vehicles"][0].update(mtbf_s=60, mission_limit_s=30)))))
+    name = lasting.vehicles[0].name
+    assert lasting.with_availability({name: 0.5}).vehicles[0].mtbf_s is None
+    assert lasting.with_availability({}).vehicles[0].mtbf_s == 60.0
+    endless = replace(lasting, vehicles=(replace(lasting.vehicles[0], mission_limit_s=math.inf),))
+    with pytest.raises(BadInput, match="set mission_limit_s or mtbf_s of the vehicle"):
+        endless.with_availability({name: 0.5})
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity"])

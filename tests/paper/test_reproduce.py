@@ -12,7 +12,8 @@ from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Settings
 from sva_bench.paper.rewards import rewards, rewards_page, three_vehicles
 from sva_bench.paper.simulation import simulation, simulation_page
-from sva_bench.study.costs import NOMINAL, nominal_scenario
+from sva_bench.study.costs import nominal_scenario
+from sva_bench.world.model import NOMINAL
 from tests.worlds_for_tests import SMALL, world_of
 
 SETTINGS = Settings(seed=0, trials=400, rollouts=4, fidelity="kinematic")

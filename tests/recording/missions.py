@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from sva_bench.execution.outcome import Assignment, Driven, Trace, trace_of
+from sva_bench.arrays import FloatArray
+from sva_bench.execution.outcome import Assignment, Driven, RobotFate, Trace, trace_of
 from sva_bench.execution.rules import settle
+from sva_bench.execution.team_trace import NewsHeard, Rerouted
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import NEVER
 from sva_bench.robot.model import BUILT_IN
@@ -53,4 +56,26 @@ def trace(robot: str, route: tuple[str, ...] = TOUR, *, fails_before: int = NEVE
         stop_s={site.name: site.stop_s for site in WORLD.sites},
         fuel_capacity_s=me.fuel_capacity_s if fuel_s is None else fuel_s, mission_limit_s=limit_s)
     planned = np.array([at[site] for site in route]).reshape(-1, 2)
-    return trace_of(orders, driven, settle(orders, driven, fails_before), BASE, planned)
+    return trace_of(orders, driven, settle(orders, driven, RobotFate(fails_before)), BASE, planned)
+
+
+def mission_with_news() -> tuple[list[Trace], list[NewsHeard]]:
+    """uv1 fails at the base, which uv2 learns after 4 s, on its way to r1; it takes over p2 and comes home after 14 s.
+
+    uv3 was to stay at the base, and is sent to p1 in the place of uv1.
+    """
+    at = {site.name: np.array([site.x_m, site.y_m]) for site in WORLD.sites}
+
+    def path(*stops: str) -> FloatArray:
+        return np.array([at[site] for site in stops]).reshape(-1, 2)
+
+    later = trace("uv3", ("base", "p1", "base"))
+    later = replace(later, time_s=np.append(0.0, 4.0 + later.time_s), pose=np.vstack([later.pose[:1], later.pose]),
+                    fuel_s=np.append(later.fuel_s[0], later.fuel_s), outcome=replace(
+                        later.outcome, end_time_s=8.0,
+                        events=tuple(replace(e, time_s=e.time_s + 4.0) for e in later.outcome.events)))
+    news = NewsHeard(time_s=4.0, failed=("uv1",), learned=("uv2", "uv3"), rerouted=(
+        Rerouted(robot="uv2", taken=("p2",), dropped=("p1",), old=path("r1", "p1", "base"),
+                 new=path("r1", "p2", "base")),
+        Rerouted(robot="uv3", taken=("p1",), dropped=(), old=path(), new=path("base", "p1", "base"))))
+    return [trace("uv1", fails_before=0), trace("uv2", ("base", "r1", "p2", "base")), later], [news]

@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from rerun.chunk import RrdReader
 
+from sva_bench.recording.colors import ALARM, BLUE, DISABLED, ROBOT_COLORS, VERMILLION, YELLOW, pale
 from sva_bench.recording.rerun import TIMELINE, end_s, record
-from sva_bench.recording.story import BLUE, DISABLED, ROBOT_COLORS, YELLOW
 from sva_bench.recording.viewer import program, verify
-from tests.recording.missions import WORLD, trace
+from tests.recording.missions import WORLD, mission_with_news, trace
 
 
 def rows(path: Path, entity: str, component: str) -> tuple[np.ndarray[Any, np.dtype[np.float64]], list[Any]]:
@@ -119,3 +119,57 @@ def test_a_failed_recording_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="taken"):
         record(tmp_path / "taken.rrd", WORLD, [trace("uv1")], title="taken")
     assert [file.name for file in tmp_path.iterdir()] == ["taken.rrd"]
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recording") / "told.rrd"
+    traces, news = mission_with_news()
+    record(path, WORLD, traces, title="told", news=news)
+    verify(path)
+    return path
+
+
+def constants(path: Path, entity: str, component: str) -> list[Any]:
+    """What an entity's component is at all times."""
+    return [value for chunk in RrdReader(path).stream() if chunk.entity_path == f"/{entity}" and chunk.is_static
+            for batch in [chunk.to_record_batch()] if component in batch.schema.names
+            for value in batch.column(component).to_pylist()]
+
+
+def test_a_lost_robot_is_crossed_out_and_named_from_then_on(told: Path, tour: Path) -> None:
+    for path, robot, when, at, what in ((told, "uv1", 0, (1, 1), "uv1 failed, 0 s"), (tour, "uv2", 6, (5, 1), None)):
+        times, (cross,) = rows(path, f"world/lost/{robot}", "LineStrips3D:strips")
+        assert_array_equal(times, [when])
+        corners = np.array(cross)[..., :2]
+        assert_allclose(corners.mean(axis=(0, 1)), at, atol=1e-6)
+        assert np.ptp(corners[..., 0]) > 2 * 2 * WORLD.robots[0].model.radius_m  # larger than the robot
+        (colors,) = rows(path, f"world/lost/{robot}", "LineStrips3D:colors")[1]
+        assert {rgb(color) for color in colors} == {ALARM}
+        assert what is None or rows(path, f"world/lost/{robot}/what", "Points3D:labels")[1] == [[what]]
+    assert not len(rows(told, "world/lost/uv2", "LineStrips3D:strips")[0])
+
+
+def test_new_orders_are_thick_and_old_ones_thin_from_the_news_on(told: Path) -> None:
+    widths = {}
+    for name, route, color in (("old", [[5, 1], [3, 1], [1, 1]], pale(VERMILLION)),
+                               ("new", [[5, 1], [7, 1], [1, 1]], VERMILLION)):
+        entity = f"world/orders/uv2/{name}"
+        times, (strips,) = rows(told, entity, "LineStrips3D:strips")
+        assert_array_equal(times, [4])
+        assert_allclose(np.array(strips[0])[:, :2], route, atol=1e-6)
+        ((packed,),) = constants(told, entity, "LineStrips3D:colors")
+        assert rgb(packed) == color
+        ((radius,),) = constants(told, entity, "LineStrips3D:radii")
+        widths[name] = abs(radius)  # negative: in points of the screen
+    assert widths["new"] > 2 * widths["old"]
+    assert not len(rows(told, "world/orders/uv3/old", "LineStrips3D:strips")[0])  # it had none
+
+
+def test_lanes_show_who_was_lost_and_who_learned_of_it_when(told: Path, tour: Path) -> None:
+    marks = {entity: [(when, value[0]) for when, value in zip(*rows(told, f"news/{entity}", "Scalars:scalars"),
+                                                              strict=True)]
+             for entity in ("uv1/lost", "uv1/learned", "uv2/learned", "uv3/learned", "uv2/lost")}
+    assert marks == {"uv1/lost": [(0, 0)], "uv1/learned": [], "uv2/learned": [(4, -1)], "uv3/learned": [(4, -2)],
+                     "uv2/lost": []}
+    assert not any(chunk.entity_path.startswith("/news") for chunk in RrdReader(tour).stream())

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sva_bench.recording.story import BLUE, ROBOT_COLORS, VERMILLION, YELLOW, Level, Story, corners, dashes, story_of
-from tests.recording.missions import WORLD, trace
+from sva_bench.recording.colors import ALARM, BLUE, PURPLE, ROBOT_COLORS, VERMILLION, YELLOW, pale
+from sva_bench.recording.story import Level, Story, corners, dashes, story_of
+from tests.recording.missions import WORLD, mission_with_news, trace
 
 
 def entries(story: Story) -> list[tuple[float, Level, str]]:
@@ -127,3 +128,39 @@ def test_traces_of_strangers_or_twins_are_refused() -> None:
         story_of(WORLD, [trace("uv1"), trace("uv1")], "twins")
     with pytest.raises(ValueError, match="one trace per robot"):
         story_of(replace(WORLD, robots=WORLD.robots[:1]), [trace("uv2")], "stranger")
+
+
+def test_news_is_logged_with_who_learned_of_it_and_what_each_robot_does_then() -> None:
+    traces, news = mission_with_news()
+    story = story_of(WORLD, traces, "news", news)
+    told = [(entry.text, entry.color) for entry in story.log if entry.time_s == 4.0 and entry.level == "WARN"]
+    assert told == [("uv2, uv3 learned that uv1 failed", ALARM),
+                    ("uv2 takes over p2 and leaves out p1", VERMILLION), ("uv3 takes over p1", PURPLE)]
+    assert [entry.time_s for entry in story.log] == sorted(entry.time_s for entry in story.log)
+    assert (0.0, "ERROR", "uv1 failed at base, with 0 collected") in entries(story)
+
+
+def test_an_orphan_changes_its_colour_to_a_light_one_of_who_takes_it_over_and_its_own_when_it_is_collected() -> None:
+    traces, news = mission_with_news()
+    (pois,) = (marks for marks in story_of(WORLD, traces, "news", news).marks if marks.kind == "poi")
+    # News after 4 s; p1 is uv3's after 2 m from then on, p2 uv2's after 4 m, 2 s of refuelling and 2 m.
+    assert_array_equal(pois.time_s, [0, 4, 6, 8])
+    orphans = [pale(PURPLE), pale(VERMILLION)]
+    assert_array_equal(pois.colors, [[YELLOW, YELLOW], orphans, [PURPLE, orphans[1]], [PURPLE, VERMILLION]])
+
+
+def test_who_was_lost_is_marked_where_it_stands_and_in_its_lane_with_who_learned_of_it() -> None:
+    traces, news = mission_with_news()
+    story = story_of(WORLD, traces, "news", news)
+    ((name, when, what),) = [(lost.robot, lost.time_s, lost.what) for lost in story.lost]
+    assert (name, when, what) == ("uv1", 0.0, "uv1 failed, 0 s")
+    assert_array_equal(story.lost[0].at_m, [1, 1])
+    assert [(lane.robot, lane.height, lane.lost_s.tolist(), lane.learned_s.tolist()) for lane in story.lanes] == [
+        ("uv1", 0, [0], []), ("uv2", -1, [], [4]), ("uv3", -2, [], [4])]
+    assert [change.robot for change in story.changes] == ["uv2", "uv3"]
+    assert_array_equal(story.changes[0].new[0], [[5, 1], [7, 1], [1, 1]])
+
+
+def test_a_mission_without_news_has_neither_lanes_nor_changes() -> None:
+    story = story_of(WORLD, [trace("uv1", fails_before=1)], "alone")
+    assert (story.lanes, story.changes, len(story.lost)) == ((), (), 1)

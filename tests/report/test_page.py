@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.analysis.over_maps import BatchSummary, Percentage, UnitSummary
-from sva_bench.analysis.results import Estimate, ScenarioSummary
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import ScenarioSummary, UnitScenario
 from sva_bench.analysis.summaries import Summary
 from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
@@ -71,7 +72,9 @@ def units_of(finished: Run, world: str = "small", seed: int = 0, variant: str = 
     found = results_of(finished)
     return UnitSummary(
         world=world, seed=seed, variant=variant, trials=found.trials, rollouts=found.rollouts, fidelity=found.fidelity,
-        failure=found.failure, travel=found.travel, reproducible=True, reach=found.reach, scenarios=found.scenarios)
+        failure=found.failure, travel=found.travel, reproducible=True, reach=found.reach,
+        scenarios=tuple(UnitScenario(**{field.name: getattr(scenario, field.name) for field in fields(UnitScenario)})
+                        for scenario in found.scenarios))
 
 
 def batch_of(units: Sequence[UnitSummary]) -> BatchSummary:

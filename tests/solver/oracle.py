@@ -196,3 +196,56 @@ def random_instance(seed: int) -> Instance:
         vehicles=tuple(Vehicle(name=v.name, fuel_capacity_s=v.fuel_capacity_s, mission_limit_s=v.mission_limit_s,
                                availability=v.availability, incentives=v.incentives[order],
                                fuel_s=v.fuel_s[np.ix_(order, order)]) for v in vehicles))
+
+
+def discounted_optimum(instance: Instance) -> float:
+    """Greatest value under ``per_leg`` or ``hazard``, costs of losses included: every order and every way counts."""
+    worth = [_best_ways(instance, v) for v in instance.vehicles]
+    best = {frozenset[int](): 0.0}  # value by the POIs that the vehicles so far visit
+    for of_vehicle in worth:
+        now: dict[frozenset[int], float] = {}
+        for visited, value in best.items():
+            for own, more in of_vehicle.items():
+                if not visited & own:
+                    now[visited | own] = max(now.get(visited | own, -np.inf), value + more)
+        best = now
+    return max(best.values())
+
+
+def _chance(instance: Instance, vehicle: Vehicle, visits: int, driven: float) -> float:
+    if instance.failure == "per_leg":
+        return float(vehicle.availability**visits)
+    mtbf = vehicle.mtbf_s
+    if mtbf is None:
+        if vehicle.availability in (0.0, 1.0):
+            return float(vehicle.availability)
+        mtbf = -vehicle.mission_limit_s / float(np.log(vehicle.availability))
+    return float(np.exp(-driven / mtbf)) if mtbf > 0 else 0.0
+
+
+def _best_ways(instance: Instance, vehicle: Vehicle) -> dict[frozenset[int], float]:
+    """Greatest value of a route for every set of POIs: labels (site, visited, fuel, time, driven, value)."""
+    pois = set(instance.pois)
+    found = {frozenset[int](): 0.0}
+    front: dict[tuple[int, frozenset[int]], list[tuple[float, float, float, float]]] = {}
+    waiting = [(instance.base, frozenset[int](), 0.0, 0.0, 0.0, 0.0)]
+    while waiting:
+        site, visited, fuel, time, driven, value = waiting.pop()
+        for j, burnt, later in moves(instance, vehicle, site, visited, fuel, time):
+            far = driven + float(vehicle.fuel_s[site, j])
+            if j == instance.base:
+                if visited:
+                    lost = vehicle.loss_cost * (1 - _chance(instance, vehicle, len(visited), far))
+                    found[visited] = max(found.get(visited, -np.inf), value - lost)
+                continue
+            now = visited | {j} if j in pois else visited
+            left = burnt if j in pois else 0.0
+            earned = value
+            if j in pois:
+                earned += _chance(instance, vehicle, len(now), far) * float(vehicle.incentives[j])
+            labels = front.setdefault((j, now), [])
+            if any(t <= later and f <= left and d <= far and v >= earned for t, f, d, v in labels):
+                continue
+            labels.append((later, left, far, earned))
+            waiting.append((j, now, left, later, far, earned))
+    return found

@@ -29,6 +29,7 @@ from sva_bench.solver.columns.graph import graph_of, neighbours
 from sva_bench.solver.columns.listing import counts
 from sva_bench.solver.columns.pricing import Priced, price
 from sva_bench.solver.columns.subset_row import cut_duals_of
+from sva_bench.solver.discounts import Discount
 from sva_bench.solver.flow import branch_and_cut, lshaped
 from sva_bench.solver.preprocess import scope_of
 from sva_bench.solver.risk import RiskMeasure
@@ -118,7 +119,7 @@ def test_labels_stop_growing_when_ctrl_c_is_pressed_or_time_is_up() -> None:
     # Nothing is charged for, so hardly any label falls to another: millions would grow.
     instance = hard(pois=100)
     vehicle = instance.vehicles[1]
-    graph = graph_of(instance, scope_of(instance, vehicle, vehicle.incentives > 0), 0.99)
+    graph = graph_of(instance, scope_of(instance, vehicle, vehicle.incentives > 0), Discount(survival=0.99))
     n = len(instance.sites)
 
     def labels(left_s: float) -> Priced:

@@ -50,7 +50,7 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
     instance, rng = small(seed), np.random.default_rng(seed)
     n, pois = len(instance.sites), np.array(instance.pois)
     vehicle = instance.vehicles[0]
-    graph = graph_of(instance, scope_of(instance, vehicle, np.isin(np.arange(n), pois)), 1.0)
+    graph = graph_of(instance, scope_of(instance, vehicle, np.isin(np.arange(n), pois)))
     reward, dual = np.zeros(n), np.zeros(n)
     reward[pois], dual[pois] = rng.uniform(1, 9, len(pois)), rng.uniform(0, 5, len(pois))
     cuts = []
@@ -78,7 +78,7 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
 def test_enumeration_finds_every_set_of_pois_above_the_threshold(seed: int) -> None:
     instance, rng = small(seed), np.random.default_rng(seed)
     n, pois = len(instance.sites), np.array(instance.pois)
-    graph = graph_of(instance, scope_of(instance, instance.vehicles[0], np.isin(np.arange(n), pois)), 1.0)
+    graph = graph_of(instance, scope_of(instance, instance.vehicles[0], np.isin(np.arange(n), pois)))
     reward, dual = np.zeros(n), np.zeros(n)
     reward[pois], dual[pois] = rng.uniform(1, 9, len(pois)), rng.uniform(0, 9, len(pois))
     cut_duals = cut_duals_of((), np.zeros(0), 0, n)

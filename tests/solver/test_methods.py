@@ -8,7 +8,7 @@ from typing import get_args
 
 import pytest
 
-from sva_bench.choices import Method
+from sva_bench.choices import FailureProcess, Method
 from sva_bench.errors import BadInput
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.instance import Instance
@@ -38,12 +38,15 @@ def test_every_method_has_a_description(method: Method) -> None:
 
 
 @every_method
-def test_failures_along_the_route_go_to_the_methods_that_serve_them(method: Method) -> None:
-    instance = replace(OPEN_FIELD, failure="per_leg")
+@pytest.mark.parametrize(("failure", "how"), [("per_leg", "per leg"), ("hazard", "after exponential lifetimes")])
+def test_failures_along_the_route_go_to_the_methods_that_serve_them(
+    method: Method, failure: FailureProcess, how: str,
+) -> None:
+    instance = replace(OPEN_FIELD, failure=failure)
     if METHODS[method].discounts:
         assert plan_stochastic(instance, method=method).value == pytest.approx(plan_stochastic(instance).value)
     else:
-        with pytest.raises(BadInput, match=f"{method} plans under mission, the instance fails per leg"):
+        with pytest.raises(BadInput, match=f"{method} plans under mission, the instance fails {how}"):
             plan_stochastic(instance, method=method)
 
 

@@ -10,6 +10,8 @@ from sva_bench.analysis.precision import Precision
 from sva_bench.analysis.results import Loss
 from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
+from sva_bench.mission.certify import certify
+from sva_bench.mission.failures import PROCESSES, JointState
 from sva_bench.study.options import Options
 from sva_bench.study.run import measure
 from sva_bench.world.model import World
@@ -114,13 +116,32 @@ def test_the_wrong_assumption_costs_what_the_plan_for_the_right_one_collects_mor
     for scenario in summary.scenarios:
         rows = scenario.assumptions or ()
         assert [(row.executed_under, row.planner, row.planned_for) for row in rows] == [
-            (process, planner, made_for) for process in ("mission", "per_leg") for planner, made_for in (
-                ("stochastic", "mission"), ("stochastic", "per_leg"), ("deterministic", None))]
+            (process, planner, made_for) for process in PROCESSES for planner, made_for in (
+                *(("stochastic", name) for name in PROCESSES), ("deterministic", None))]
         for row in rows:
             assert row.loss_modelled >= -1e-9
             if row.planned_for == row.executed_under:
                 assert row.loss == Loss(mean=0.0, ci95=(0.0, 0.0), distinguishable=False, same_plan=True)
         # Under mission the table repeats what the run itself executed.
-        for row, name in ((rows[0], "stochastic"), (rows[2], "deterministic")):
-            assert row.executed == scenario.plans[name].executed
-        assert rows[3].loss_modelled == pytest.approx(scenario.value_of_process)
+        by_plan = {(row.executed_under, row.planned_for): row for row in rows}
+        assert by_plan["mission", "mission"].executed == scenario.plans["stochastic"].executed
+        assert by_plan["mission", None].executed == scenario.plans["deterministic"].executed
+        assert by_plan["per_leg", "mission"].loss_modelled == pytest.approx(scenario.value_of_process)
+
+
+def test_a_process_under_which_availabilities_mean_nothing_is_no_assumption(
+        world: World, caplog: pytest.LogCaptureFixture) -> None:
+    half = replace(world.scenarios[0], joint=(JointState(probability=0.4, available=frozenset({"uv1", "uv2"})),
+                                              JointState(probability=0.6, available=frozenset({"uv1"}))))
+    options = replace(QUICK, assumptions=True, trials=50)
+    done = measure(replace(world, scenarios=(half,)), options, None, lambda *_: None)
+    rows = done.summary.scenarios[0].assumptions or ()
+    assert {row.executed_under for row in rows} == {"mission", "per_leg"}
+    assert "no assumption of hazard failures" in caplog.text
+
+
+def test_instances_name_the_process_that_plans_were_made_for(world: World) -> None:
+    along = replace(world, plan_failure="per_leg", execute_failure="per_leg", scenarios=world.scenarios[:1])
+    (planned,) = measure(along, replace(QUICK, trials=20), None, lambda *_: None).planned.values()
+    assert planned.instance.failure == "per_leg"
+    assert certify(planned.instance, planned.stochastic).feasible  # which checks the value that it claims

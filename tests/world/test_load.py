@@ -11,11 +11,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from ruamel.yaml import YAML
 
+from sva_bench.choices import NEWS, POLICY_NAMES
 from sva_bench.errors import BadFile
+from sva_bench.mission.failures import mtbf_s
 from sva_bench.robot.model import BUILT_IN
+from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.world.load import draw_incentives, load_world, world_as_dict
-from sva_bench.world.model import World
-from sva_bench.world.schema import Drawn
+from sva_bench.world.model import World, WorldReaction, nominal_of
+from sva_bench.world.schema import Drawn, WorldFile
 from tests.worlds_for_tests import SMALL, world_of
 
 SHIPPED = sorted((Path(__file__).parents[2] / "worlds").glob("*.yaml"))
@@ -103,8 +106,19 @@ def test_a_world_file_gives_its_world(tmp_path: Path) -> None:
     ("bounds_m: [0, 0, 6, 6]", "bounds_m: [0, 0, 6, 0]", "map.shapes.bounds_m", "min below max"),
     ("bounds_m: [0, 0, 6, 6]", "bounds_m: [0, 0, 6, 1.0e9]", "map.shapes.bounds_m", "at most 2000 m"),
     ("wheel_gain_sd: 0.01", "wheel_gain_sd: 0.5", "noise.wheel_gain_sd", "expected at most 0.2"),
-    ("name: small\n", "name: small\nfailure: sometimes\n", "failure", "'mission' or 'per_leg'"),
+    ("name: small\n", "name: small\nfailure: sometimes\n", "failure", "'mission', 'per_leg' or 'hazard'"),
+    ("    availability: 0.75\n", "    availability: 0.75\n    mtbf_s: -1\n", "robots.uv2.mtbf_s",
+     "expected at least 0"),
+    ("    availability: 0.75\n", "    availability: 0.75\n    loss_cost: -1\n", "robots.uv2.loss_cost",
+     "expected at least 0"),
     ("name: small\n", "name: small\ninteraction: shared\n", None, "this version knows only"),
+    ("name: small\n", "name: small\nreaction: {policy: resolv}\n", "reaction.policy", "'none' or 'resolve'"),
+    ("name: small\n", "name: small\nreaction: {policy: resolve, news: soon}\n", "reaction.news",
+     "'report' or 'instant'"),
+    ("name: small\n", "name: small\nreaction: {polcy: resolve}\n", "reaction.polcy", "did you mean 'policy'"),
+    ("name: small\n", "name: small\nreaction: resolve\n", "reaction", "expected a mapping"),
+    ("name: small\n", "name: small\nreaction: {policy: none, news: report}\n", "reaction.news", "no use for news"),
+    ("name: small\n", "name: small\nreaction: {news: instant}\n", "reaction.news", "choose 'policy: resolve'"),
     ("name: small\n", "name: small\nmargin: -0.1\n", "margin", "expected at least 0"),
 ])
 def test_each_complaint_names_line_and_key(tmp_path: Path, old: str, new: str, key: str | None, says: str) -> None:
@@ -122,7 +136,7 @@ def test_each_complaint_names_line_and_key(tmp_path: Path, old: str, new: str, k
     ("size_m: [1.2, 0.5]", "size_m: [1.2, 0]", "map.shapes.obstacles[1].size_m[1]", "expected at least 1e-06"),
     ("[[3.0, 0.0], [3.0, 2.6]]", "[[3.0, 0.0], [3.0, 0.0]]", "map.shapes.obstacles[0].wall", "the same point"),
     ("name: small\n", "name: small\nfailure: {plan: mission, execute: never}\n", "failure.execute",
-     "'mission' or 'per_leg'"),
+     "'mission', 'per_leg' or 'hazard'"),
     ("model: turtlebot2\n    fuel_capacity_s: 60\n    mission_limit_s: 120\n    avail",
      "model: {radius_m: 0.2}\n    fuel_capacity_s: 60\n    mission_limit_s: 120\n    avail",
      "robots.uv2.model.wheel_radius_m", "is missing; add it"),
@@ -235,6 +249,101 @@ def test_failure_processes_of_planning_and_execution_may_differ(tmp_path: Path) 
     assert (world.plan_failure, world.execute_failure) == ("mission", "per_leg")
 
 
+# Lifetimes
+
+
+UNLIMITED = SMALL.replace("    mission_limit_s: 120\n    availability: 0.75\n", "    availability: 0.75\n")
+
+
+@pytest.mark.parametrize("failure", ["hazard", "{plan: mission, execute: hazard}", "{plan: hazard, execute: per_leg}"])
+def test_an_availability_without_a_mission_limit_is_refused_where_lifetimes_are_drawn(
+        tmp_path: Path, failure: str) -> None:
+    text = f"{UNLIMITED}failure: {failure}\n"
+    error = complaint(tmp_path, text)
+    assert (error.key, error.line) == ("robots.uv2.availability", line_of(text, "availability: 0.75"))
+    assert "set mission_limit_s or mtbf_s of the robot" in str(error)
+    with_mtbf = text.replace("availability: 0.75", "mtbf_s: 300").replace("  half: {uv2: 0.5}\n", "")
+    assert world_of(tmp_path, with_mtbf).robots[1].mtbf_s == 300.0
+    # An availability of a scenario replaces the mean, so it has no meaning either.
+    error = complaint(tmp_path, text.replace("availability: 0.75", "mtbf_s: 300"))
+    assert error.key == "scenarios.half.uv2"
+
+
+def test_availabilities_of_0_and_1_need_no_mission_limit(tmp_path: Path) -> None:
+    text = UNLIMITED.replace("availability: 0.75", "availability: 0.0").replace("half: {uv2: 0.5}", "half: {uv2: 0}")
+    means = [mtbf_s(s.reliability(world.robots[1])) for world in (world_of(tmp_path, text + "failure: hazard\n"),)
+             for s in world.scenarios]
+    assert means == [0.0, math.inf]
+
+
+def test_a_joint_scenario_is_refused_where_lifetimes_are_drawn(tmp_path: Path) -> None:
+    error = complaint(tmp_path, VARIANTS["joint"] + "failure: hazard\n")
+    assert error.key == "scenarios.half.joint"
+
+
+def test_a_scenario_replaces_the_mean_time_to_failure_of_the_robots_it_names(tmp_path: Path) -> None:
+    world = world_of(tmp_path, LASTING)
+    half, safe = world.scenarios
+    # uv1 keeps its 300 s; uv2 survives 120 s of driving with probability 0.5, or always.
+    assert [mtbf_s(half.reliability(robot)) for robot in world.robots] == pytest.approx([300, 120 / math.log(2)])
+    assert mtbf_s(safe.reliability(world.robots[1])) == math.inf
+    assert mtbf_s(nominal_of(world.robots).reliability(world.robots[1])) == 90.0
+    # Under the other processes it is as available as it survives the mission limit, unless said otherwise.
+    assert [robot.availability for robot in world.robots] == pytest.approx([math.exp(-120 / 300), 0.75])
+    assert [robot.loss_cost for robot in world.robots] == [0.0, 25.0]
+
+
+def test_planning_costs_and_means_hold_the_same_margin(tmp_path: Path) -> None:
+    world = world_of(tmp_path, LASTING.replace("name: small\n", "name: small\nmargin: 0.1\n"))
+    costs = plan_costs(world, "prmstar", lambda *_: None)
+    instance = instance_of(world, costs, world.scenarios[0])
+    assert [v.mtbf_s for v in instance.vehicles] == pytest.approx([330, 1.1 * 120 / math.log(2)])
+    assert [v.loss_cost for v in instance.vehicles] == [0.0, 25.0]
+    # Of a world whose failures don't depend on driving, an instance says what the world says.
+    plain = world_of(tmp_path, SMALL)
+    assert [v.mtbf_s for v in instance_of(plain, costs, plain.scenarios[0]).vehicles] == [None, None]
+
+
+def test_what_is_not_set_is_not_written(tmp_path: Path) -> None:
+    text = json.dumps(world_as_dict(world_of(tmp_path, SMALL)))
+    assert "mtbf_s" not in text
+    assert "loss_cost" not in text
+
+
+# Reactions
+
+
+@pytest.mark.parametrize(("section", "reaction"), [
+    ("", WorldReaction()), ("reaction:\n", WorldReaction()), ("reaction: {}\n", WorldReaction()),
+    ("reaction: {policy: none}\n", WorldReaction()), ("reaction: {policy: none, news: never}\n", WorldReaction()),
+    ("reaction: {policy: resolve}\n", WorldReaction(policy="resolve", news="report")),
+    ("reaction: {policy: resolve, news: }\n", WorldReaction(policy="resolve", news="report")),
+    *((f"reaction: {{policy: resolve, news: {news}}}\n", WorldReaction(policy="resolve", news=news)) for news in NEWS),
+])
+def test_a_team_reacts_as_the_world_says_and_not_at_all_where_it_says_nothing(
+    tmp_path: Path, section: str, reaction: WorldReaction
+) -> None:
+    world = world_of(tmp_path, SMALL + section)
+    assert world.reaction == reaction
+    # Names of runs depend on the resolved world: one in which nobody reacts is as it was before anybody could.
+    assert ("reaction" in world_as_dict(world)) == (reaction.policy != "none")
+
+
+def test_news_at_stations_takes_a_station(tmp_path: Path) -> None:
+    text = SMALL.replace("  stations:\n    r1: {at_m: [3.2, 5.2], stop_s: 4}\n", "")
+    assert world_of(tmp_path, text + "reaction: {policy: resolve}\n").stations == ()
+    text += "reaction:\n  policy: resolve\n  news: station\n"
+    found = complaint(tmp_path, text)
+    assert (found.key, found.line) == ("reaction.news", line_of(text, "news: station"))
+    assert "place one under sites.stations" in found.problem
+
+
+def test_the_schema_of_worlds_knows_every_policy_and_all_news() -> None:
+    entry = WorldFile.model_json_schema()["$defs"]["ReactionEntry"]
+    assert entry["properties"]["policy"]["enum"] == list(POLICY_NAMES)
+    assert entry["properties"]["news"]["anyOf"][0]["enum"] == list(NEWS)
+
+
 # Drawn incentives
 
 
@@ -269,7 +378,7 @@ def assert_same_world(a: World, b: World, *, exactly: bool) -> None:
     close([s.heading_rad for s in a.sites], [s.heading_rad for s in b.sites])
     assert [vars(r) for r in a.robots] == [vars(r) for r in b.robots]
     assert [vars(s) for s in a.scenarios] == [vars(s) for s in b.scenarios]
-    for name in ("name", "plan_failure", "execute_failure", "margin", "noise"):
+    for name in ("name", "plan_failure", "execute_failure", "margin", "noise", "reaction"):
         assert getattr(a, name) == getattr(b, name)
 
 
@@ -284,12 +393,17 @@ def written(folder: Path, world: World, kind: str) -> World:
     return load_world(path)
 
 
+LASTING = SMALL.replace("120\n    incentives", "120\n    mtbf_s: 300\n    incentives").replace(
+    "    availability: 0.75\n", "    availability: 0.75\n    mtbf_s: 90\n    loss_cost: 25\n") + "failure: hazard\n"
 VARIANTS = {
+    "lasting": LASTING,
+    "lasting in every scenario": LASTING.replace("half: {uv2: 0.5}", "half: {}"),
     "as it is": SMALL,
     "drawn": SMALL.replace("incentives: {p1: 10, p2: 20, p3: 30, p4: 40}",
                            "incentives: {uniform: [0, 150], zero_share: 0.5, seed: 1}"),
     "joint": SMALL.replace("half: {uv2: 0.5}", "half: {joint: [{probability: 0.6, available: [uv1, uv2]}, "
                                                "{probability: 0.4, available: [uv1]}]}"),
+    "reacting": SMALL + "reaction: {policy: resolve, news: station}\n",
     "no limits": SMALL.replace("fuel_capacity_s: 60\n    mission_limit_s: 120\n    incentives", "incentives"),
 }
 

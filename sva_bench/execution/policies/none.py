@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from sva_bench.execution.policies.policy import TeamState
+from sva_bench.execution.policies.policy import Orders, TeamState
 
 
-def none(state: TeamState) -> Mapping[str, tuple[str, ...]]:
+def none(state: TeamState) -> Orders:
     """What was left anyway."""
-    return {robot.robot: robot.remaining for robot in state.robots}
+    return {robot.robot: robot.remaining for robot in state.robots if robot.reached}

@@ -1,4 +1,4 @@
-"""What a policy is: from the state of a team at an epoch to what is left of its orders."""
+"""What a policy is: from the state of a team, as it knows it, to what is left of its orders."""
 
 from __future__ import annotations
 
@@ -6,20 +6,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from sva_bench.choices import End
+from sva_bench.choices import Standing
+
+Orders = Mapping[str, tuple[str, ...]]
+"""Sites that robots are to go to from their next stops on, the base last; who is left out keeps its orders."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotState:
-    """One robot at an epoch, or at its next one: legs are atomic.
+    """One robot as its team knows it: where it can take new orders next, by schedule or by its own report.
 
     Attributes:
         robot: Its name.
-        site: Site of its next epoch; where it was last, if its mission is over.
-        ready_s: When that epoch is [s on the mission clock].
-        burnt_s: Fuel burnt since it was filled last [s of driving].
-        remaining: Sites that it is to go to from there, the base last.
-        end: How its mission ended; ``None`` as long as it goes on.
+        site: The stop at which it can: where it stands, or where it is going, for a leg is driven to its end.
+        ready_s: When its stop there is over [s on the mission clock]: by the schedule, or later if it was late before.
+        burnt_s: Fuel burnt since it was filled last, then [s of driving].
+        remaining: Its orders from there on, the base last; empty if it goes home, or waits there.
+        standing: What is known of it.
+        reached: Whether it takes new orders now.
     """
 
     robot: str
@@ -27,27 +31,32 @@ class RobotState:
     ready_s: float
     burnt_s: float
     remaining: tuple[str, ...]
-    end: End | None
+    standing: Standing
+    reached: bool
 
 
 @dataclass(frozen=True, kw_only=True)
 class TeamState:
-    """A team at an epoch: a robot stands at a stop, its stop time over.
+    """A team to which news of a failure has come.
 
     Attributes:
         time_s: Mission clock [s].
-        at_epoch: Position of the robot whose epoch it is.
         robots: Every robot, in the order of the team.
+        open_pois: POIs that no robot has visited, and none that isn't known to be dead is on its way to.
     """
 
     time_s: float
-    at_epoch: int
     robots: tuple[RobotState, ...]
+    open_pois: frozenset[str]
 
 
 class Policy(Protocol):
-    """A rule that says what is left of each robot's orders. A pure function: the same state, the same orders."""
+    """A rule that says what is left of each robot's orders.
 
-    def __call__(self, state: TeamState) -> Mapping[str, tuple[str, ...]]:
-        """Sites that robots are to go to from their next epochs on, the base last; who is left out keeps its orders."""
+    It is asked when news of a failure comes, never because time has passed, so the plan stays the plan. A pure
+    function, and not of the time: the same robots and POIs, the same orders.
+    """
+
+    def __call__(self, state: TeamState) -> Orders:
+        """The orders of robots that are reached."""
         ...

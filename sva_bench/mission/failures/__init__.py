@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from sva_bench.arrays import IntArray
 from sva_bench.choices import FailureProcess
+from sva_bench.mission.failures.hazard import HazardFailure, availability_by, mtbf_s
 from sva_bench.mission.failures.joint import JointState, marginals
 from sva_bench.mission.failures.mission import MissionFailure
 from sva_bench.mission.failures.per_leg import PerLegFailure
@@ -35,17 +36,22 @@ __all__ = [
     "Process",
     "Reliability",
     "RouteProfile",
+    "availability_by",
     "draw_failures",
+    "fails_by_driving",
     "failure_uniforms",
     "marginals",
+    "mtbf_s",
     "process_of",
     "route_value",
+    "undefined_under",
     "without_joint",
 ]
 
 _ALL: tuple[Process, ...] = (
     MissionFailure(),
     PerLegFailure(),
+    HazardFailure(),
 )
 PROCESSES: Mapping[FailureProcess, Process] = {process.name: process for process in _ALL}
 """The processes by name, in the order in which results list them."""
@@ -57,6 +63,22 @@ MODEL: FailureProcess = MissionFailure().name
 def process_of(name: FailureProcess) -> Process:
     """The process of that name."""
     return PROCESSES[name]
+
+
+def fails_by_driving(name: FailureProcess, reliability: Reliability) -> bool:
+    """Whether how a robot fails under a process depends on how long it drives."""
+    rate = process_of(name).terms([reliability]).rate
+    return rate is not None and float(rate[0]) > 0
+
+
+def undefined_under(names: Iterable[FailureProcess], reliability: Reliability) -> str | None:
+    """Why the failures of a robot are unknown under one of some processes; ``None`` if they are known."""
+    for name in names:
+        try:
+            process_of(name).terms([reliability])
+        except ValueError as error:
+            return f"under {name}, {error}"
+    return None
 
 
 def without_joint(names: Iterable[FailureProcess]) -> FailureProcess | None:

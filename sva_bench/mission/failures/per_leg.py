@@ -16,6 +16,7 @@ from sva_bench.mission.failures.process import (
     RouteProfile,
     availabilities,
     failure_uniforms,
+    loss_costs,
     no_failures,
 )
 
@@ -39,16 +40,19 @@ class PerLegFailure:
         return fails
 
     def route_value(self, route: RouteProfile, reliability: Reliability) -> float:
-        """``sum_k s^k e_k``.
+        """``sum_k s^k e_k - c (1 - s^n)``; stations and the way home are without risk.
 
         Source:
-            Section 5.2 of the paper.
+            Section 5.2 of the paper, without a cost of losses.
         """
-        return float(sum(reliability.availability**k * e for k, e in enumerate(route.incentives, start=1)))
+        s, n = reliability.availability, len(route.incentives)
+        earned = float(sum(s**k * e for k, e in enumerate(route.incentives, start=1)))
+        return earned - reliability.loss_cost * (1 - s**n) if reliability.loss_cost else earned
 
     def terms(self, reliability: Sequence[Reliability]) -> PlanningTerms:
         """All of an incentive is earned if the vehicle gets there, with probability ``s`` from each POI to the next."""
-        return PlanningTerms(share=np.ones(len(reliability)), survival=availabilities(reliability))
+        return PlanningTerms(share=np.ones(len(reliability)), survival=availabilities(reliability),
+                             loss_cost=loss_costs(reliability))
 
     def can_leave(self, reliability: Reliability) -> bool:  # noqa: ARG002
         """Always ``True``: it fails on the way to a POI."""

@@ -23,12 +23,17 @@ class Reliability:
     """The reliability parameters of one vehicle; each process has its own interpretation.
 
     Attributes:
-        availability: Probability of no failure: in the whole mission, or on the way to the next POI.
+        availability: Probability of no failure: in the whole mission, on the way to the next POI, or driving for the
+            whole mission limit.
         mission_limit_s: Longest mission [s]; ``inf`` = no limit.
+        mtbf_s: Mean driving time to failure [s]; ``None`` = by availability and mission limit.
+        loss_cost: Cost of a robot that left the base and doesn't come home [incentive].
     """
 
     availability: float
     mission_limit_s: float = math.inf
+    mtbf_s: float | None = None
+    loss_cost: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,17 +92,35 @@ class Failures:
 class PlanningTerms:
     """The expected rewards under a process: all that a solver knows of it.
 
-    The k-th POI of vehicle m's route earns ``share[m] * survival[m]**k`` times its incentive. A process that discounts
-    by driving time needs a field of its own here (a rate a second), in ``solver/goal.py`` and in pricing.
+    The k-th POI of vehicle m's route, reached after ``T`` seconds of driving, earns ``share[m] * survival[m]**k *
+    exp(-rate[m] * T)`` times its incentive. A vehicle that leaves pays ``loss_cost[m]`` and gets it back at home, times
+    the same discount.
 
     Attributes:
         share: Share of every incentive that a vehicle earns on average, independent of its route, shape (M,).
-        survival: Probability of a vehicle to get to its next POI, shape (M,); ``None`` = 1, and the order of visits
-            makes no difference.
+        survival: Probability of a vehicle to get to its next POI, shape (M,); ``None`` = 1. Where it, ``rate`` and
+            ``loss_cost`` are ``None``, the order of visits makes no difference.
+        rate: Failures in a second of driving, shape (M,); ``None`` = 0; ``inf`` = nothing is ever reached.
+        loss_cost: Cost of a vehicle that doesn't come home, shape (M,); ``None`` = 0.
     """
 
     share: FloatArray
     survival: FloatArray | None = None
+    rate: FloatArray | None = None
+    loss_cost: FloatArray | None = None
+
+    def most(self, vehicle: int) -> float:
+        """Upper bound on the share of an incentive that a visit of a vehicle earns on average."""
+        survival = 1.0 if self.survival is None else float(self.survival[vehicle])
+        return 0.0 if self.rate_of(vehicle) == math.inf else float(self.share[vehicle]) * survival
+
+    def rate_of(self, vehicle: int) -> float:
+        """Failures of a vehicle in a second of driving."""
+        return 0.0 if self.rate is None else float(self.rate[vehicle])
+
+    def certain(self, vehicle: int) -> bool:
+        """Whether no failure makes a difference to a vehicle: it never fails, or is never of use."""
+        return self.most(vehicle) <= 0 or (self.most(vehicle) >= 1 and self.rate_of(vehicle) == 0)
 
 
 class Process(Protocol):
@@ -128,7 +151,7 @@ class Process(Protocol):
         """
 
     def route_value(self, route: RouteProfile, reliability: Reliability) -> float:
-        """Expected incentive of one route, in closed form.
+        """Expected value of one route, in closed form: its incentives less the cost of a lost robot.
 
         Raises:
             ValueError: If it depends on driving times that aren't known.
@@ -150,6 +173,12 @@ def no_failures(trials: int, vehicles: int) -> Failures:
 def failure_uniforms(seed: int, vehicle: int, poi: int, trials: int, first: int = 0) -> FloatArray:
     """The uniforms that decide the failures of one vehicle before its ``poi``-th POI, shape (trials,)."""
     return uniforms(seed, Stream.FAILURE, vehicle, poi, first=first, count=trials)
+
+
+def loss_costs(reliability: Sequence[Reliability]) -> FloatArray | None:
+    """Cost of each vehicle's loss, shape (M,); ``None`` where none costs anything."""
+    costs = np.array([vehicle.loss_cost for vehicle in reliability], dtype=np.float64)
+    return costs if costs.any() else None
 
 
 def availabilities(reliability: Sequence[Reliability]) -> FloatArray:

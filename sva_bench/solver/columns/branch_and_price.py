@@ -124,9 +124,8 @@ class BranchAndPrice:
             before = best
 
     def _cutting(self) -> bool:
-        """Whether to separate cuts: worthwhile with many vehicles; labels with survival < 1 carry no duals of cuts."""
-        survival = self.generation.survival
-        return len(survival) >= CUTTING and bool((survival == 1.0).all())
+        """Whether to separate cuts: worthwhile with many vehicles; discounted labels carry no duals of cuts."""
+        return len(self.generation.scopes) >= CUTTING and self.generation.is_plain
 
     def _enumerate(self, state: BranchState, made: Generated) -> float | None:
         """Solve the node over all routes that can be in a better plan, if few: its upper bound, else ``None``."""

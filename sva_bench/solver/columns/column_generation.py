@@ -67,7 +67,6 @@ class ColumnGeneration:
         instance: The instance.
         goal: What to maximise.
         scopes: Legs and bounds of each vehicle.
-        survival: Chance of each vehicle to get to its next POI, shape (M,).
         cutoff: Bound at or below which a node holds no better plan.
         is_over: Whether time is up.
         left_s: Time left [s].
@@ -84,7 +83,6 @@ class ColumnGeneration:
     instance: Instance
     goal: Goal
     scopes: Sequence[Scope]
-    survival: FloatArray
     cutoff: Callable[[], float]
     is_over: Callable[[], bool]
     left_s: Callable[[], float]
@@ -100,7 +98,7 @@ class ColumnGeneration:
         floors = np.array([weights for weights, _ in self.goal.floors]).reshape(
             len(self._floors), len(self.instance.vehicles), n)
         for m in range(len(self.instance.vehicles)):
-            graph = graph_of(self.instance, self.scopes[m], float(self.survival[m]))
+            graph = graph_of(self.instance, self.scopes[m], self.goal.discount(m))
             own = VehicleClass(vehicles=(m,), weights=self.goal.weights[m], floors=floors[:, m])
             same = [k for k, other in enumerate(self.classes) if _identical(other, own, self.graphs[k], graph)]
             if same:
@@ -125,6 +123,11 @@ class ColumnGeneration:
         self._sizes = sizes_of(self.goal.floors)
         if self.goal.risk is not None:  # its columns have entries in several floors' rows: one scale for all
             self._sizes[:] = self._sizes.max(initial=0.0)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether no vehicle's rewards depend on the way to them."""
+        return all(graph.is_plain for graph in self.graphs)
 
     @property
     def priced(self) -> int:
@@ -268,7 +271,7 @@ class ColumnGeneration:
         """All columns of each vehicle group that a plan above the cutoff can use; ``None`` if they are too many."""
         room = made.bound - self.cutoff()
         if made.duals is None or room > min(ENUMERATED * abs(self.cutoff()), RETRIED * self._too_many) \
-                or not bool((self.survival == 1.0).all()):
+                or not self.is_plain:
             return None
         found: list[tuple[tuple[int, ...], ...]] = []
         for number, group in enumerate(state.groups):
@@ -299,11 +302,13 @@ class ColumnGeneration:
             floors = np.zeros(len(self._floors))
             for i, j in itertools.pairwise(route):
                 value -= self.goal.driving * graph.time_s[i, j]
+                chance *= graph.survival[i, j]
                 if graph.bit[j] >= 0:
-                    chance *= graph.survival
                     value += chance * own.weights[j]
                     visits[j] += 1
                     floors += own.floors[:, j]
+            if not graph.is_plain:
+                value += graph.discount.home * chance - graph.discount.departure
             self.pool[key] = Column(vehicle_class=vehicle_class, route=route, visits=visits, value=float(value),
                                     floors=floors)
         return self.pool[key]
@@ -371,7 +376,7 @@ class ColumnGeneration:
 
 def _identical(one: VehicleClass, other: VehicleClass, graph: Graph, other_graph: Graph) -> bool:
     return np.array_equal(one.weights, other.weights) and np.array_equal(one.floors, other.floors) \
-        and (graph.capacity_s, graph.limit_s, graph.survival) == \
-        (other_graph.capacity_s, other_graph.limit_s, other_graph.survival) \
+        and (graph.capacity_s, graph.limit_s, graph.discount) == \
+        (other_graph.capacity_s, other_graph.limit_s, other_graph.discount) \
         and np.array_equal(graph.legs, other_graph.legs) and np.array_equal(graph.time_s, other_graph.time_s) \
         and np.array_equal(graph.fuel_s, other_graph.fuel_s)

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.mission.instance import Instance
+from sva_bench.solver.discounts import NO_DISCOUNT, Discount, greatest_survival, leg_survival
 from sva_bench.solver.preprocess import SLACK_S, Scope, is_metric
 
 NG_START, NG_MOST = 7, 14  # POIs that a site remembers at first, and at most
+_MOST_VISITS = 1_000_000  # counted on a route whose legs may take no time
 _WITHIN = 0.9  # share of the feasibility tolerance used here: sums in another order differ by rounding
 
 
@@ -29,8 +31,13 @@ class Graph:
         fuel_s: Fuel of a leg [s], shape (n, n).
         capacity_s: Fuel capacity, tolerance included [s].
         limit_s: Mission limit, tolerance included [s]; finite.
-        survival: Probability to get to the next POI.
-        symmetric: Whether costs are symmetric and rewards independent of the order of visits.
+        discount: The vehicle's discount.
+        survival: Probability to survive a leg, of use or not, shape (n, n).
+        arrival: Greatest probability to get to a site, of the base: back to it, shape (n,).
+        most_visits: Upper bound on the visits of POIs of a route, repeated ones included.
+        least_survival: Least probability to survive a whole route.
+        driving: Least share of driving in the time of a leg, half the stops at its ends included.
+        symmetric: Whether costs are symmetric and rewards independent of the way to them.
         metric: Whether no detour is quicker, or burns less, than a direct leg.
     """
 
@@ -41,18 +48,28 @@ class Graph:
     fuel_s: FloatArray
     capacity_s: float
     limit_s: float
-    survival: float
+    discount: Discount
+    survival: FloatArray
+    arrival: FloatArray
+    most_visits: int
+    least_survival: float
+    driving: float
     symmetric: bool
     metric: bool
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether rewards don't depend on the way to them."""
+        return self.discount.is_plain
 
-def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
+
+def graph_of(instance: Instance, scope: Scope, discount: Discount = NO_DISCOUNT) -> Graph:
     """The pricing graph of a vehicle.
 
     Args:
         instance: The instance.
         scope: The vehicle's legs and bounds.
-        survival: Its probability to get to the next POI.
+        discount: Its discount.
     """
     n = len(instance.sites)
     bit = np.full(n, -1, dtype=np.int64)
@@ -65,11 +82,19 @@ def graph_of(instance: Instance, scope: Scope, survival: float) -> Graph:
     # Without a mission limit this is an upper bound on a route: each POI once, all stations between any two.
     limit = scope.limit_s if math.isfinite(scope.limit_s) else \
         float(time[legs].max(initial=0.0)) * (len(instance.pois) + 1) * (len(instance.stations) + 1)
-    symmetric = survival == 1.0 and np.array_equal(legs, legs.T) and np.array_equal(time[legs], time.T[legs]) \
+    symmetric = discount.is_plain and np.array_equal(legs, legs.T) and np.array_equal(time[legs], time.T[legs]) \
         and np.array_equal(fuel[legs], fuel.T[legs])
+    survival = leg_survival(scope.driven_s, bit >= 0, discount)
+    arrival = np.ones(n) if discount.is_plain else greatest_survival(np.where(legs, survival, 0.0), instance.base)
+    shortest = float(time[:, bit >= 0][legs[:, bit >= 0]].min(initial=np.inf))
+    visits = int(limit / max(shortest, limit / _MOST_VISITS)) + 1
     return Graph(base=instance.base, bit=bit, legs=legs, time_s=np.where(legs, time, 0.0),
                  fuel_s=np.where(legs, fuel, 0.0), capacity_s=scope.capacity_s + _WITHIN * SLACK_S,
-                 limit_s=limit + _WITHIN * SLACK_S, survival=survival, symmetric=bool(symmetric),
+                 limit_s=limit + _WITHIN * SLACK_S, discount=discount, survival=survival,
+                 arrival=arrival,
+                 most_visits=visits, least_survival=discount.chance(visits, limit),
+                 driving=float((drive[legs] / np.maximum(time[legs], 1e-300)).min(initial=1.0)),
+                 symmetric=bool(symmetric),
                  metric=is_metric(scope.fuel_s, instance.base, tolerance_s=0.0))
 
 

@@ -5,8 +5,10 @@ that its site remembers (its ng-set). Labels grow up to half the mission limit f
 the leg that crosses the middle. A label is dominated by another one at its site that is nowhere worse. A label that
 can't exceed a threshold even with the completion bound is dropped, so a run without results proves that no route does.
 
-Under failure along the route a forward label also carries the probability to get so far; a backward label carries what
-the rest of the route is worth if its first site is reached, and its duals.
+Under discounts a forward label also carries the probability ``D`` to get so far; a backward label what the rest is
+worth once its site is reached, ``W``, and apart minus its duals. A route's value is linear in ``W`` and in ``D``, so a
+label is nowhere worse than another if it isn't at either end of their range. The return is a reward within ``W``: a
+cost of losses paid bit by bit would let a label's value fall with ``D``.
 
 Source:
     Baldacci, Mingozzi, Roberti (2011), "New route relaxation and pricing strategies for the vehicle routing problem";
@@ -31,8 +33,11 @@ def completion(legs, time, gain, charge, bit, base, step, steps, stop):
     """Upper bound on what a path from a site to the base can add within a number of time steps, shape (steps + 1, n).
 
     Paths may repeat sites, but have no 2-cycles of POIs; fuel is ignored; a leg's time steps are rounded down.
+
+    Args:
+        gain: What the visit of a site adds, by the time steps left after it, shape (steps + 1, n); or shape (1, n).
     """
-    n = len(gain)
+    n, timed = gain.shape[1], len(gain) > 1
     best, second = np.full((steps + 1, n), -np.inf), np.full((steps + 1, n), -np.inf)
     by = np.full((steps + 1, n), -1, np.int64)
     for t in range(steps + 1):
@@ -47,11 +52,11 @@ def completion(legs, time, gain, charge, bit, base, step, steps, stop):
                 left = t - int(time[i, j] / step - 1e-9)
                 if left < 0:
                     continue
-                value = -charge * time[i, j]
+                value = gain[left if timed else 0, j] - charge * time[i, j]
                 if j != base:
                     # No 2-cycle: out of j to a site other than i, if i is a POI.
                     back = bit[i] >= 0 and by[left, j] == i
-                    value += gain[j] + (second[left, j] if back else best[left, j])
+                    value += second[left, j] if back else best[left, j]
                 if value > best[t, i]:
                     second[t, i] = best[t, i]
                     best[t, i], by[t, i] = value, j
@@ -61,18 +66,25 @@ def completion(legs, time, gain, charge, bit, base, step, steps, stop):
 
 
 @njit(cache=True)
-def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charge, survival, base, half, capacity,
-                  limit, bound, step, threshold, exact, forwards, most, in_cut, in_memory, at_first_visit, cut_dual,
-                  stop, left_s):
+def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charge, discounted, survival, low, high,
+                  start, base, half, capacity, limit, bound, step, threshold, exact, forwards, most_labels, in_cut,
+                  in_memory, at_first_visit, cut_dual, stop, left_s):
     """All nondominated labels from one end of the route up to half the limit.
 
     Long because compiled: its arrays grow, and each part would need nearly all of them.
 
+    Args:
+        discounted: Whether ``survival``, ``low``, ``high`` and ``start`` count.
+        survival: Probability to survive a leg, shape (n, n).
+        low: Least weight of the value, or probability, that the other end of a route multiplies a label's with.
+        high: The greatest, shape (n,).
+        start: What a route's first label is worth.
+
     Returns:
         Site, time, fuel, value, second value, memory, state of the cuts, parent, and labels by site, each site's by
         decreasing value: first the index at which each site's begin. Then whether labels or time ran out. The second
-        value is, forwards, the probability to get so far; backwards, minus the duals of the visits, which is what the
-        rest is worth if never reached.
+        value is, forwards, the probability to get so far; backwards, minus the duals of the visits, and the value is
+        then what the rest is worth if the site is reached, without duals.
     """
     n, words = memory.shape
     room = 4096
@@ -82,7 +94,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
     mask = np.zeros((room, words), np.uint64)
     cut_state = np.zeros(room, np.uint64)  # cuts whose dual is subtracted at the next visit to one of their POIs
     kept = np.zeros(room, np.bool_)
-    site[0], y[0], cut_state[0], size = base, 1.0 if forwards else 0.0, at_first_visit, 1
+    site[0], x[0], y[0], cut_state[0], size = base, start, 1.0 if forwards else 0.0, at_first_visit, 1
     has_cuts = len(cut_dual) > 0
     width = half / BUCKETS
     head = np.full(BUCKETS + 1, -1, np.int64)
@@ -96,8 +108,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
     c_x, c_y = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
     c_mask, c_cut_state = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
     c_least_fuel, c_most_value = np.zeros(chunks), np.zeros(chunks)
-    used, overflow = 0, False
-    polled, end_s = 0, now_s() + left_s
+    used, overflow, polled, end_s = 0, False, 0, now_s() + left_s
     bounded = len(bound) > 0
     new = np.zeros(words, np.uint64)
     for bucket in range(BUCKETS + 1):
@@ -120,6 +131,9 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
                     overflow = True
                     break
                 i = site[label]
+                best, worst = x[label], 0.0
+                if discounted:
+                    best, worst = _at_both_ends(forwards, x[label], y[label], low, high[i])
                 # Dominance, against the labels whose key is a subset of this one's.
                 dominated = False
                 key = 0
@@ -132,11 +146,11 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
                 while not dominated:
                     chunk = chunk_of[i, subset]
                     while chunk >= 0 and not dominated:
-                        if c_most_value[chunk] >= x[label] - _EPSILON and c_least_fuel[chunk] <= q[label] + _EPSILON:
+                        if c_most_value[chunk] >= best - _EPSILON and c_least_fuel[chunk] <= q[label] + _EPSILON:
                             for k in range(chunk_size[chunk]):
-                                if c_x[chunk, k] >= x[label] - _EPSILON and c_q[chunk, k] <= q[label] + _EPSILON \
+                                if c_x[chunk, k] >= best - _EPSILON and c_q[chunk, k] <= q[label] + _EPSILON \
                                         and c_t[chunk, k] <= t[label] + _EPSILON \
-                                        and c_y[chunk, k] >= y[label] - _EPSILON:
+                                        and c_y[chunk, k] >= worst - _EPSILON:
                                     dominated = True
                                     if exact:
                                         for w in range(words):
@@ -145,7 +159,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
                                                 break
                                         if dominated and has_cuts:
                                             more = sum_of(cut_dual, c_cut_state[chunk, k] & ~cut_state[label])
-                                            dominated = c_x[chunk, k] - more >= x[label] - _EPSILON
+                                            dominated = c_x[chunk, k] - more >= best - _EPSILON
                                     if dominated:
                                         break
                         chunk = chunk_next[chunk]
@@ -172,9 +186,9 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
                     c_least_fuel[chunk], c_most_value[chunk] = np.inf, -np.inf
                 k = chunk_size[chunk]
                 chunk_size[chunk] += 1
-                c_t[chunk, k], c_q[chunk, k], c_x[chunk, k], c_y[chunk, k] = t[label], q[label], x[label], y[label]
+                c_t[chunk, k], c_q[chunk, k], c_x[chunk, k], c_y[chunk, k] = t[label], q[label], best, worst
                 c_least_fuel[chunk] = min(c_least_fuel[chunk], q[label])
-                c_most_value[chunk] = max(c_most_value[chunk], x[label])
+                c_most_value[chunk] = max(c_most_value[chunk], best)
                 c_cut_state[chunk, k] = cut_state[label]
                 for w in range(words):
                     c_mask[chunk, k, w] = mask[label, w]
@@ -193,25 +207,28 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
                             continue
                     else:
                         burnt = 0.0
-                    value, second = x[label] - charge * time[i, j], y[label]
-                    if survival == 1.0:
-                        value += reward[j] - dual[j]
-                    elif b >= 0:
-                        if forwards:
-                            second = y[label] * survival
-                            value += second * reward[j] - dual[j]
-                        else:
-                            worth = survival * (reward[j] + x[label] - y[label])
-                            second = y[label] - dual[j]
-                            value = worth + second
+                    second = y[label]
+                    if not discounted:
+                        value = x[label] - charge * time[i, j] + reward[j] - dual[j]
+                        most = value
+                    elif forwards:
+                        second *= survival[i, j]
+                        value = x[label] + second * reward[j] - dual[j]
+                        most = value
+                    else:
+                        value = reward[j] + survival[i, j] * x[label]
+                        second -= dual[j]
+                        most = high[j] * value + second
                     ahead = cut_state[label] & in_memory[j]
                     if has_cuts and in_cut[j]:
-                        value -= sum_of(cut_dual, ahead & in_cut[j])
+                        less = sum_of(cut_dual, ahead & in_cut[j])
+                        value -= less
+                        most -= less
                         ahead = (ahead ^ (in_cut[j] & ~at_first_visit)) & ~(in_cut[j] & at_first_visit)
-                    if bounded and value + bound[int((limit - later) / step + 1e-9), j] <= threshold:
+                    if bounded and most + bound[int((limit - later) / step + 1e-9), j] <= threshold:
                         continue
                     if size == room:
-                        if size >= most:
+                        if size >= most_labels:
                             overflow = True
                             break
                         room *= 2
@@ -242,13 +259,25 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
     for i in range(n):
         begin[i + 1] += begin[i]
     undominated = np.flatnonzero(kept[:size])
-    by_value = undominated[np.argsort(-x[undominated])]
+    worth = x[undominated]
+    if discounted:
+        for k, label in enumerate(undominated):
+            worth[k] = _at_both_ends(forwards, x[label], y[label], low, high[site[label]])[0]
+    by_value = undominated[np.argsort(-worth)]
     placed, by_site = begin.copy(), np.zeros(len(undominated), np.int64)
     for label in by_value:
         by_site[placed[site[label]]] = label
         placed[site[label]] += 1
     return site[:size], t[:size], q[:size], x[:size], y[:size], mask[:size], cut_state[:size], parent[:size], \
         (begin, by_site), overflow
+
+
+@njit(cache=True)
+def _at_both_ends(forwards, x, y, low, high):
+    """A label's value at the greatest, and at the least, that its second factor can become at the other end."""
+    if forwards:
+        return x + high * y, x + low * y
+    return high * x + y, low * x + y
 
 
 @njit(cache=True)
@@ -301,9 +330,12 @@ def _taller(array, size):
 
 
 @njit(cache=True)
-def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, at_first_visit, cut_dual,
-                stop, t, q, x, y, mask, cut_state, of_site, t_b, q_b, x_b, y_b, mask_b, cut_state_b, of_site_b):
+def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, survival, high, home,
+                at_first_visit, cut_dual, stop, t, q, x, y, mask, cut_state, of_site, t_b, q_b, x_b, y_b, mask_b,
+                cut_state_b, of_site_b):
     """For each forward label the backward label that completes it to the best route above the threshold.
+
+    Long because compiled: nested loops over arrays that each part would need.
 
     Returns:
         Value, forward label, and backward label or -1 for a leg straight to the base; of each route found.
@@ -322,6 +354,8 @@ def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold
             best, partner = threshold, -2
             if legs[i, base] and t[label] + time[i, base] <= limit and q[label] + fuel[i, base] <= capacity:
                 total = x[label] - charge * time[i, base]
+                if discounted:
+                    total += y[label] * survival[i, base] * home
                 if total > best:
                     best, partner = total, -1
             for j in range(n):
@@ -334,18 +368,22 @@ def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold
                 so_far = x[label] - charge * time[i, j]
                 # Cuts that count the first visit alone: both labels may have subtracted the dual.
                 refund = sum_of(cut_dual, at_first_visit & ~cut_state[label])
+                chance = y[label] * survival[i, j]
                 for k_b in range(begin_b[j], begin_b[j + 1]):
                     other = by_site_b[k_b]
-                    if so_far + x_b[other] + refund <= best:
+                    most = x_b[other]
+                    if discounted:
+                        most = high[j] * most + y_b[other]
+                    if so_far + most + refund <= best:
                         break
                     if t_b[other] > most_time or q_b[other] > most_fuel:
                         continue
                     total = so_far + x_b[other]
-                    if len(cut_dual) > 0:
+                    if discounted:
+                        total = so_far + chance * x_b[other] + y_b[other]
+                    elif len(cut_dual) > 0:
                         total += sum_of(cut_dual, at_first_visit & ~cut_state[label] & ~cut_state_b[other]) \
                             - sum_of(cut_dual, ~at_first_visit & cut_state[label] & cut_state_b[other])
-                    if discounted:
-                        total = so_far + y[label] * (x_b[other] - y_b[other]) + y_b[other]
                     if total <= best:
                         continue
                     disjoint = True

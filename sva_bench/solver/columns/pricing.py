@@ -17,6 +17,9 @@ from sva_bench.solver.polling import stop_flag
 
 STEPS = 500  # of time, for completion bounds
 MOST_STEPS = 4000
+_MIDDLE = 0.6  # share of the limit up to which labels grow from the start under a discount: from the end, without
+# knowing their probability to be reached, more of them stay undominated
+_TYPICAL = 0.3  # share of the greatest worth of the rest, and probability of a site, at which heuristic runs compare
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,38 +56,47 @@ def price(
         exact: Whether to prove the best ng-route; else a heuristic that finds some good elementary routes quickly.
         most_routes: Most routes to return.
         most_labels: Labels from one end after which an exact run ends without a proof.
-        cut_duals: Duals of the cuts; none where survival is below 1.
+        cut_duals: Duals of the cuts; none under a discount.
         left_s: Time limit, after which the run ends without a proof [s].
 
     Raises:
-        ValueError: If there are cuts and survival is below 1.
+        ValueError: If there are cuts and a discount.
 
     Source:
         Righini, Salani (2006), "Symmetry helps: bounded bi-directional dynamic programming".
     """
-    if len(cut_duals.dual) and graph.survival < 1.0:
+    plain, cost, home = graph.is_plain, graph.discount.departure, graph.discount.home
+    if len(cut_duals.dual) and not plain:
         raise ValueError("discounted labels can't account for the duals of cuts")
     subgraph = pricing_graph(graph, reward, dual, cut_duals)
-    legs, time, fuel, base, half = subgraph.legs, subgraph.time_s, subgraph.fuel_s, subgraph.base, graph.limit_s / 2
+    legs, time, fuel, base = subgraph.legs, subgraph.time_s, subgraph.fuel_s, subgraph.base
+    half = graph.limit_s * (0.5 if plain else _MIDDLE)
     memory = memory[subgraph.sites] if exact else np.full((len(legs), subgraph.words), np.uint64(0xFFFFFFFFFFFFFFFF))
     none = np.zeros((0, len(legs)))
     step, ahead_bound, behind_bound = bounds_of(graph, subgraph, charge) if exact else (1.0, none, none)
     following, count = _adjacent(legs)
-    stop = stop_flag()
+    stop, survival, arrival = stop_flag(), subgraph.survival, subgraph.arrival
+    # What the rest of a route is worth if it is reached, and the probability to reach it: both within a range, over
+    # which a label dominates; heuristic runs take one value of it.
+    typical = _TYPICAL * (home + float(subgraph.reward.sum()))
+    low, high = (home * graph.least_survival, home + graph.most_visits * float(subgraph.reward.max(initial=0.0))) \
+        if exact else (typical, typical)
+    least, most = (graph.least_survival, arrival) if exact else (_TYPICAL, np.full_like(arrival, _TYPICAL))
     ahead = behind = extend_labels(
-        following, count, time, fuel, subgraph.bit, memory, subgraph.reward, subgraph.dual, charge, graph.survival,
-        base, half, graph.capacity_s, graph.limit_s, ahead_bound, step, threshold, exact, True, most_labels,
-        subgraph.in_cut, subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
+        following, count, time, fuel, subgraph.bit, memory, subgraph.reward, subgraph.dual, charge, not plain, survival,
+        low, np.full(len(legs), high), 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s,
+        ahead_bound, step, threshold, exact, True, most_labels, subgraph.in_cut, subgraph.in_memory,
+        cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     if not graph.symmetric:
         following, count = _adjacent(legs.T)
         behind = extend_labels(
             following, count, time.T.copy(), fuel.T.copy(), subgraph.bit, memory, subgraph.reward, subgraph.dual,
-            charge, graph.survival, base, half, graph.capacity_s, graph.limit_s, behind_bound, step, threshold, exact,
-            graph.survival == 1.0, most_labels, subgraph.in_cut, subgraph.in_memory, cut_duals.at_first_visit,
-            cut_duals.dual, stop, left_s)
+            charge, not plain, survival.T.copy(), least, most, 0.0 if plain else home, base, graph.limit_s - half,
+            graph.capacity_s, graph.limit_s, behind_bound, step, threshold, exact, plain, most_labels, subgraph.in_cut,
+            subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     value, left, right = join_labels(
-        legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, graph.survival < 1.0,
-        cut_duals.at_first_visit, cut_duals.dual, stop, *ahead[1:7], ahead[8], *behind[1:7], behind[8])
+        legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, not plain, survival, arrival,
+        home, cut_duals.at_first_visit, cut_duals.dual, stop, *ahead[1:7], ahead[8], *behind[1:7], behind[8])
     order = np.argsort(-value, kind="stable")[:most_routes]
     routes = []
     for k in order:
@@ -106,6 +118,8 @@ class PricingGraph:
         legs: Whether a leg is of use, shape (k, k).
         time_s: Time of a leg [s], shape (k, k).
         fuel_s: Fuel of a leg [s], shape (k, k).
+        survival: Probability to survive a leg, shape (k, k).
+        arrival: Greatest probability to get to a site, shape (k,).
         reward: Reward of each site, shape (k,).
         dual: Dual of each site's visit, shape (k,).
         in_cut: Cuts of which a site is a member, as bits, shape (k,).
@@ -119,6 +133,8 @@ class PricingGraph:
     legs: BoolArray
     time_s: FloatArray
     fuel_s: FloatArray
+    survival: FloatArray
+    arrival: FloatArray
     reward: FloatArray
     dual: FloatArray
     in_cut: NDArray[np.uint64]
@@ -130,15 +146,17 @@ def pricing_graph(
 ) -> PricingGraph:
     """The sites that the best route at these duals can visit, or a route of up to ``loss`` less reduced value."""
     usable = np.isfinite(reward)
-    if graph.metric and (graph.survival == 1.0 or bool((reward[usable] >= 0).all())):
-        # Under the triangle inequality, dropping a POI whose dual exceeds its reward improves any route.
-        usable &= (graph.bit < 0) | (graph.survival * reward > dual - loss)
+    if graph.metric:
+        # Under the triangle inequality, dropping a POI whose dual exceeds its reward improves any route. It shortens
+        # the drive, so under a discount, where no reward is negative, the others are worth as much or more.
+        usable &= (graph.bit < 0) | (graph.arrival * np.where(usable, reward, 0.0) > dual - loss)
     sites = np.flatnonzero(usable)
     across = np.ix_(sites, sites)
     return PricingGraph(
         sites=sites, base=int(np.searchsorted(sites, graph.base)), bit=graph.bit[sites],
         words=max(1, -(-int(graph.bit.max(initial=0) + 1) // 64)), legs=graph.legs[across],
-        time_s=graph.time_s[across], fuel_s=graph.fuel_s[across], reward=reward[sites], dual=dual[sites],
+        time_s=graph.time_s[across], fuel_s=graph.fuel_s[across], survival=graph.survival[across],
+        arrival=graph.arrival[sites], reward=reward[sites], dual=dual[sites],
         in_cut=cut_duals.in_cut[sites], in_memory=cut_duals.in_memory[sites])
 
 
@@ -152,13 +170,37 @@ def bounds_of(graph: Graph, subgraph: PricingGraph, charge: float) -> tuple[floa
         return 1.0, np.zeros((0, len(subgraph.sites))), np.zeros((0, len(subgraph.sites)))
     steps = STEPS if math.isinf(shortest) else max(STEPS, int(np.ceil(graph.limit_s / shortest)) + 1)
     step = graph.limit_s / steps
-    gain = graph.survival * subgraph.reward - subgraph.dual
+    ahead_gain = behind_gain = (subgraph.reward - subgraph.dual)[None, :]
+    if not graph.is_plain:
+        ahead_gain, behind_gain = _discounted_gains(graph, subgraph, step * np.arange(1.0, steps + 2))
     stop = stop_flag()
-    ahead = completion(subgraph.legs, subgraph.time_s, gain, charge, subgraph.bit, subgraph.base, step, steps, stop)
+    ahead = completion(subgraph.legs, subgraph.time_s, ahead_gain, charge, subgraph.bit, subgraph.base, step, steps,
+                       stop)
     if graph.symmetric:
         return step, ahead, ahead
-    return step, ahead, completion(subgraph.legs.T.copy(), subgraph.time_s.T.copy(), gain, charge, subgraph.bit,
+    return step, ahead, completion(subgraph.legs.T.copy(), subgraph.time_s.T.copy(), behind_gain, charge, subgraph.bit,
                                    subgraph.base, step, steps, stop)
+
+
+def _discounted_gains(graph: Graph, subgraph: PricingGraph, left_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Upper bounds on what a visit adds to the rest of a route, shape (steps + 1, k), and to its beginning, (1, k).
+
+    A vehicle reaches a site with no greater probability than by the safest way there, and with none greater than that
+    to have driven all the time before what is left of its mission.
+
+    Args:
+        graph: The vehicle's graph.
+        subgraph: The sites that can be visited.
+        left_s: Upper bound on the time left after a visit, by time steps left [s], shape (steps + 1,).
+    """
+    driven_s = graph.driving * np.maximum(graph.limit_s - left_s, 0.0)
+    rate = 0.0 if graph.discount.is_hopeless else graph.discount.rate
+    chance = np.minimum(np.exp(-rate * driven_s)[:, None], subgraph.arrival[None, :])
+    reward, base = subgraph.reward.copy(), subgraph.base
+    reward[base] = graph.discount.home
+    behind = subgraph.arrival * reward - subgraph.dual
+    behind[base] = -graph.discount.departure
+    return chance * reward - subgraph.dual, behind[None, :]
 
 
 def _adjacent(legs: BoolArray) -> tuple[IntArray, IntArray]:

@@ -6,7 +6,7 @@ import logging
 
 from sva_bench.solver.columns.branch_and_price import BranchAndPrice
 from sva_bench.solver.columns.column_generation import ColumnGeneration
-from sva_bench.solver.knowledge import adopt, route_over
+from sva_bench.solver.knowledge import adopt, route_over, routes_of
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.routes.heuristic import VisitOrders
 
@@ -27,10 +27,13 @@ def prove_by_columns(problem: Problem) -> None:
         adopt(problem.progress, problem.goal, problem.known, orders)
 
     generation = ColumnGeneration(instance=problem.instance, goal=problem.goal, scopes=problem.scopes,
-                                  survival=problem.goal.chances(), cutoff=cutoff, is_over=problem.clock.is_over,
+                                  cutoff=cutoff, is_over=problem.clock.is_over,
                                   left_s=problem.clock.left_s)
-    for m, order in (*enumerate(problem.progress.orders), *problem.routes):
-        generation.add_route(m, route_over(problem.known.legs_by_vehicle[m], order))
+    legs_by_vehicle = problem.known.legs_by_vehicle
+    for m, route in enumerate(routes_of(problem.goal, legs_by_vehicle, problem.progress.orders)):
+        generation.add_route(m, route)
+    for m, order in problem.routes:
+        generation.add_route(m, route_over(legs_by_vehicle[m], order))
     search_tree = BranchAndPrice(generation=generation, offer=offer, left_s=problem.clock.left_s,
                                  report_bound=problem.progress.tighten)
     try:

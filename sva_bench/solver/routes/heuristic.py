@@ -6,7 +6,6 @@ Deterministic: it counts iterations, and reads the clock only to stop early.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,11 +13,13 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
+from sva_bench.solver.discounts import Discounts
 from sva_bench.solver.polling import stop_flag
 from sva_bench.solver.routes.fronts import FRONT, LegTables
+from sva_bench.solver.routes.local_search import improve_order
 from sva_bench.solver.routes.packing import Route, best_packing
-from sva_bench.solver.routes.ruin_recreate import improve_order
 from sva_bench.solver.routes.ruin_recreate import rounds as run_rounds
+from sva_bench.solver.routes.worth import worth_of
 
 VisitOrders = tuple[tuple[int, ...], ...]
 """POIs of each vehicle, in order of visit."""
@@ -47,7 +48,7 @@ class Found:
 
 
 def search(
-    tables: LegTables, weights: FloatArray, survival: FloatArray, start: VisitOrders, *, seed: int = 0,
+    tables: LegTables, weights: FloatArray, discounts: Discounts | None, start: VisitOrders, *, seed: int = 0,
     starts: int = STARTS, stop: Callable[[float], bool] = lambda value: False,  # noqa: ARG005
     offer: Callable[[VisitOrders], None] = lambda orders: None,  # noqa: ARG005
 ) -> Found:
@@ -56,8 +57,7 @@ def search(
     Args:
         tables: The legs of all vehicle classes.
         weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
-        survival: Probability of a vehicle to get to its next POI, a factor on its rewards, shape (M,); 1 = the order of
-            visits is indifferent.
+        discounts: Discounts of the rewards; ``None`` = the order of visits is indifferent.
         start: A feasible plan.
         seed: Seed of the random choices.
         starts: Number of starts: the first from the given plan, the others from the empty one.
@@ -70,10 +70,11 @@ def search(
     if not vehicles or not (weights > 0).any():
         return Found(orders=best, routes=())
     near, detour = _distances(tables)
-    ordered = bool((survival < 1).any())
+    worth = worth_of(tables, weights, discounts)
+    ordered = bool(worth.discounted.any())
     rounds = int(ROUNDS * min(1.0, (_LARGE / n) ** 1.5)) + 1
     for number in range(starts):
-        if number and stop(value_of(weights, survival, best)):
+        if number and stop(worth.of(best)):
             break
         rng = np.random.default_rng((seed, number))
         current, current_length = _as_arrays(start if number == 0 else tuple(() for _ in start), n)
@@ -88,20 +89,21 @@ def search(
                 size = run_rounds(
                     rng, until - done, done, _CYCLE, _HEAT, tables.vehicle_class, tables.base, tables.fuel_s,
                     tables.time_s, tables.quickest_s, tables.first, tables.last, tables.hops, tables.capacity_s,
-                    tables.limit_s, near, weights, survival, detour, current, current_length, incumbent,
-                    incumbent_length, pool, length, vehicle_class, size, table, keys, ordered, stop_flag())
+                    tables.limit_s, near, weights, worth.discounted, worth.survival, worth.departure, worth.home,
+                    detour, current, current_length, incumbent, incumbent_length, pool, length, vehicle_class, size,
+                    table, keys, ordered, stop_flag())
                 found = _as_orders(incumbent, incumbent_length)
-                if value_of(weights, survival, found) > value_of(weights, survival, best):
+                if worth.of(found) > worth.of(best):
                     best = found
                     offer(best)
-            if stop(value_of(weights, survival, best)):
+            if stop(worth.of(best)):
                 break
         routes.update(dict.fromkeys(
             (int(vehicle_class[k]), tuple(pool[k, :length[k]].tolist())) for k in range(size)))
     good: tuple[Route, ...] = ()
-    if not stop(value_of(weights, survival, best)):
-        packed, good = best_packing(tables, weights, survival, tuple(routes), best)
-        if value_of(weights, survival, packed) > value_of(weights, survival, best):
+    if not stop(worth.of(best)):
+        packed, good = best_packing(tables, worth, tuple(routes), best)
+        if worth.of(packed) > worth.of(best):
             best = packed
     return Found(orders=best, routes=good)
 
@@ -114,12 +116,6 @@ def _distances(tables: LegTables) -> tuple[IntArray, float]:
     return np.argsort(both_ways, axis=1, kind="stable"), detour
 
 
-def value_of(weights: FloatArray, survival: FloatArray, orders: VisitOrders) -> float:
-    """Expected reward of a plan: each visit's reward times the probability to get that far."""
-    return math.fsum(weights[m, j] * survival[m]**k if survival[m] < 1 else weights[m, j]
-                     for m, order in enumerate(orders) for k, j in enumerate(order, start=1))
-
-
 def shorten(tables: LegTables, orders: VisitOrders) -> VisitOrders:
     """The same visits in orders that are locally optimal in time, under 2-opt and Or-opt moves."""
     n = tables.fuel_s.shape[1]
@@ -129,8 +125,8 @@ def shorten(tables: LegTables, orders: VisitOrders) -> VisitOrders:
         for m, k in enumerate(tables.vehicle_class):
             if length[m]:
                 improve_order(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
-                           tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), 1.0,
-                           np.zeros((4, FRONT)), spare, sums, stop_flag())
+                           tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), False,
+                           np.zeros((n, n)), 0.0, 0.0, np.zeros((4, FRONT)), spare, sums, stop_flag())
     return _as_orders(array, length)
 
 

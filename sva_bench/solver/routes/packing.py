@@ -10,6 +10,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.solver.highs import Relaxation, maximise
 from sva_bench.solver.program import LinearModel, Rows
 from sva_bench.solver.routes.fronts import LegTables
+from sva_bench.solver.routes.worth import Worth
 
 Route = tuple[int, tuple[int, ...]]
 """Vehicle class or vehicle that drives it, and its POIs in order."""
@@ -21,7 +22,7 @@ _EPSILON = 1e-9
 
 
 def best_packing(
-    tables: LegTables, weights: FloatArray, survival: FloatArray, routes: Sequence[Route],
+    tables: LegTables, worth: Worth, routes: Sequence[Route],
     incumbent: tuple[tuple[int, ...], ...],
 ) -> tuple[tuple[tuple[int, ...], ...], tuple[Route, ...]]:
     """The best plan of these routes, or the incumbent, and the routes of greatest reduced cost.
@@ -30,8 +31,7 @@ def best_packing(
 
     Args:
         tables: The legs of all vehicle classes.
-        weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
-        survival: Probability of a vehicle to get to its next POI, shape (M,).
+        worth: What routes are worth.
         routes: The routes, each with its vehicle class.
         incumbent: A feasible plan, whose routes are columns too.
 
@@ -41,21 +41,18 @@ def best_packing(
     Raises:
         KeyboardInterrupt: If Ctrl-C ended the solve.
     """
-    vehicles, n = weights.shape
+    vehicles, n = worth.weights.shape
     offers: dict[tuple[int, frozenset[int]], tuple[float, tuple[int, ...]]] = {}
     for m, order in (*enumerate(incumbent), *((m, order) for vehicle_class, order in routes
                                               for m in range(vehicles) if tables.vehicle_class[m] == vehicle_class)):
-        worth = 0.0
-        for k, j in enumerate(order, start=1):
-            worth += weights[m, j] * survival[m]**k
-        key = (m, frozenset(order))
-        if worth > offers.get(key, (_EPSILON, ()))[0]:
-            offers[key] = (worth, order)
-    columns = [(m, visited, worth, order) for (m, visited), (worth, order) in offers.items()]
+        value, key = worth.of_route(m, order), (m, frozenset(order))
+        if value > offers.get(key, (_EPSILON, ()))[0]:
+            offers[key] = (value, order)
+    columns = [(m, visited, value, order) for (m, visited), (value, order) in offers.items()]
     if not columns:
         return incumbent, ()
     start = np.array([float(order == incumbent[m]) for m, _, _, order in columns])
-    objective = np.array([worth for _, _, worth, _ in columns])
+    objective = np.array([value for _, _, value, _ in columns])
     model = _program(columns, objective, vehicles, n)
     relaxed = Relaxation(model).solve(np.inf)
     if relaxed.values is None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.solver.discounts import Discount
 from sva_bench.solver.preprocess import SLACK_S, shortest_paths
 
 
@@ -23,6 +24,24 @@ class _Hop(NamedTuple):
 
     fuel_s: float
     time_s: float
+    burnt_s: float
+    stations: tuple[int, ...]
+
+
+class Passage(NamedTuple):
+    """A way from one stop to the next: a leg, or a chain of stations.
+
+    Attributes:
+        time_s: Time in all [s].
+        driven_s: Driving time in all [s].
+        fuel_s: Fuel to the first station, or to the end [s].
+        burnt_s: Fuel from the last station, or in all [s].
+        stations: The stations, in order.
+    """
+
+    time_s: float
+    driven_s: float
+    fuel_s: float
     burnt_s: float
     stations: tuple[int, ...]
 
@@ -53,6 +72,9 @@ class VehicleLegs:
         limit_s: Mission limit, half the feasibility tolerance included [s].
         hops: Nondominated chains of stations between two stops, by their ends.
         known: Quickest route of each order of POIs asked for so far; ``None`` = infeasible.
+        passages: Nondominated ways between two stops, driving time included, by their ends.
+        chains: Nondominated chains of stations by their first one: time, driving time and stations, by their last one.
+        ways: Value and sites of the most valuable route of each order, rewards and discount asked for so far.
     """
 
     base: int
@@ -64,6 +86,10 @@ class VehicleLegs:
     limit_s: float
     hops: dict[tuple[int, int], list[_Hop]] = field(default_factory=dict)
     known: dict[tuple[int, ...], TimedRoute | None] = field(default_factory=dict)
+    passages: dict[tuple[int, int], list[Passage]] = field(default_factory=dict)
+    chains: dict[int, dict[int, list[tuple[float, float, tuple[int, ...]]]]] = field(default_factory=dict)
+    ways: dict[tuple[tuple[int, ...], tuple[float, ...], Discount], tuple[float, tuple[int, ...]] | None] = field(
+        default_factory=dict)
 
 
 def vehicle_legs(instance: Instance, vehicle: Vehicle) -> VehicleLegs:
@@ -124,6 +150,8 @@ def _hops(own_legs: VehicleLegs, here: int, there: int) -> list[_Hop]:
         return own_legs.hops[here, there]
     found = []
     for k, first in enumerate(own_legs.stations):
+        if first == here:  # a robot that sets off from a station doesn't go there first
+            continue
         for last_number, last in enumerate(own_legs.stations):
             hop = _Hop(own_legs.fuel_s[here][first],
                        own_legs.time_s[here][first] + own_legs.chain_s[k][last_number] + own_legs.time_s[last][there],

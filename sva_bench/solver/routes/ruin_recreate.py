@@ -11,8 +11,8 @@ from numba import njit
 
 from sva_bench.solver.polling import poll
 from sva_bench.solver.routes.fronts import FRONT, fronts, route_time, time_with
+from sva_bench.solver.routes.local_search import improve_order, route_value
 
-_SHORT = 8  # POIs up to which moves that lengthen the route without refuels are tried: they may save a refuel
 _RUIN = 0.6  # greatest share of the visits removed
 _BAN = 0.7  # share of the iterations in which POIs are barred from a random vehicle
 _SWAP = 0.1  # share of the iterations that begin by swapping the routes of two vehicles
@@ -21,19 +21,9 @@ _EPSILON = 1e-9
 
 
 @njit(cache=True)
-def route_value(order, length, weights, survival):
-    """Value of a route: each POI's weight times the probability to get that far."""
-    total, chance = 0.0, 1.0
-    for k in range(length):
-        chance *= survival
-        total += chance * weights[order[k]] if survival < 1.0 else weights[order[k]]
-    return total
-
-
-@njit(cache=True)
 def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quickest, first, last, hops, capacity, limit,
-           near, weights, survival, detour, current, current_length, best, best_length, pool, pool_length, pool_class,
-           pool_size, pool_table, keys, ordered, stop):
+           near, weights, discounted, survival, departure, home, detour, current, current_length, best, best_length,
+           pool, pool_length, pool_class, pool_size, pool_table, keys, ordered, stop):
     """The size of the pool after some iterations, which change ``current``, ``best`` and ``pool`` in place.
 
     Long because compiled: a dozen scratch arrays are made once, and each part would need nearly all of them.
@@ -48,7 +38,9 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
         base: The base; it and the arrays up to ``limit`` are those of ``LegTables``.
         near: For each POI the others by their distance, shape (n, n).
         weights: Reward of a visit by vehicle m to site j, shape (M, n), not negative.
-        survival: Probability to get to the next POI, shape (M,); 1 where the order of visits is indifferent.
+        discounted: Whether the value of vehicle m's route depends on its order, shape (M,).
+        survival: Probability of vehicle m to survive the way from a site to another, shape (M, n, n).
+        departure: Cost of leaving, shape (M,); ``home``: reward of the return, shape (M,).
         detour: Added to each detour, so that the ratio stays finite [s].
         current: POIs of each vehicle, in order, shape (M, n); ``current_length``: how many, shape (M,).
         best: The best plan, in the same form.
@@ -70,8 +62,10 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
     sums = np.zeros((2, n + 2))
     current_value = best_value = 0.0
     for m in range(vehicles):
-        current_value += route_value(current[m], current_length[m], weights[m], survival[m])
-        best_value += route_value(best[m], best_length[m], weights[m], survival[m])
+        current_value += route_value(current[m], current_length[m], base, weights[m], discounted[m], survival[m],
+                                     departure[m], home[m])
+        best_value += route_value(best[m], best_length[m], base, weights[m], discounted[m], survival[m],
+                                     departure[m], home[m])
     for number in range(done, done + count):
         if poll(stop):
             break
@@ -96,20 +90,25 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
                     allowed[int(rng.random() * vehicles), j] = False
         for again in range(2):
             _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, base, fuel, time, quickest,
-                      first, last, hops, capacity, limit, weights, survival, detour, ahead, ahead_size, behind,
-                      behind_size, score, place, least, reward, total, scratch)
+                      first, last, hops, capacity, limit, weights, discounted, survival, departure, home, again == 1,
+                      detour, ahead, ahead_size, behind, behind_size, score, place, least, reward, total, sums, scratch)
             if again == 0:
                 for m in range(vehicles):
                     k = vehicle_class[m]
                     improve_order(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
-                               limit[k], weights[m], survival[m], scratch, spare, sums, stop)
+                               limit[k], weights[m], discounted[m], survival[m], departure[m], home[m], scratch, spare,
+                               sums, stop)
+                    if discounted[m] and route_value(orders[m], lengths[m], base, weights[m], True, survival[m],
+                                                     departure[m], home[m]) < 0.0:
+                        lengths[m] = 0  # its risk costs more than it earns: others may visit its POIs
                     for j in range(n):
                         allowed[m, j] = weights[m, j] > 0
                 factor[:] = 1.0
                 power = 1.0
         value = 0.0
         for m in range(vehicles):
-            value += route_value(orders[m], lengths[m], weights[m], survival[m])
+            value += route_value(orders[m], lengths[m], base, weights[m], discounted[m], survival[m], departure[m],
+                                 home[m])
             pool_size = _keep(orders[m], lengths[m], vehicle_class[m], pool, pool_length, pool_class, pool_size,
                               pool_table, keys, ordered)
         if value > best_value + _EPSILON:
@@ -188,9 +187,9 @@ def _ruin(rng, orders, lengths, near, removed):
 
 @njit(cache=True)
 def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, base, fuel, time, quickest, first, last,
-              hops, capacity, limit, weights, survival, detour, ahead, ahead_size, behind, behind_size, score, place,
-              least, reward, total, scratch):
-    """Insert POIs greedily by reward per detour, until none fits.
+              hops, capacity, limit, weights, discounted, survival, departure, home, alone, detour, ahead, ahead_size,
+              behind, behind_size, score, place, least, reward, total, sums, scratch):
+    """Insert POIs greedily by reward per detour, until none fits; ``alone``: the first must be worth leaving for.
 
     Long because compiled: detours are kept from one insertion to the next, in arrays that each part would need.
     """
@@ -218,7 +217,10 @@ def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, b
                 total[m] = fronts(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops, capacity[k],
                                   limit[k], ahead[m], ahead_size[m], behind[m], behind_size[m])
             # Where fuel can't bind, a detour is unchanged at every position but that of the last insertion.
-            known = free and stale >= 0 and survival[m] == 1.0
+            known = free and stale >= 0 and not discounted[m]
+            chance, rest = sums[0], sums[1]
+            if discounted[m]:
+                _chances(orders[m], lengths[m], base, weights[m], survival[m], home[m], chance, rest)
             for j in range(n):
                 if visited[j] or not allowed[m, j]:
                     continue
@@ -229,29 +231,38 @@ def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, b
                         place[m, j] += 1
                 else:
                     least[m, j] = np.inf
-                suffix, chance = 0.0, 1.0
-                if survival[m] < 1.0:
-                    suffix = route_value(orders[m], lengths[m], weights[m], survival[m])
                 for position in range(begin, end + 1):
                     a = base if position == 0 else orders[m, position - 1]
                     b = base if position == lengths[m] else orders[m, position]
+                    soonest = 0.0  # a lower bound, without refuels
+                    if not free:
+                        soonest = ahead[m, position, 0, 0] + quickest[k, a, j] + quickest[k, j, b] \
+                            + behind[m, position + 1, 0, 0]
+                        if soonest >= (limit[k] if discounted[m] else min(limit[k], total[m] + least[m, j])):
+                            continue  # too late, or later than at another position
+                    gained = 0.0
+                    if discounted[m]:
+                        there = chance[position] * survival[m, a, j]
+                        gain = there * weights[m, j] + (there * survival[m, j, b]
+                                                        - chance[position] * survival[m, a, b]) * rest[position + 1]
+                        if lengths[m] == 0:
+                            gain = there * weights[m, j]
+                            if alone:
+                                gain += there * survival[m, j, b] * home[m] - departure[m]
+                        if gain <= _EPSILON:
+                            continue
+                        gained = gain**power
+                        if not free and gained <= most * (max(soonest - total[m], 0.0) + detour):
+                            continue
                     if free:
                         later = total[m] + time[k, a, j] + time[k, j, b] - (time[k, a, b] if lengths[m] > 0 else 0.0)
-                    elif ahead[m, position, 0, 0] + quickest[k, a, j] + quickest[k, j, b] \
-                            + behind[m, position + 1, 0, 0] >= \
-                            (limit[k] if survival[m] < 1.0 else min(limit[k], total[m] + least[m, j])):
-                        later = np.inf  # a lower bound without refuels is too late, or later than another position
                     else:
                         later = time_with(j, a, b, fuel[k], time[k], first[k], last[k], hops, capacity[k],
                                           limit[k], ahead[m, position], ahead_size[m, position],
                                           behind[m, position + 1], behind_size[m, position + 1], scratch)
-                    if survival[m] < 1.0:
-                        chance *= survival[m]
-                        gain = chance * weights[m, j] - (1.0 - survival[m]) * suffix
-                        if position < lengths[m]:
-                            suffix -= chance * weights[m, orders[m, position]]
-                        if gain > _EPSILON and later <= limit[k]:
-                            merit = gain**power / (max(later - total[m], 0.0) + detour)
+                    if discounted[m]:
+                        if later <= limit[k]:
+                            merit = gained / (max(later - total[m], 0.0) + detour)
                             if merit > most:
                                 least[m, j], place[m, j], most = later - total[m], position, merit
                     elif later - total[m] < least[m, j]:
@@ -259,7 +270,7 @@ def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, b
                 score[m, j] = 0.0
                 if total[m] + least[m, j] <= limit[k]:
                     score[m, j] = factor[m, j] * (
-                        most if survival[m] < 1.0 else reward[m, j] / (max(least[m, j], 0.0) + detour))
+                        most if discounted[m] else reward[m, j] / (max(least[m, j], 0.0) + detour))
         chosen, poi, most = -1, -1, 0.0
         for m in range(vehicles):
             for j in range(n):
@@ -276,90 +287,14 @@ def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, b
 
 
 @njit(cache=True)
-def improve_order(order, length, base, fuel, time, first, last, hops, capacity, limit, weights, survival, scratch,
-                  spare, sums, stop):
-    """Improve a route in place by 2-opt (reversals) and Or-opt (moves of up to three POIs) to a local optimum.
-
-    On a long route only moves are tried that save time without refuels. Ends early, with a route that is as
-    good as before or better, once ``stop`` is not 0.
-    """
-    now = route_time(order, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
-    earned = route_value(order, length, weights, survival) if survival < 1.0 else 0.0
-    refuels = last[base, base] > first[base, base]
-    ahead, back = sums[0], sums[1]
-    _sums(order, length, base, time, ahead, back)
-    improved = True
-    while improved and not poll(stop):
-        improved = False
-        for i in range(length):
-            for j in range(i + 1, length):
-                before = base if i == 0 else order[i - 1]
-                after = base if j == length - 1 else order[j + 1]
-                change = time[before, order[j]] + back[j + 1] - back[i + 1] + time[order[i], after] \
-                    - (ahead[j + 2] - ahead[i])
-                if change >= -_EPSILON and survival == 1.0 and (length > _SHORT or not refuels):
-                    continue
-                spare[:length] = order[:length]
-                for k in range(i, j + 1):
-                    spare[k] = order[i + j - k]
-                later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit, scratch)
-                gain = route_value(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
-                if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
-                    order[:length] = spare[:length]
-                    _sums(order, length, base, time, ahead, back)
-                    now, earned, improved = later, earned + gain, True
-        for size in range(1, 4):
-            for i in range(length - size + 1):
-                for position in range(length + 1):
-                    if i <= position <= i + size:
-                        continue
-                    before = base if i == 0 else order[i - 1]
-                    after = base if i + size == length else order[i + size]
-                    without = ahead[i + size + 1] - ahead[i] - (time[before, after] if before != after else 0.0)
-                    a = base if position == 0 else order[position - 1]
-                    b = base if position == length else order[position]
-                    for backwards in range(2 if size > 1 else 1):
-                        if backwards == 0:
-                            change = time[a, order[i]] + ahead[i + size] - ahead[i + 1] + time[order[i + size - 1], b]
-                        else:
-                            change = time[a, order[i + size - 1]] + back[i + size] - back[i + 1] + time[order[i], b]
-                        change -= without + time[a, b]
-                        if change >= -_EPSILON and survival == 1.0 and (length > _SHORT or not refuels):
-                            continue
-                        _move(order, length, i, size, position, backwards, spare)
-                        later = route_time(spare, length, base, fuel, time, first, last, hops, capacity, limit,
-                                           scratch)
-                        gain = route_value(spare, length, weights, survival) - earned if survival < 1.0 else 0.0
-                        if (later < now - _EPSILON and gain >= -_EPSILON) or (gain > _EPSILON and later < np.inf):
-                            order[:length] = spare[:length]
-                            _sums(order, length, base, time, ahead, back)
-                            now, earned, improved = later, earned + gain, True
-                            break
-
-
-@njit(cache=True)
-def _sums(order, length, base, time, ahead, back):
-    """Cumulative driving time up to each stop, and of the same stops in reverse."""
-    ahead[0] = back[0] = 0.0
-    for k in range(length + 1):
-        a = base if k == 0 else order[k - 1]
-        b = base if k == length else order[k]
-        ahead[k + 1] = ahead[k] + time[a, b]
-        back[k + 1] = back[k] + time[b, a]
-
-
-@njit(cache=True)
-def _move(order, length, start, size, position, backwards, to):
-    """The order with a block moved before another position, reversed if ``backwards`` is 1."""
-    filled = 0
-    for k in range(length + 1):
-        if k == position:
-            for b in range(size):
-                to[filled] = order[start + b] if backwards == 0 else order[start + size - 1 - b]
-                filled += 1
-        if k < length and not start <= k < start + size:
-            to[filled] = order[k]
-            filled += 1
+def _chances(order, length, base, weights, survival, home, chance, rest):
+    """Probability to get to each stop of a route, and what the rest of it is worth once there, base first and last."""
+    chance[0] = 1.0
+    rest[length + 1] = home
+    for k in range(length):
+        chance[k + 1] = chance[k] * survival[base if k == 0 else order[k - 1], order[k]]
+    for k in range(length - 1, -1, -1):
+        rest[k + 1] = weights[order[k]] + survival[order[k], base if k == length - 1 else order[k + 1]] * rest[k + 2]
 
 
 @njit(cache=True)

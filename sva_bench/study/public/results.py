@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.reacted import Reacted
 from sva_bench.files.records import as_dict
 from sva_bench.mission.plan import Plan
 from sva_bench.storage.outcome_table import outcome_table
@@ -31,6 +32,7 @@ class Result(Generic[SummaryT]):
         folder: The run folder; ``None`` if none was asked for.
         settings: How plans were executed.
         executed: Every case, trial by trial, as arrays.
+        reacted: The same of teams that react, for each policy and news.
     """
 
     world: World
@@ -38,6 +40,7 @@ class Result(Generic[SummaryT]):
     folder: Path | None
     settings: Settings
     executed: tuple[Executed, ...]
+    reacted: tuple[Reacted, ...] = ()
 
     @property
     def plans(self) -> Mapping[str, Mapping[str, Plan]]:
@@ -49,14 +52,16 @@ class Result(Generic[SummaryT]):
 
     @property
     def outcomes(self) -> pa.Table:
-        """A row per scenario, plan, trial and robot, as in ``outcomes.parquet``; ``.to_pandas()`` where pandas is."""
+        """A row per scenario, plan, reaction, trial and robot, as in ``outcomes.parquet``; ``.to_pandas()`` where
+        pandas is."""
         robots = [robot.name for robot in self.world.robots]
-        return pa.concat_tables([outcome_table(run, robots, self.settings) for run in self.executed])
+        runs: list[Executed | Reacted] = [*self.executed, *self.reacted]
+        return pa.concat_tables([outcome_table(run, robots, self.settings) for run in runs])
 
     @property
     def legs(self) -> pa.Table:
         """A row per leg that was driven, with times as planned and as driven [s], as in ``legs.parquet``."""
-        return pa.table(vars(legs_of(self.executed)), schema=LEGS)
+        return pa.table(vars(legs_of([*self.executed, *self.reacted])), schema=LEGS)
 
     def as_dict(self) -> dict[str, Any]:
         """The summary as ``summary.json`` holds it."""

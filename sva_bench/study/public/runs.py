@@ -11,7 +11,7 @@ from typing import cast
 
 from sva_bench.analysis.precision import Precision, precision_of
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
-from sva_bench.choices import FailureProcess, Fidelity, PathPlanner
+from sva_bench.choices import FailureProcess, Fidelity, News, PathPlanner, PolicyName
 from sva_bench.errors import BadInput, nearest
 from sva_bench.files.outputs import check_folder, check_output
 from sva_bench.mission.plan import Plan
@@ -35,6 +35,7 @@ from sva_bench.study.public.arguments import (
     flag,
     integer,
     is_a,
+    names_of,
     number,
     optional,
     path_of,
@@ -43,6 +44,8 @@ from sva_bench.study.public.arguments import (
 )
 from sva_bench.study.public.plans import plan_given
 from sva_bench.study.public.results import Result
+from sva_bench.study.publish import record_team
+from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_to_anticipate
 from sva_bench.study.run import measure, publish_run
 from sva_bench.workers.pool import count_of, local_workers
 from sva_bench.workers.progress import OnProgress
@@ -55,10 +58,11 @@ def run(
     world: WorldLike, *, seed: int = 0, trials: int = Options.trials, rollouts: int = Options.rollouts,
     fidelity: Fidelity = "rollout", planner: PathPlanner = "prmstar", scenario: str | Sequence[str] | None = None,
     margin: float | None = None, plan_failure: FailureProcess | None = None,
-    execute_failure: FailureProcess | None = None, time_limit: float | None = None, gap: float = 1e-6,
-    evpi: bool = False, informed: bool = False, assumptions: bool = False, precision: float | str | None = None,
-    max_trials: int | None = None, out: PathLike | None = None, workers: int | None = None,
-    progress: OnProgress | None = None,
+    execute_failure: FailureProcess | None = None, policy: PolicyName | Sequence[PolicyName] | None = None,
+    news: News | Sequence[News] | None = None, anticipate: bool = False, time_limit: float | None = None,
+    gap: float = 1e-6, evpi: bool = False, informed: bool = False, assumptions: bool = False,
+    precision: float | str | None = None, max_trials: int | None = None, out: PathLike | None = None,
+    workers: int | None = None, progress: OnProgress | None = None,
 ) -> Result[Summary]:
     """Plan, execute and measure a mission, as ``sva-bench run`` does; nothing is written unless ``out`` says where.
 
@@ -74,6 +78,11 @@ def run(
         margin: Planning costs are twin times x (1 + margin), 0 to 1; by default the world's.
         plan_failure, execute_failure: Failure process that plans are made for, and that is executed; by default the
             world's.
+        policy: What the team does about failures: nothing (``none``), or plan what is left again (``resolve``); of
+            several, each is measured. By default the world's.
+        news: When it learns of one: ``instant``, when the ``report`` from a robot's next stop is overdue, each robot
+            at a ``station``, or ``never``; of several, each is measured. By default the world's, or ``report``.
+        anticipate: With a policy: make a plan for the reaction too, the planner ``anticipative``.
         time_limit: Stop each solve after so many seconds and take its best plan; none by default.
         gap: Relative gap at which a plan counts as optimal.
         evpi: Work out the value of perfect information however long it takes.
@@ -102,15 +111,17 @@ def run(
     options = _options(seed, trials, rollouts, fidelity, planner, Options(
         limits=SolveLimits(time_limit_s=optional(number, "time_limit", time_limit, 0), gap=number("gap", gap, 0)),
         evpi=flag("evpi", evpi), informed=flag("informed", informed), assumptions=flag("assumptions", assumptions),
-        precision=_precision(precision, max_trials, trials, rollouts)))
+        policies=policies_of(names_of("policy", policy) or ()), news=news_of(names_of("news", news) or ()),
+        anticipate=flag("anticipate", anticipate), precision=_precision(precision, max_trials, trials, rollouts)))
     count = _workers(workers)
     read, path = world_given(world, scenario, margin, _process("plan_failure", plan_failure),
                              _process("execute_failure", execute_failure))
+    check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
     with nullcontext() if path is None else about(path), local_workers(count, PRELOAD) as executor:
         done = measure(read, options, executor, told)
         folder = None if place is None else publish_run(read, options, done, place, told, _command()).folder
     return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
-                  executed=tuple(done.executed))
+                  executed=tuple(done.executed), reacted=tuple(done.reacted))
 
 
 @called_from_python()
@@ -118,8 +129,9 @@ def execute(
     world: WorldLike, plans: PlanLike | Mapping[str, PlanLike] | Sequence[PathLike], *, allow_infeasible: bool = False,
     seed: int = 0, trials: int = Options.trials, rollouts: int = Options.rollouts, fidelity: Fidelity = "rollout",
     planner: PathPlanner = "prmstar", scenario: str | Sequence[str] | None = None, margin: float | None = None,
-    execute_failure: FailureProcess | None = None, out: PathLike | None = None, workers: int | None = None,
-    progress: OnProgress | None = None,
+    execute_failure: FailureProcess | None = None, policy: PolicyName | Sequence[PolicyName] | None = None,
+    news: News | Sequence[News] | None = None, anticipate: bool = False, out: PathLike | None = None,
+    workers: int | None = None, progress: OnProgress | None = None,
 ) -> Result[ComparisonSummary]:
     """Execute plans from anywhere in a world and compare them pair by pair, as ``sva-bench execute`` does.
 
@@ -127,7 +139,8 @@ def execute(
         world: The world, or its file.
         plans: One plan, which goes by the name ``plan``; plans by their names; or plan files, which go by their stems.
         allow_infeasible: Drive plans that break fuel capacity or mission limit too; each is warned of.
-        seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure: As for ``run``.
+        seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure, policy, news: As for ``run``.
+        anticipate: Refused, as no plans are made here; ``run`` makes them.
         out, workers, progress: As for ``run``.
 
     Returns:
@@ -144,10 +157,13 @@ def execute(
         KeyboardInterrupt: On Ctrl-C; nothing is left behind.
     """
     told, place, count = progress_of(progress), _place(out), _workers(workers)
-    options = _options(seed, trials, rollouts, fidelity, planner, Options())
+    refuse_to_anticipate(asked=flag("anticipate", anticipate))
+    options = _options(seed, trials, rollouts, fidelity, planner, Options(
+        policies=policies_of(names_of("policy", policy) or ()), news=news_of(names_of("news", news) or ())))
     allowed = flag("allow_infeasible", allow_infeasible)
     named = _named(plans)
     read, path = world_given(world, scenario, margin, None, _process("execute_failure", execute_failure))
+    check_reactions(read, options.policies, options.news)
     bare = without_times(read)
     labels: dict[str, Path | str] = {name: _label(plans, name, plan) for name, plan in named.items()}
     given = {name: drivable(read, bare, plan_given(str(labels[name]), plan, bare), labels[name])
@@ -160,27 +176,30 @@ def execute(
             folder = None if place is None else publish_plans(
                 read, given, options, done, place, told, costs, _command()).folder
     return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
-                  executed=tuple(done.executed))
+                  executed=tuple(done.executed), reacted=tuple(done.reacted))
 
 
 @called_from_python()
 def record(
     result: Result[Summary] | Result[ComparisonSummary], path: PathLike, *, scenario: str | None = None,
-    planner: str | None = None,
+    planner: str | None = None, policy: PolicyName = "none", news: News | None = None,
 ) -> Path:
-    """Write the first trial of a plan as a recording for the Rerun viewer.
+    """Write the first trial of a plan, or a typical one in which the team reacts, for the Rerun viewer.
 
     Args:
         result: What ``run`` or ``execute`` gave.
         path: The ``.rrd`` file.
         scenario: The scenario; by default the first.
         planner: Whose plan, or the name it was given by; by default the first: ``stochastic`` after ``run``.
+        policy: What the team does about failures; with one, the most probable course of events in which it changes
+            orders is shown.
+        news: When it learns of one; by default the first that was measured.
 
     Returns:
         The path.
 
     Raises:
-        BadInput: If there is no such scenario or plan, or the file can't be written.
+        BadInput: If there is no such scenario, plan or reaction, orders never change, or the file can't be written.
         ValueError: If an argument is of a wrong type.
     """
     is_a("result", result, Result, "what run or execute gave")
@@ -190,6 +209,18 @@ def record(
     check_output(target, way_out="choose another path")
     plans = result.plans
     chosen_scenario = _one_of("scenario", scenario, list(plans))
+    if choice("policy", policy, PolicyName) != "none":
+        reacting = [run for run in result.reacted
+                    if (run.case.scenario.name, run.case.policy) == (chosen_scenario, policy)]
+        if not reacting:
+            raise BadInput(f"policy {policy!r}: the result holds no such reaction; ask run or execute for it")
+        heard = _one_of("news", news, list(dict.fromkeys(run.case.news for run in reacting)))
+        mine = {run.case.planner: run for run in reacting if run.case.news == heard}
+        chosen = mine[_one_of("planner", planner, list(mine))]
+        if chosen.shown is None:
+            raise BadInput(f"{chosen.case.title}: orders never change; record it without a policy")
+        record_team(target, result.world, chosen.case, chosen.shown)
+        return target
     name = _one_of("planner", planner, list(plans[chosen_scenario]))
     executed = next(run for run in result.executed
                     if (run.case.scenario.name, run.case.planner) == (chosen_scenario, name))
@@ -212,7 +243,8 @@ def _options(
         seed=integer("seed", seed, 0, MOST_SEED), trials=integer("trials", trials, 1, MOST_TRIALS),
         rollouts=integer("rollouts", rollouts, 1, MOST_ROLLOUTS), fidelity=choice("fidelity", fidelity, Fidelity),
         planner=choice("planner", planner, PathPlanner), limits=rest.limits, evpi=rest.evpi, informed=rest.informed,
-        assumptions=rest.assumptions, precision=rest.precision)
+        assumptions=rest.assumptions, policies=rest.policies, news=rest.news, anticipate=rest.anticipate,
+        precision=rest.precision)
 
 
 def _precision(precision: float | str | None, max_trials: int | None, trials: int, rollouts: int) -> Precision | None:

@@ -1,0 +1,158 @@
+"""What stochastic planning is worth if the team reacts: the paper's claim under every process and kind of news."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from typing import get_args
+
+from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.reactions import reaction_result
+from sva_bench.analysis.statistics import sample_mean
+from sva_bench.choices import NEWS, FailureProcess, News
+from sva_bench.execution.case import Settings
+from sva_bench.execution.drives import Drives
+from sva_bench.execution.execute import execute
+from sva_bench.files.printable import counted
+from sva_bench.report.wording import with_interval
+from sva_bench.study.costs import plan_costs
+from sva_bench.study.options import Options
+from sva_bench.study.planning import plan_scenarios, two_cases
+from sva_bench.study.recourse import Stage, react_in_scenarios
+from sva_bench.workers.progress import OnProgress
+from sva_bench.world.model import Scenario, World
+
+AVAILABILITIES = (0.25, 0.5, 0.75)
+"""Of each world's last robot; the others are certain."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReactedWorld:
+    """A world under one failure process and availability: the results by news."""
+
+    world: str
+    process: FailureProcess
+    availability: float
+    by_news: Mapping[News, ReactionResult]
+
+
+def reaction(
+    worlds: Sequence[World], settings: Settings, executor: Executor | None, progress: OnProgress,
+) -> list[ReactedWorld]:
+    """Plans for each failure process, executed under it by teams that react: a row per world, process, availability."""
+    rows = []
+    for world in map(_with_availabilities, worlds):
+        costs = plan_costs(world, "prmstar", progress)
+        own = replace(settings, rollouts=1 if world.noise.silent else settings.rollouts, recorded=False)
+        options = Options(policies=("resolve",), anticipate=True,
+                          news=tuple(news for news in NEWS if world.stations or news != "station"))
+        drives = Drives()
+        for process in get_args(FailureProcess):
+            here = replace(world, plan_failure=process, execute_failure=process)
+            planned = plan_scenarios(here, costs, options, progress)
+            cases = [case for scenario in here.scenarios for case in two_cases(scenario, planned[scenario.name])]
+            executed = execute(here, costs, cases, own, executor,
+                               lambda done, of: progress("driving routes", done, of), drives)
+            found = react_in_scenarios(Stage(
+                world=here, costs=costs, instances={name: p.instance for name, p in planned.items()}, settings=own,
+                executed=executed, executor=executor, drives=drives), options, reaction_result, progress)
+            rows += [ReactedWorld(world=world.name, process=process, availability=availability,
+                                  by_news={result.news: result for result in found[scenario.name].results})
+                     for scenario, availability in zip(here.scenarios, AVAILABILITIES, strict=True)]
+    return rows
+
+
+def _with_availabilities(world: World) -> World:
+    """The world with a scenario for each availability of its last robot."""
+    names = [robot.name for robot in world.robots]
+    return replace(world, scenarios=tuple(
+        Scenario(name=f"A{100 * p:.0f}", availability={**dict.fromkeys(names, 1.0), names[-1]: p})
+        for p in AVAILABILITIES))
+
+
+_Figure = Callable[[ReactionResult], float | None]
+
+
+def reaction_page(rows: Sequence[ReactedWorld], settings: Settings) -> str:
+    """The rows as Markdown: over worlds first, then world by world."""
+    worlds = list(dict.fromkeys(row.world for row in rows))
+    lines = [
+        "# What stochastic planning is worth if the team reacts", "",
+        f"`sva-bench reproduce reaction`: {counted(len(worlds), 'world')} ({', '.join(worlds)}), "
+        f"{counted(settings.rollouts, 'noise draw')}, fidelity {settings.fidelity}, seed {settings.seed}.", "",
+        _ASSUMED, "",
+        "## VSS against news", "",
+        "How much more the stochastic plan is worth than the deterministic one under the same reaction, in per cent of "
+        "the stochastic plan: the mean over worlds, and its 95 % interval with the worlds as the sample. `never` is "
+        "without reaction.", "",
+        *_table(rows, lambda result: result.vss.executed_pct), "",
+        "## What reacting adds", "",
+        "Value of recourse: what the same plan is worth more if the team reacts, in per cent of its value if nobody "
+        "does.", "",
+        "Deterministic plan:", "",
+        *_table(rows, lambda result: result.value_of_recourse["deterministic"].pct), "",
+        "Stochastic plan:", "",
+        *_table(rows, lambda result: result.value_of_recourse["stochastic"].pct), "",
+        "## The best plan for the reaction", "",
+        "VSS with recourse: the best plan for the reaction less the deterministic one, in per cent of the best. It is "
+        "one of the stochastic, the deterministic and the anticipative plan, which is chosen by simulating it.", "",
+        *_table(rows, lambda result: result.vss_with_recourse.pct), "",
+        "Anticipation: the best plan less the stochastic one.", "",
+        *_table(rows, lambda result: result.anticipation.pct), "",
+        "## World by world", "",
+        "VSS in per cent by news, with the 95 % interval over noise draws (failures are enumerated, so they add no "
+        "sampling error).", "",
+        *_by_world(rows)]
+    return "\n".join([*lines, ""])
+
+
+_ASSUMED = (
+    "In each world the last robot is uncertain and the others are certain. Its availability is the probability to be "
+    "there for the mission (`mission`), to survive until its next POI (`per_leg`), or to survive driving for the whole "
+    "mission limit (`hazard`). Plans are made for the process that is executed. When a failure is heard of, the policy "
+    "`resolve` plans the rest of the mission again, exactly and for that process; robots finish the leg that they are "
+    "on. News comes when it happens (`instant`), when the planned arrival at the next stop passes without a report "
+    "(`report`), or to each robot as it leaves a station (`station`).")
+
+
+def _table(rows: Sequence[ReactedWorld], figure: _Figure) -> list[str]:
+    """Means over worlds, a row per process and availability and a column per news."""
+    heard = [news for news in NEWS if any(news in row.by_news for row in rows)]
+    lines = [f"| process | availability | {' | '.join(heard)} |", f"| --- | ---: |{' ---: |' * len(heard)}"]
+    for process, availability in dict.fromkeys((row.process, row.availability) for row in rows):
+        mine = [row for row in rows if (row.process, row.availability) == (process, availability)]
+        cells = [_mean([figure(row.by_news[news]) for row in mine if news in row.by_news]) for news in heard]
+        lines.append(f"| {process} | {100 * availability:.0f} % | {' | '.join(cells)} |")
+    return lines
+
+
+def _mean(shares: Sequence[float | None]) -> str:
+    known = [share for share in shares if share is not None]
+    return with_interval(sample_mean(known)) if known else ""
+
+
+def _by_world(rows: Sequence[ReactedWorld]) -> list[str]:
+    heard = [news for news in NEWS if any(news in row.by_news for row in rows)]
+    lines = [f"| world | process | availability | {' | '.join(heard)} | best plan on report | anticipation on report |",
+             f"| --- | --- | ---: |{' ---: |' * len(heard)} --- | ---: |"]
+    for row in rows:
+        cells = [_in_per_cent(row.by_news[news]) if news in row.by_news else "" for news in heard]
+        report = row.by_news["report"]
+        share = "" if report.anticipation.pct is None else f"{report.anticipation.pct:.1f}"
+        lines.append(f"| {row.world} | {row.process} | {100 * row.availability:.0f} % | {' | '.join(cells)} | "
+                     f"{report.best.plan} | {share} |")
+    return lines
+
+
+def _in_per_cent(result: ReactionResult) -> str:
+    """The VSS in per cent of the stochastic plan's mean, with its interval."""
+    whole, vss = result.plans["stochastic"].executed.mean, result.vss
+    if vss.same_plan:
+        return "the same plan"
+    if whole == 0 or vss.executed_pct is None:
+        return ""
+    if vss.executed.ci95 is None:
+        return f"{vss.executed_pct:.1f}"
+    low, high = (100 * end / whole for end in vss.executed.ci95)
+    return f"{vss.executed_pct:.1f} [{low:.1f}, {high:.1f}]"

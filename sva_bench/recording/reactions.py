@@ -1,0 +1,99 @@
+"""What a recording shows of failures and reactions: who was lost and where, who learned of it when, and new orders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray, frozen
+from sva_bench.choices import End
+from sva_bench.execution.outcome import Trace
+from sva_bench.execution.team_trace import NewsHeard
+from sva_bench.recording.colors import Color
+
+LOST: Mapping[End, str] = {"failed": "failed", "out_of_fuel": "out of fuel", "stuck": "stuck"}
+"""Ends of robots that don't come home, as they are labelled."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Lost:
+    """A robot that failed, ran out of fuel or got stuck: when [s], where [m], shape (2,), and what happened."""
+
+    robot: str
+    radius_m: float
+    time_s: float
+    at_m: FloatArray
+    what: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at_m", frozen(self.at_m, (2,)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Change:
+    """The orders of one robot as news changes them.
+
+    Attributes:
+        robot, color: The robot, and its colour.
+        time_s: When its orders change, shape (n,).
+        old, new: From each of these times on: the path that was left before, and that which is now [m], each (k, 2).
+    """
+
+    robot: str
+    color: Color
+    time_s: FloatArray
+    old: tuple[FloatArray, ...]
+    new: tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Lane:
+    """One robot in the chart of news: its height there, when it was lost, and when it learned of others' failures."""
+
+    robot: str
+    color: Color
+    height: float
+    lost_s: FloatArray
+    learned_s: FloatArray
+
+
+def lost_of(trace: Trace, radius_m: float) -> Lost:
+    """Where a robot was lost."""
+    outcome, robot = trace.outcome, trace.orders.robot
+    return Lost(robot=robot, radius_m=radius_m, time_s=outcome.end_time_s, at_m=trace.pose[-1, :2],
+                what=f"{robot} {LOST[outcome.end]}, {outcome.end_time_s:.0f} s")
+
+
+def changes_of(news: Sequence[NewsHeard], colors: Mapping[str, Color]) -> tuple[Change, ...]:
+    """Robots whose orders changed, in order of the first time."""
+    changed = dict.fromkeys(robot.robot for heard in news for robot in heard.rerouted)
+    found = []
+    for name in changed:
+        mine = [(heard.time_s, robot) for heard in news for robot in heard.rerouted if robot.robot == name]
+        found.append(Change(robot=name, color=colors[name], time_s=np.array([time_s for time_s, _ in mine]),
+                            old=tuple(robot.old for _, robot in mine), new=tuple(robot.new for _, robot in mine)))
+    return tuple(found)
+
+
+def lanes_of(traces: Sequence[Trace], news: Sequence[NewsHeard], colors: Mapping[str, Color]) -> tuple[Lane, ...]:
+    """A lane for each robot, the first at the top; none if no news came."""
+    return tuple(Lane(
+        robot=robot, color=colors[robot], height=-float(number),
+        lost_s=np.array([trace.outcome.end_time_s] if trace.outcome.end in LOST else []),
+        learned_s=np.array([heard.time_s for heard in news if robot in heard.learned]))
+        for number, trace in enumerate(traces) for robot in [trace.orders.robot]) if news else ()
+
+
+def sentences_of(heard: NewsHeard) -> list[tuple[str, str | None]]:
+    """What a team hears, and what each robot is told to do: sentences, and whom they are about alone."""
+    failed = ", ".join(heard.failed)
+    said: list[tuple[str, str | None]] = [(
+        f"{', '.join(heard.learned)} learned that {failed} failed" if heard.learned else
+        f"it is known that {failed} failed, and nobody is left to be told", None)]
+    for robot in heard.rerouted:
+        parts = [f"{verb} {', '.join(sites)}" for verb, sites in (
+            ("takes over", robot.taken), ("leaves out", robot.dropped)) if sites]
+        said.append((f"{robot.robot} {' and '.join(parts) or 'goes on in another order'}", robot.robot))
+    return said

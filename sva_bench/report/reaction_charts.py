@@ -1,0 +1,96 @@
+"""Charts of teams that react."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import ScenarioSummary
+from sva_bench.choices import NEWS
+from sva_bench.report.charts import mark
+from sva_bench.report.drawing import Axes, chart
+from sva_bench.report.reaction_wording import Reacting, recourse_pct, vss_pct
+
+MOST_SCENARIOS = 8
+"""Scenarios that a chart shows: as many as there are shapes of points."""
+_WIDTH_IN = 4.8  # narrow, so that its letters stay legible on a phone
+
+
+def vss_against_news(rows: Sequence[Reacting]) -> str:
+    """Points with intervals: VSS without reaction, and by the kind of news from the worst to the best informed."""
+    policy = rows[0].reaction.policy
+    heard = [news for news in NEWS if any(row.reaction.news == news for row in rows)]
+    scenarios = _first(rows)
+
+    def draw(axes: Axes) -> None:
+        axes.axhline(0, color="#444", linewidth=1)
+        for number, (name, scenario) in enumerate(scenarios.items()):
+            found = {0: vss_pct(scenario.vss, scenario.stochastic.executed.mean)}
+            for row in rows:
+                if row.scenario is scenario:
+                    reaction = row.reaction
+                    found[1 + heard.index(reaction.news)] = vss_pct(
+                        reaction.vss, reaction.plans["stochastic"].executed.mean)
+            known = {at: value for at, value in found.items() if value is not None}
+            beside = 0.5 * ((number + 0.5) / len(scenarios) - 0.5)
+            at = [position + beside for position in sorted(known)]
+            _points(axes, at, [known[position] for position in sorted(known)], number, name, joined=True)
+        axes.set_xticks(range(len(heard) + 1), ["no reaction", *heard])
+        axes.set_xlim(-0.5, len(heard) + 0.5)
+        axes.set_ylabel("VSS [% of the stochastic plan]")
+        axes.set_title(f"VSS by news, policy {policy}")
+        axes.grid(axis="y", color="#ddd")
+        _legend(axes)
+
+    return chart(f"vss-by-news-{policy}", "VSS in per cent without reaction and by the kind of news, a line for each "
+                 "scenario, with 95 % intervals", (_WIDTH_IN, 3.8), draw)
+
+
+def recourse_by_plan(rows: Sequence[Reacting]) -> str:
+    """Points with intervals: what reacting adds to each plan, a row for each scenario and kind of news."""
+    policy = rows[0].reaction.policy
+    kept = [row for row in rows if row.scenario.name in _first(rows)]
+    plans = list(dict.fromkeys(name for row in kept for name in row.reaction.plans))
+
+    def draw(axes: Axes) -> None:
+        axes.axvline(0, color="#444", linewidth=1)
+        for number, plan in enumerate(plans):
+            known = [(k, value) for k, row in enumerate(kept)
+                     if plan in row.reaction.plans and (value := recourse_pct(row.reaction, plan)) is not None]
+            beside = 0.64 * ((number + 0.5) / len(plans) - 0.5)
+            _points(axes, [k + beside for k, _ in known], [value for _, value in known], number, plan, across=True)
+        for k in range(1, len(kept)):
+            if kept[k].scenario is not kept[k - 1].scenario:
+                axes.axhline(k - 0.5, color="#bbb", linewidth=0.8)
+        axes.set_yticks(range(len(kept)), [f"{row.scenario.name}, {row.reaction.news}" for row in kept])
+        axes.set_ylim(len(kept) - 0.5, -0.5)
+        axes.set_xlabel("value of recourse [% of the plan's value]")
+        axes.set_title(f"What reacting adds, policy {policy}")
+        axes.grid(axis="x", color="#ddd")
+        _legend(axes)
+
+    return chart(f"recourse-{policy}", "Value of recourse of each plan in per cent of its value without reaction, by "
+                 "scenario and kind of news, with 95 % intervals", (_WIDTH_IN, 1.5 + 0.36 * len(kept)), draw)
+
+
+def _first(rows: Sequence[Reacting]) -> dict[str, ScenarioSummary]:
+    """The scenarios that a chart shows, by name."""
+    return dict(list({row.scenario.name: row.scenario for row in rows}.items())[:MOST_SCENARIOS])
+
+
+def _points(axes: Axes, at: Sequence[float], found: Sequence[Estimate], number: int, label: str, *,
+            joined: bool = False, across: bool = False) -> None:
+    """Points with intervals, upright or across."""
+    colour, shape = mark(number)
+    for place, value in zip(at, found, strict=True):
+        if value.ci95 is not None:
+            ends = (value.ci95, (place, place)) if across else ((place, place), value.ci95)
+            axes.plot(*ends, color=colour, linewidth=2.4, solid_capstyle="butt")
+    means = [value.mean for value in found]
+    axes.plot(*((means, at) if across else (at, means)), marker=shape, color=colour, markersize=6.5,
+              markeredgecolor="black", markeredgewidth=0.6, linestyle=":" if joined else "none", linewidth=1.2,
+              label=label)
+
+
+def _legend(axes: Axes) -> None:
+    axes.figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9, handlelength=1.8)

@@ -1,0 +1,276 @@
+"""Texts of teams that react, shared by terminal and page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from sva_bench.analysis.over_trials import percent
+from sva_bench.analysis.reaction_results import Gain, ReactionResult
+from sva_bench.analysis.results import Estimate, VssFigures
+from sva_bench.analysis.scenarios import ScenarioSummary
+from sva_bench.analysis.summaries import Summary
+from sva_bench.choices import News, PolicyName
+from sva_bench.files.printable import counted
+from sva_bench.report.wording import listed, per_cent, with_interval
+
+_MOST_NAMED = 6
+
+_DOES: dict[PolicyName, str] = {"resolve": "re-plans", "none": "keeps its orders"}
+_HEARS: dict[News, str] = {
+    "never": "but never hears of a failure", "station": "at the stations where robots hear of a failure",
+    "report": "when a robot misses a report", "instant": "the moment a robot fails"}
+KNOWS: dict[News, str] = {
+    "never": "nobody ever learns of a failure",
+    "station": "a failure is posted when its report is missed, each robot learns of it when it next leaves a station, "
+               "and stations share what robots decided",
+    "report": "all robots learn of a failure at the planned arrival that the robot misses, or at the failure if that "
+              "is later",
+    "instant": "all robots learn of a failure the moment it happens"}
+"""Who knows what when, by the kind of news."""
+
+
+class Answer(NamedTuple):
+    """What a policy and news come to: the condition, and what holds under it, sentence by sentence.
+
+    Joined by spaces, all of it reads as a text.
+    """
+
+    condition: str
+    sentences: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return " ".join((self.condition, *self.sentences))
+
+
+class Reacting(NamedTuple):
+    """A scenario under one policy and news."""
+
+    scenario: ScenarioSummary
+    reaction: ReactionResult
+
+
+def reacting(summary: Summary) -> list[Reacting]:
+    """Every scenario under every policy and news, scenario by scenario."""
+    return [Reacting(scenario, reaction) for scenario in summary.scenarios for reaction in scenario.reactions or ()]
+
+
+def reaction_answers(summary: Summary) -> list[Answer]:
+    """What planning for failures is worth to a team that re-plans: an answer for each policy and news.
+
+    News that come to the same, in the digits shown, share an answer.
+    """
+    found: dict[tuple[PolicyName, tuple[str, ...]], list[News]] = {}
+    for policy, news in dict.fromkeys((row.reaction.policy, row.reaction.news) for row in reacting(summary)):
+        rows = [row for row in reacting(summary) if (row.reaction.policy, row.reaction.news) == (policy, news)]
+        said = tuple(part for part in (_worth(rows), _recourse(rows), _best(rows)) if part)
+        found.setdefault((policy, said), []).append(news)
+    return [Answer(f"If the team {_DOES[policy]} {', or '.join(_HEARS[own] for own in news)},", said)
+            for (policy, said), news in found.items()]
+
+
+def reaction_assumptions(summary: Summary) -> list[str]:
+    """What the answers rest on: who knows what when, what re-planning is, and whether failures were sampled."""
+    rows = reacting(summary)
+    if not rows:
+        return []
+    news = dict.fromkeys(row.reaction.news for row in rows)
+    tried = "" if any("anticipative" in row.reaction.plans for row in rows) else \
+        " No plan was made for the reaction; --anticipate makes one and tries it too."
+    return [f"Who knows what when: {'; '.join(f'{own} news: {KNOWS[own]}' for own in news)}. The team counts on its "
+            "schedule, and on reports of robots that run late; a leg is driven to its end before new orders are taken.",
+            f"{_histories(rows)}{tried}"]
+
+
+def _histories(rows: Sequence[Reacting]) -> str:
+    least, most = (extreme(plan.missions for row in rows for plan in row.reaction.plans.values())
+                   for extreme in (min, max))
+    number = f"{least} to {counted(most, 'mission')}" if least < most else counted(most, "mission")
+    kinds = {row.reaction.histories for row in rows}
+    if kinds == {"enumerated"}:
+        return f"With reactions all histories of failures were played under each noise draw ({number} a plan): the " \
+               "interval is that of the noise alone."
+    if kinds == {"sampled"}:
+        return f"With reactions {number} were played of each plan, a sample of the histories of failures: the " \
+               "interval is that of failures and noise."
+    return "With reactions all histories of failures were played where they are few, else a sample of them " \
+           f"({number} a plan)."
+
+
+def _worth(rows: Sequence[Reacting]) -> str:
+    """Value of planning for failures under the reaction, beside that without."""
+    pays, loses, even, same, unsure = _sorted_by_verdict(rows)
+    said = []
+    if pays:
+        said.append("planning for failures is worth " + _some(
+            [f"{_amount(r.vss)} in {s.name} in place of {_without(s.vss)}" for s, r in pays]))
+    if loses:
+        said.append("the deterministic plan is worth more in " + _some(
+            [f"{s.name} (VSS {_amount(r.vss)} in place of {_without(s.vss)})" for s, r in loses]))
+    if even:
+        said.append("the value of planning for failures is not distinguishable from zero in " + _some(
+            [f"{s.name} (in place of {_without(s.vss)})" for s, r in even]))
+    if unsure:
+        said.append("too few noise draws give an interval in " + _some([s.name for s, _ in unsure]))
+    if same:
+        said.append("both plans are the same in " + _some([s.name for s, _ in same]))
+    return "; ".join(said) + "."
+
+
+def _sorted_by_verdict(rows: Sequence[Reacting]) -> tuple[list[Reacting], ...]:
+    pays: list[Reacting] = []
+    loses: list[Reacting] = []
+    even: list[Reacting] = []
+    same: list[Reacting] = []
+    unsure: list[Reacting] = []
+    for row in rows:
+        vss = row.reaction.vss
+        if vss.same_plan:
+            same.append(row)
+        elif vss.executed.ci95 is None:
+            unsure.append(row)
+        elif not vss.distinguishable:
+            even.append(row)
+        else:
+            (pays if vss.executed.mean > 0 else loses).append(row)
+    return pays, loses, even, same, unsure
+
+
+def _without(vss: VssFigures) -> str:
+    """The VSS without reaction, in a word."""
+    if vss.same_plan:
+        return "none"
+    if vss.executed.ci95 is None:
+        return f"{_amount(vss)}, no interval"
+    return _amount(vss) if vss.distinguishable else "one not distinguishable from zero"
+
+
+def _amount(vss: VssFigures) -> str:
+    return per_cent(vss.executed_pct) if vss.executed_pct is not None else f"{vss.executed.mean:.1f}"
+
+
+def _recourse(rows: Sequence[Reacting]) -> str:
+    """What re-planning adds to each of the two plans."""
+    gains = [(s.name, r.value_of_recourse["deterministic"], r.value_of_recourse["stochastic"]) for s, r in rows]
+    telling = [row for row in gains if row[1].excludes_zero or row[2].excludes_zero]
+    if not telling:
+        return "Re-planning changes no plan's value distinguishably."
+    falls = any(gain.excludes_zero and gain.mean < 0 for _, *both in telling for gain in both)
+    (name, det, sto), *more = telling
+    first = f"the deterministic plan by {_gained(det)} and the stochastic one by {_gained(sto)} in {name}" if falls \
+        else f"{_gained(det)} to the deterministic plan and {_gained(sto)} to the stochastic one in {name}"
+    others = [f"{_gained(det)} and {_gained(sto)} in {name}" for name, det, sto in more]
+    return f"Re-planning {'changes' if falls else 'adds'} {_some([first, *others], '; ')}."
+
+
+def _gained(gain: Gain) -> str:
+    if not gain.excludes_zero:
+        return "nothing" if gain.ci95 == (0.0, 0.0) else "nothing distinguishable"
+    return per_cent(gain.pct) if gain.pct is not None else f"{gain.mean:.1f}"
+
+
+def _best(rows: Sequence[Reacting]) -> str:
+    """Which of the plans tried is the best for the reaction, and by how much."""
+    said = [f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over})" for s, r in rows if r.best.over is not None]
+    return f"The best plan for it, of those tried: {_some(said)}." if said else ""
+
+
+def lead(reaction: ReactionResult) -> str:
+    """How far the best plan is ahead of the next, in words that end before the next one's name."""
+    ahead = lead_pct(reaction)
+    known = Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
+    if not known.excludes_zero:
+        return "not distinguishable from the"
+    return f"{f'{known.mean:+.1f}' if ahead is None else _signed(ahead.mean)} over the"
+
+
+def _signed(pct: float) -> str:
+    return f"{'+' if pct > 0 else ''}{per_cent(pct)}"
+
+
+def _some(words: Sequence[str], comma: str = ", ") -> str:
+    """As many as a sentence bears."""
+    kept = [*words[:_MOST_NAMED], *([f"{len(words) - _MOST_NAMED} more below"] if len(words) > _MOST_NAMED else [])]
+    return listed(kept) if comma == ", " else comma.join(kept)
+
+
+def in_per_cent(found: Estimate, of: float) -> Estimate | None:
+    """A difference and its interval in per cent of a value; ``None`` of a value of nothing, or less, or next to it."""
+    low, mean, high = (percent(figure, of) for figure in (
+        (found.ci95 or (found.mean,))[0], found.mean, (found.ci95 or (found.mean,))[-1]))
+    if of <= 0 or low is None or mean is None or high is None:
+        return None
+    return Estimate(mean=mean, ci95=found.ci95 and (low, high))
+
+
+def vss_pct(vss: VssFigures, stochastic: float) -> Estimate | None:
+    """VSS in per cent of the stochastic plan's value."""
+    return in_per_cent(vss.executed, stochastic)
+
+
+def recourse_pct(reaction: ReactionResult, plan: str) -> Estimate | None:
+    """Value of recourse in per cent of the plan's value without."""
+    gain = reaction.value_of_recourse[plan]
+    return in_per_cent(gain, reaction.plans[plan].executed.mean - gain.mean)
+
+
+def of_best_pct(reaction: ReactionResult, gain: Estimate) -> Estimate | None:
+    """A lead of the best plan in per cent of its value."""
+    return in_per_cent(gain, reaction.plans[reaction.best.plan].executed.mean)
+
+
+def lead_pct(reaction: ReactionResult) -> Estimate | None:
+    """Lead of the best plan over the next in per cent of its value."""
+    return of_best_pct(reaction, Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95))
+
+
+DOUBTED = "°"
+"""Behind figures whose interval holds zero."""
+
+
+def doubted(found: Estimate | None, show: Callable[[Estimate], str] = with_interval) -> str:
+    """A difference as tables show it: marked where it is not distinguishable from zero."""
+    if found is None:
+        return ""
+    mean, bracket, ends = show(found).partition(" [")  # behind the mean, where no line breaks before it
+    return mean + ("" if found.excludes_zero or found.ci95 in (None, (0.0, 0.0)) else DOUBTED) + bracket + ends
+
+
+def doubles(rows: Iterable[Reacting]) -> list[str]:
+    """Scenarios, news and plans in which two robots visit a POI, if any."""
+    return [f"{plan.doubled:.2g} a mission in {s.name} on {r.news} news ({name})"
+            for s, r in rows for name, plan in r.plans.items() if plan.doubled > 0]
+
+
+def changed(reaction: ReactionResult) -> str:
+    """Share of missions in which orders change, over the plans [%]."""
+    shares = [100 * plan.reacted for plan in reaction.plans.values()]
+    least, most = f"{min(shares):.0f}", f"{max(shares):.0f}"
+    return least if least == most else f"{least}–{most}"
+
+
+DEFINITIONS: tuple[tuple[str, str], ...] = (
+    ("V(x, π)", "mean value that plan x collects if the team follows policy π; V(x, none) is that without reaction"),
+    ("VSS under π", "V(stochastic, π) − V(deterministic, π), in per cent of V(stochastic, π). Either sign: neither "
+     "plan was made for π, and the stochastic plan pays for a hedge that re-planning may give for nothing"),
+    ("Value of recourse of x", "V(x, π) − V(x, none), by the same failures and noise, in per cent of V(x, none). What "
+     "reacting adds to a plan; below zero where re-planning on what is known then turns out worse"),
+    ("Best plan for π", "the plan with the greatest V(x, π) if all legs are driven as planned, of those tried: the two "
+     "plans and, with --anticipate, the anticipative one; another plan may be better still. Its lead is "
+     "over the next best of other routes, in per cent of its own value"),
+    ("VSS with recourse", "V(best, π) − V(deterministic, π), in per cent of V(best, π): what planning for failures is "
+     "worth if the plan may be made for the reaction. Not below zero but for noise, as the deterministic plan is among "
+     "those tried"),
+    ("Anticipation", "V(best, π) − V(stochastic, π), in per cent of V(best, π): what knowing of the reaction when "
+     "planning adds to planning for failures"),
+    ("Orders changed", "share of missions in which some robot's orders change"),
+)
+"""What each figure is."""
+
+
+def definitions(rows: Sequence[Reacting]) -> Iterator[tuple[str, str]]:
+    """Figures with what they are, as far as the tables have them."""
+    yield from DEFINITIONS
+    if doubles(rows):
+        yield "Doubled visits", "mean number of POIs in a mission that two robots visit, both visits counted: the " \
+                                "incentive of such a POI is credited twice"

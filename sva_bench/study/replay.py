@@ -1,0 +1,151 @@
+"""One trial or history of a finished run again, recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
+from sva_bench.analysis.summaries import ComparisonSummary
+from sva_bench.choices import News, PolicyName
+from sva_bench.errors import BadInput, nearest
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.policies.registry import POLICIES, Means
+from sva_bench.execution.react import react_again
+from sva_bench.execution.reacted import Reacted
+from sva_bench.mission.plan_file import read_plan
+from sva_bench.recording.rerun import record
+from sva_bench.solver.rest import plan_rest
+from sva_bench.storage.outcome_table import outcome_table
+from sva_bench.storage.run_folder import made_for, recording_stem, stem_of
+from sva_bench.storage.stored_run import Content, find_row, read_content, run_folder_at
+from sva_bench.study.costs import instance_of, plan_costs
+from sva_bench.study.given_plans import without_times
+from sva_bench.study.publish import record_team
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.workers.progress import OnProgress
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Wanted:
+    """What is to be seen again.
+
+    Attributes:
+        scenario: The scenario; ``None`` = the only one.
+        trial: Number of the trial, or of the history.
+        planner: Whose plan; ``None`` = everybody's.
+        policy, news: The reaction; ``None`` = the only one of the run that fits.
+    """
+
+    scenario: str | None
+    trial: int
+    planner: str | None = None
+    policy: PolicyName = "none"
+    news: News | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Replayed:
+    """A trial again: its rows as in ``outcomes.parquet``, and where it was recorded."""
+
+    rows: Sequence[Mapping[str, Any]]
+    recording: Path
+
+
+def replay(folder: Path, wanted: Wanted, executor: Executor | None, progress: OnProgress) -> list[Replayed]:
+    """Play one trial of a run again, for each plan asked for, and record it into the run's folder.
+
+    Raises:
+        BadInput: If this is no run folder, or the run has no such trial.
+        BadFile: If a file of the folder is damaged.
+    """
+    content = read_content(run_folder_at(folder))
+    cases = _cases(folder, content, wanted)
+    costs = plan_costs(content.world, content.manifest.options["planner"], progress)
+    foreign = isinstance(content.summary, ComparisonSummary)
+    found = []
+    for case, history in cases:
+        path = folder / "recordings" / f"{recording_stem(case.key, wanted.trial, foreign=foreign)}.rrd"
+        path.parent.mkdir(exist_ok=True)
+        found.append(_again(content, costs, case, wanted.trial, history, path, executor))
+    return found
+
+
+def _again(
+    content: Content, costs: Mapping[str, FuelCosts], case: Case, trial: int, history: tuple[int, int] | None,
+    path: Path, executor: Executor | None,
+) -> Replayed:
+    """Play one case again."""
+    world, summary = content.world, content.summary
+    settings = Settings(seed=summary.seed, trials=summary.trials, rollouts=summary.rollouts, fidelity=summary.fidelity)
+    run: Executed | Reacted
+    if case.policy == "none":
+        settings = replace(settings, first=trial, trials=1)
+        (run,) = execute(world, costs, [case], settings, executor)
+        record(path, world, run.traces, title=f"{world.name}, {case.title}, trial {trial}")
+    else:
+        instance = replace(instance_of(world, costs, case.scenario), failure=world.execute_failure)
+        policy = POLICIES[case.policy](Means(instance=instance, plans_rest=plan_rest))
+        run = react_again(world, costs, case, policy, settings, trial, history, executor)
+        assert run.shown is not None, "a mission that is played again is shown"
+        record_team(path, world, case, run.shown)
+    table = outcome_table(run, [robot.name for robot in world.robots], settings)
+    return Replayed(rows=table.to_pylist(), recording=path)
+
+
+def _cases(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case, tuple[int, int] | None]]:
+    """The plans that are to be played again, with noise draw and history where these are enumerated.
+
+    Raises:
+        BadInput: If the run has no such plan, reaction or trial.
+    """
+    scenarios: Sequence[ScenarioSummary | ComparedScenario] = content.summary.scenarios
+    names = [scenario.name for scenario in scenarios]
+    number = names.index(_one_of("--scenario", wanted.scenario, names))
+    told, scenario, instance = scenarios[number], content.world.scenarios[number], without_times(content.world)
+    plans: Sequence[str] = list(told.plans)
+    news: News = "never"
+    if wanted.policy != "none":
+        mine = {r.news: r for r in told.reactions or () if r.policy == wanted.policy}
+        if not mine:
+            raise BadInput(f"--policy {wanted.policy}: the run measured no such reaction; run its command again with "
+                           f"--policy {wanted.policy}")
+        news = {str(when): when for when in mine}[_one_of("--news", wanted.news, list(mine))]
+        plans = list(mine[news].plans)
+    elif wanted.news not in (None, "never"):
+        raise BadInput(f"--news {wanted.news}: nobody reacts to it without a policy; add --policy resolve")
+    if wanted.planner is None:
+        plans = [name for name in plans if name != "informed"]
+    elif _one_of("--planner", wanted.planner, list(plans)) == "informed":
+        raise BadInput("--planner informed: it has another plan for each set of robots; replay one of the others")
+    cases = []
+    for name in plans if wanted.planner is None else [wanted.planner]:
+        row = find_row(folder / "outcomes.parquet", (scenario.name, name, wanted.policy, news), wanted.trial)
+        if row is None:
+            raise BadInput(f"--trial {wanted.trial}: {scenario.name}, {name} has no such trial; the first is 0, and "
+                           "outcomes.parquet lists all")
+        kept = name if (scenario.name, name) in content.stems else made_for(name, news)
+        foreign = isinstance(content.summary, ComparisonSummary)
+        plan = read_plan(folder / "plans" / f"{stem_of(scenario.name, kept, foreign=foreign)}.json", instance)
+        cases.append((Case(scenario=scenario, planner=name, plan=plan, policy=wanted.policy, news=news),
+                      row if row[1] >= 0 else None))
+    return cases
+
+
+def _one_of(option: str, value: str | None, known: Sequence[str]) -> str:
+    """The value of an option, or the only one there is.
+
+    Raises:
+        BadInput: If there is no such, or it isn't given and there are several.
+    """
+    if value is None and len(known) == 1:
+        return known[0]
+    if value is None:
+        raise BadInput(f"{option}: the run has several; name one of {', '.join(known)}")
+    if value not in known:
+        raise BadInput(f"{option} {value[:60]!r}: the run has none of that name; {nearest(value, list(known))}")
+    return value

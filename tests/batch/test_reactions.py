@@ -1,0 +1,215 @@
+"""Reactions in batches: figures of a run, in any order of work, aggregated over maps."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sva_bench as sb
+from sva_bench.__main__ import run_command_line
+from sva_bench.analysis.over_maps import UnitSummary
+from sva_bench.analysis.reaction_results import Gain, ReactionResult
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import UnitScenario
+from sva_bench.batch.grid import Grid, Point
+from sva_bench.batch.reactions import ReactionsJob
+from sva_bench.batch.reactions_over_maps import reactions_over_maps
+from sva_bench.batch.shards import Unit, read_note
+from sva_bench.batch.strands import strand
+from sva_bench.errors import BadFile
+from sva_bench.files.codec import decoded, encoded
+from sva_bench.files.records import as_dict
+from sva_bench.study.options import Options
+from tests.results_for_tests import unit
+from tests.worlds_for_tests import SMALL, world_of
+
+QUICK = ("--trials", "30", "--rollouts", "3", "--fidelity", "kinematic", "--unit-trials", "10")
+REACT = ("--policy", "none,resolve", "--news", "report,instant", "--anticipate")
+
+
+def batch(folder: Path, *words: str) -> None:
+    """A batch of the two worlds of a folder."""
+    assert run_command_line(["batch", str(folder / "one.yaml"), str(folder / "two.yaml"), *QUICK, "--cache",
+                             str(folder / "cache"), *words]) == 0
+
+
+def content_of(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two worlds, and a batch of both with reactions in ``done``."""
+    place = tmp_path_factory.mktemp("batch")
+    (place / "one.yaml").write_text(SMALL.replace("name: small", "name: one"), encoding="utf-8")
+    (place / "two.yaml").write_text(SMALL.replace("name: small", "name: two").replace("p4: 40", "p4: 35"),
+                                    encoding="utf-8")
+    batch(place, *REACT, "--out", str(place / "done"), "--workers", "2", "--csv")
+    return place
+
+
+def units_of(folder: Path) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads((folder / "summary.json").read_text())["units"]
+    return found
+
+
+def test_a_unit_has_the_reactions_of_a_run(folder: Path) -> None:
+    whole = sb.run(folder / "one.yaml", trials=30, rollouts=3, fidelity="kinematic", workers=1, anticipate=True,
+                   policy="resolve", news=["report", "instant"])
+    (mine,) = (unit for unit in units_of(folder / "done") if unit["world"] == "one")
+    for scenario, own in zip(whole.summary.scenarios, mine["scenarios"], strict=True):
+        assert scenario.reactions is not None
+        assert json.loads(json.dumps([as_dict(reaction) for reaction in scenario.reactions])) == own["reactions"]
+
+
+def test_any_number_of_workers_and_any_interruption_give_the_same_bytes(folder: Path, tmp_path: Path) -> None:
+    done = content_of(folder / "done")
+    batch(folder, *REACT, "--out", str(tmp_path / "again"), "--workers", "1", "--csv", "--cache", str(tmp_path))
+    assert content_of(tmp_path / "again") == done
+    # The first unit of a map has its reactions in it, the second hasn't: each is lost once.
+    for lost in ("one-seed0-t00000000", "two-seed0-t00000010"):
+        (tmp_path / "again" / f"outcomes-{lost}.parquet").unlink()
+    batch(folder, *REACT, "--out", str(tmp_path / "again"), "--resume", "--csv")
+    assert content_of(tmp_path / "again") == done
+
+
+def test_a_batch_with_other_reactions_isnt_gone_on_with(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(folder / "done", tmp_path / "done")
+    words = ["batch", str(folder / "one.yaml"), str(folder / "two.yaml"), *QUICK, "--cache", str(folder / "cache")]
+    assert run_command_line([*words, "--policy", "resolve", "--news", "report", "--out", str(tmp_path / "done"),
+                             "--resume"]) == 2
+    assert "options.news" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("first", "reactions"), [
+    (0, ()), (0, (("resolve", "report"),)), (10, (("resolve", "report"),))])
+def test_the_shard_of_a_unit_with_other_reactions_is_refused(
+    folder: Path, first: int, reactions: tuple[Any, ...]
+) -> None:
+    world = sb.load_world(folder / "one.yaml")
+    path = folder / "done" / f"outcomes-one-seed0-t{first:08d}.parquet"
+    sought = Unit(point=Point(world=world, planner="prmstar"), seed=0, first=first, trials=10, rollouts=3,
+                  reactions=reactions)
+    with pytest.raises(BadFile, match="reactions: the shard of another unit"):
+        read_note(path, sought)
+
+
+def test_the_tables_of_reactions_have_a_row_for_each_figure(folder: Path) -> None:
+    with (folder / "done" / "reactions.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    figures = {("vss", ""), ("vss_with_recourse", ""), ("anticipation", ""), *(
+        ("value_of_recourse", plan) for plan in ("stochastic", "deterministic", "anticipative"))}
+    assert {(row["figure"], row["plan"]) for row in rows} == figures
+    assert len(rows) == 2 * 2 * len(figures)  # scenarios, news
+    with (folder / "done" / "reactions-maps.csv").open() as file:
+        each = list(csv.DictReader(file))
+    assert len(each) == 2 * len(rows)
+    for row in rows:
+        mine = [float(own["mean"]) for own in each if all(own[key] == row[key] for key in (
+            "scenario", "policy", "news", "figure", "plan"))]
+        assert float(row["mean"]) == pytest.approx(np.mean(mine))
+
+
+def test_the_page_of_a_batch_shows_its_reactions(folder: Path) -> None:
+    assert "Teams that react" in (folder / "done" / "report.html").read_text()
+
+
+def test_how_far_a_batch_is_says_what_reacting_is_worth_so_far(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command_line(["batch", "status", str(folder / "done"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["reactions"] == json.loads((folder / "done" / "summary.json").read_text())["reactions"]
+    assert run_command_line(["batch", "status", str(folder / "done")]) == 0
+    assert "Reactions over maps" in capsys.readouterr().out
+
+
+def test_a_batch_that_is_taken_up_again_reacts_as_before(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder / "done", tmp_path / "done")
+    (tmp_path / "done" / "outcomes-one-seed0-t00000000.parquet").unlink()
+    assert run_command_line(["batch", "retry", str(tmp_path / "done"), "--cache", str(folder / "cache"), "--csv"]) == 0
+    assert content_of(tmp_path / "done") == content_of(folder / "done")
+
+
+def test_how_a_world_reacts_is_varied_as_any_key(folder: Path, tmp_path: Path) -> None:
+    words = ["batch", str(folder / "one.yaml"), *QUICK, "--cache", str(folder / "cache"), "--scenario", "half",
+             "--out", str(tmp_path / "out")]
+    assert run_command_line([*words, "--set", "reaction.policy=none,resolve"]) == 0
+    still, reacts = units_of(tmp_path / "out")
+    assert "reactions" not in still["scenarios"][0]
+    assert [row["news"] for row in reacts["scenarios"][0]["reactions"]] == ["report"]
+    del reacts["scenarios"][0]["reactions"]
+    assert reacts["scenarios"] == still["scenarios"]
+
+
+def test_a_sweep_file_names_reactions_as_options_do(folder: Path, tmp_path: Path) -> None:
+    sweep = tmp_path / "sweep.yaml"
+    sweep.write_text(f"format: sva-bench/sweep@1\nworlds: [{folder}/one.yaml, {folder}/two.yaml]\ntrials: 30\n"
+                     "rollouts: 3\nfidelity: kinematic\nunit_trials: 10\npolicy: [none, resolve]\n"
+                     "news: report,instant\nanticipate: true\n", encoding="utf-8")
+    assert run_command_line(["batch", str(sweep), "--cache", str(folder / "cache"), "--out", str(tmp_path / "out"),
+                             "--csv"]) == 0
+    assert content_of(tmp_path / "out") == content_of(folder / "done")
+
+
+def gain(mean: float, pct: float | None) -> Gain:
+    return Gain(mean=mean, ci95=None, pct=pct)
+
+
+def reacting(world: str, seed: int, mean: float, pct: float | None, example: ReactionResult) -> UnitSummary:
+    """A map and seed at which every gain of the reaction is this."""
+    bare = unit(world, mean)
+    result = replace(
+        example, value_of_recourse={"stochastic": gain(mean, pct)}, vss_with_recourse=gain(mean, pct),
+        anticipation=gain(mean, pct),
+        vss=replace(example.vss, executed=Estimate(mean=mean, ci95=None), executed_pct=pct))
+    scenario: UnitScenario = replace(bare.scenarios[0], reactions=(result,))
+    return replace(bare, seed=seed, scenarios=(scenario,))
+
+
+def test_over_maps_the_maps_are_the_sample_and_seeds_are_nested_in_them(tmp_path: Path) -> None:
+    found = sb.run(world_of(tmp_path), trials=4, rollouts=2, fidelity="kinematic", policy="resolve", workers=1)
+    example = found.summary.scenarios[0].reactions
+    assert example is not None
+    # Map a: seeds of 2 and 4, the one at 10 %, the other without a percentage; map b: 7 at 30 %.
+    rows = reactions_over_maps([reacting("a", 0, 2, 10, example[0]), reacting("a", 1, 4, None, example[0]),
+                                reacting("b", 0, 7, 30, example[0]), unit("c", 1.0)])
+    (row,) = rows
+    assert (row.maps, row.policy, row.news) == (2, "resolve", "report")
+    for gained in (row.vss, row.value_of_recourse["stochastic"], row.vss_with_recourse, row.anticipation):
+        assert gained.mean == pytest.approx(5)  # of 3 and 7
+        assert gained.pct.mean == pytest.approx(20)
+        assert gained.ci95 is not None
+        assert gained.ci95[0] < 3 < 7 < gained.ci95[1]
+
+
+def test_a_job_is_known_by_what_its_result_depends_on(tmp_path: Path) -> None:
+    world = world_of(tmp_path)
+
+    def job(options: Options, name: str = "small") -> ReactionsJob:
+        point = Point(world=replace(world, name=name), planner="prmstar")
+        steps = strand(Grid(points=[point], seeds=[0], options=options, unit_trials=10), point, 0, frozenset())
+        jobs = next(steps)
+        while not isinstance(jobs[0], ReactionsJob):
+            jobs = steps.send([each.run() for each in jobs])
+        return jobs[0]
+
+    options = Options(trials=4, rollouts=2, fidelity="kinematic", policies=("resolve",), news=("report",))
+    first = job(options)
+    assert first.key == job(replace(options, policies=("none", "resolve"))).key
+    others = [replace(options, trials=3), replace(options, rollouts=1), replace(options, news=("instant",)),
+              replace(options, anticipate=True)]
+    assert len({first.key, *(job(other).key for other in others)}) == 1 + len(others)
+    result = first.run()
+    assert first.fits(result)
+    assert decoded(encoded(result, ReactionsJob.result), ReactionsJob.result) == result
+    assert not first.fits(dict.fromkeys(result, ()))

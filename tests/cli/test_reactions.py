@@ -1,0 +1,141 @@
+"""Reactions as a user asks for them: what commands take, keep, and answer where something doesn't go together."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sva_bench.__main__ import run_command_line
+from sva_bench.choices import NEWS, POLICY_NAMES
+from tests.worlds_for_tests import SMALL
+
+STATION = "  stations:\n    r1: {at_m: [3.2, 5.2], stop_s: 4}\n"
+PLAN = '{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}'
+QUICK = ("--trials", "10", "--rollouts", "1", "--fidelity", "kinematic", "--workers", "1")
+TAKE_LISTS = {"run": ["run", "w.yaml"], "execute": ["execute", "w.yaml", "p.json"], "batch": ["batch", "w.yaml"]}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a world, one without stations, one that reacts, and a plan."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "w.yaml").write_text(SMALL)
+    (tmp_path / "bare.yaml").write_text(SMALL.replace(STATION, ""))
+    (tmp_path / "reacts.yaml").write_text(SMALL + "reaction: {policy: resolve, news: instant}\n")
+    (tmp_path / "p.json").write_text(PLAN)
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", TAKE_LISTS)
+@pytest.mark.parametrize(("options", "says"), [
+    (("--policy", "resolv"), "--policy 'resolv': there is no such policy; did you mean 'resolve'?"),
+    (("--policy", "none,resolve,none"), "--policy none: given twice"),
+    (("--policy", "resolve", "--policy", "resolve"), "--policy resolve: given twice"),
+    (("--policy", "resolve,"), "--policy 'resolve,': an entry is empty"),
+    (("--policy", ""), "--policy: its value is empty"),
+    (("--news", ""), "--news: its value is empty"),
+    (("--policy", "resolve", "--news", "instant,,never"), "--news 'instant,,never': an entry is empty"),
+    (("--policy", "resolve", "--news", "reprot"), "--news 'reprot': there is no such kind of news; did you mean"),
+    (("--news", "instant"), "--news: no policy reacts to it; add the policy resolve"),
+    (("--policy", "none", "--news", "never,report"), "--news: no policy reacts to it"),
+    (("--anticipate",), "--anticipate: "),
+])
+def test_what_makes_no_sense_is_one_error_that_names_the_option(
+    command: str, options: tuple[str, ...], says: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command_line([*TAKE_LISTS[command], *options]) == 2
+    told = "".join(capsys.readouterr())
+    assert told.startswith(f"error: {says}"), told
+    assert told.count("\n") == 1
+    assert not (folder / "runs").exists()
+
+
+@pytest.mark.parametrize("command", TAKE_LISTS)
+def test_news_at_stations_takes_a_station_whoever_asks_for_it(
+    command: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [word.replace("w.yaml", "bare.yaml") for word in TAKE_LISTS[command]]
+    assert run_command_line([*words, "--policy", "none,resolve", "--news", "report,station"]) == 2
+    assert capsys.readouterr().err.startswith("error: --news: small has no station to hear it at; place one")
+    (folder / "bare.yaml").write_text(SMALL.replace(STATION, "") + "reaction: {policy: resolve, news: station}\n")
+    assert run_command_line(words) == 2
+    assert "bare.yaml:33: reaction.news: there is no station to hear it at" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(("world", "options", "asks_for"), [
+    ("w.yaml", (), "the policy resolve, or a reaction"), ("w.yaml", ("--policy", "none"), "the policy resolve"),
+    ("reacts.yaml", ("--policy", "none"), "the policy resolve"),
+    ("w.yaml", ("--policy", "resolve", "--news", "never"), "news other than never"),
+])
+def test_nothing_is_anticipated_where_nobody_reacts(
+    world: str, options: tuple[str, ...], asks_for: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for command in (["run"], ["batch", "--dry-run"]):
+        assert run_command_line([*command, world, "--anticipate", *options]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith("error: --anticipate: plans for a reaction to failures, and small has none; add ")
+        assert asks_for in said
+
+
+@pytest.mark.usefixtures("folder")
+def test_execute_says_who_makes_plans_for_a_reaction(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command_line(["execute", "w.yaml", "p.json", "--policy", "resolve", "--anticipate"]) == 2
+    assert "execute makes no plans; run --anticipate does" in capsys.readouterr().err
+
+
+def test_a_run_keeps_what_was_asked_for_and_is_named_as_ever_where_nothing_was(folder: Path) -> None:
+    def options_of(*words: str) -> tuple[str, dict[str, object]]:
+        assert run_command_line([*words, *QUICK, "--out", f"out{len(list(folder.iterdir()))}"]) == 0
+        (run,) = max(folder.glob("out*"), key=lambda path: int(path.name[3:])).iterdir()
+        return run.name, json.loads((run / "manifest.json").read_text())["options"]
+
+    plain, nothing = options_of("run", "w.yaml")
+    assert not {"policies", "news", "anticipate"} & set(nothing)
+    name, kept = options_of("run", "w.yaml", "--policy", "none,resolve", "--news", "instant,report", "--anticipate")
+    assert (kept["policies"], kept["news"], kept["anticipate"]) == (["none", "resolve"], ["instant", "report"], True)
+    assert name != plain
+    name, kept = options_of("execute", "w.yaml", "p.json", "--policy", "resolve", "--news", "station")
+    assert (kept["policies"], kept["news"]) == (["resolve"], ["station"])
+    name, kept = options_of("run", "reacts.yaml", "--anticipate")  # the world's own reaction is one
+    assert name != plain
+    assert kept["anticipate"]
+
+
+def test_a_batch_takes_them_and_its_folder_keeps_them(folder: Path) -> None:
+    words = ["batch", "w.yaml", *QUICK, "--cache", "cache", "--policy", "resolve", "--news", "never,report",
+             "--anticipate", "--out", "b"]
+    assert run_command_line(words) == 0
+    kept = json.loads((folder / "b" / "manifest.json").read_text())["settings"]["options"]
+    assert (kept["policies"], kept["news"], kept["anticipate"]) == (["resolve"], ["never", "report"], True)
+    assert run_command_line([*words, "--resume"]) == 0
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_batch_is_not_gone_on_with_under_another_reaction(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["batch", "w.yaml", *QUICK, "--cache", "cache", "--policy", "resolve", "--out", "b", "--resume"]
+    assert run_command_line(words) == 0
+    capsys.readouterr()
+    assert run_command_line([*words, "--news", "instant"]) == 2
+    assert 'options.news (absent there, ["instant"] now)' in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_check_says_how_the_team_reacts(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command_line(["world", "check", "reacts.yaml"]) == 0
+    assert "the team reacts to failures: policy resolve, news instant" in capsys.readouterr().out
+    assert run_command_line(["world", "check", "w.yaml"]) == 0
+    assert "reacts" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", TAKE_LISTS)
+def test_help_lists_every_policy_and_all_news(command: str, capsys: pytest.CaptureFixture[str],
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    assert run_command_line([command, "--help"]) == 0
+    shown = {line.split()[1]: line for line in capsys.readouterr().out.splitlines() if line.startswith("│ --")}
+    for option, words in (("--policy", POLICY_NAMES), ("--news", NEWS)):
+        assert ", ".join(words) in shown[option]
+    assert ("--anticipate" in shown) == (command != "execute")
