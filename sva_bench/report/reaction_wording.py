@@ -79,7 +79,18 @@ def reaction_assumptions(summary: Summary) -> list[str]:
         " No plan was made for the reaction; --anticipate makes one and tries it too."
     return [f"Who knows what when: {'; '.join(f'{own} news: {KNOWS[own]}' for own in news)}. The team counts on its "
             "schedule, and on reports of robots that run late; a leg is driven to its end before new orders are taken.",
-            f"{_histories(rows)}{tried}"]
+            f"{_histories(rows)}{_driven_whole(rows)}{tried}"]
+
+
+def _driven_whole(rows: Sequence[Reacting]) -> str:
+    """The check of missions put together from legs; nothing where there was none."""
+    missions = sum(row.reaction.driven_whole.missions for row in rows)
+    differing = sum(row.reaction.driven_whole.differing for row in rows)
+    if not missions:
+        return ""
+    found = "none ended otherwise" if not differing else f"{differing} ended otherwise"
+    return f" Legs were driven one by one; as a check {counted(missions, 'mission')} with changed orders " \
+           f"{'was' if missions == 1 else 'were'} driven whole in physics: {found}."
 
 
 def _histories(rows: Sequence[Reacting]) -> str:

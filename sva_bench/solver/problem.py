@@ -11,6 +11,7 @@ from sva_bench.solver.goal import Goal
 from sva_bench.solver.knowledge import Clock, Knowledge, Progress
 from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope
+from sva_bench.solver.routes.heuristic import STARTS
 from sva_bench.solver.routes.packing import Route
 
 
@@ -28,6 +29,7 @@ class Problem:
         progress: The incumbent and its bound, which the method improves.
         recourse: The second stage; ``None`` in the collapsed model.
         cuts: Kind of optimality cuts of the L-shaped method.
+        starts: Starts of the heuristic.
         routes: Routes that the heuristic found, each with its vehicle: initial columns.
     """
 
@@ -40,6 +42,7 @@ class Problem:
     progress: Progress
     recourse: Outcomes | None = None
     cuts: Cuts = "single"
+    starts: int = STARTS
     routes: Sequence[Route] = ()
 
     @property

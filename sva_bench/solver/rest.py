@@ -62,8 +62,10 @@ def _solved(rest: Rest, home: Mapping[str, _Way]) -> dict[str, tuple[str, ...]]:
     known.orders[_visits(instance, rest, known.legs_by_vehicle)] = None
     own, unit = in_own_units(instance)
     limits = SolveLimits()
-    exact = len(rest.open_pois) <= MOST_POIS
-    solution = solve(own, _goal(own, rest, home, unit), known, limits.clock(), limits.gap if exact else math.inf)
+    goal, clock = _goal(own, rest, home, unit), limits.clock()
+    # What is proved anyway, and small, needs one start of the heuristic; beyond that size it is all there is.
+    solution = solve(own, goal, known, clock, limits.gap, starts=1) if len(rest.open_pois) <= MOST_POIS else \
+        solve(own, goal, known, clock, math.inf)
     return {v.name: tuple(instance.sites[k] for k in route[1:])
             for v, route in zip(instance.vehicles, solution.routes, strict=True)}
 

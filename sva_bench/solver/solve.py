@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)
 
 def solve(
     instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method = "auto",
-    recourse: Outcomes | None = None, cuts: Cuts = "single",
+    recourse: Outcomes | None = None, cuts: Cuts = "single", starts: int = STARTS,
 ) -> Solution:
     """The best plan for a goal, with a proof unless time runs out or Ctrl-C is pressed.
 
@@ -52,18 +52,19 @@ def solve(
         method: How to prove it.
         recourse: The second stage, for the methods that keep it.
         cuts: Kind of optimality cuts of ``lshaped``.
+        starts: Starts of the heuristic; with discounts one does.
 
     Raises:
         BadInput: If the method doesn't support the instance or the goal.
         ValueError: If the goal has floors and no known plan reaches them.
     """
     with deferring_ctrl_c():
-        return _solve(instance, goal, known, clock, gap, method, recourse, cuts)
+        return _solve(instance, goal, known, clock, gap, method, recourse, cuts, starts)
 
 
 def _solve(
     instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method,
-    recourse: Outcomes | None, cuts: Cuts,
+    recourse: Outcomes | None, cuts: Cuts, starts: int,
 ) -> Solution:
     start = best_known(goal, known)
     if start is None:
@@ -81,7 +82,8 @@ def _solve(
     progress = Progress(orders=start, value=value_of(goal, known.legs_by_vehicle, start), bound=trivial_bound(goal),
                         grain=grain_of(goal), rounding=ROUNDING * most_of_a_visit(goal), constant=factor * constant)
     problem = Problem(instance=instance, scopes=scopes, goal=goal, known=known, clock=clock, gap=gap, progress=progress,
-                      recourse=None if recourse is None else recourse.times(factor), cuts=cuts)
+                      recourse=None if recourse is None else recourse.times(factor), cuts=cuts,
+                      starts=starts if goal.discounts is None else 1)  # columns find it sooner than further starts
     used = method_for(method, problem)
     try:
         with hearing_ctrl_c():
@@ -122,7 +124,7 @@ def _search(problem: Problem) -> Sequence[Route]:
     started_s = clock.used_s()
     found = search(
         problem.known.tables, _searched(goal), goal.discounts, progress.orders,
-        starts=STARTS if goal.discounts is None else 1,  # columns find the optimum sooner than further starts
+        starts=problem.starts,
         stop=lambda value: clock.is_over() or (
             goal.risk is None and progress.bound - value <= problem.gap * abs(value)),
         offer=lambda orders: adopt(progress, goal, problem.known, orders))
