@@ -280,7 +280,15 @@ class _Enumerated(_Plays):
         self._final: dict[int, list[tuple[float, _Mission]]] = {}
 
     def begin(self, legs: KnownLegs) -> bool:
-        """Play all histories on planned times; whether they are few enough."""
+        """Play all histories on planned times; whether they are few enough, and exact.
+
+        A robot that waits at the base sets off the moment it is told to. Of lifetimes a history only says between which
+        events one ends, so it would be told too late.
+        """
+        rate = self._terms.rate
+        if rate is not None and rate.any() and self._team.news != "never" and not all(
+                own.route for own in self._team.orders):
+            return False
         most = MOST_HISTORIES // self._draws
         self._nominal, driven = 0.0, legs.noting(self._used)
         for number, history in enumerate(self._histories()):

@@ -50,7 +50,7 @@ SOLVED = 1e-6  # the gap at which a solve ends
 
 over_processes = pytest.mark.parametrize("process", PROCESSES)
 # The solver plans for neither lifetimes nor the cost of a loss.
-over_solved = pytest.mark.parametrize("process", ["mission", "per_leg"])
+over_solved = pytest.mark.parametrize("process", ["mission", "per_leg", "hazard"])
 
 
 def setting(seed: int, process: FailureProcess, *, losses: bool = True) -> tuple[Instance, Ground, Plan]:
@@ -225,7 +225,7 @@ def test_fates_drawn_ahead_come_to_the_same_as_their_histories_on_many_teams(
 
 
 def check_resolve(seed: int, process: FailureProcess) -> None:
-    instance, ground, plan = setting(seed, process, losses=False)
+    instance, ground, plan = setting(seed, process, losses=True)
     for news in NEWS:
         heard = Heard(resolve(instance))
         team = team_of(instance, plan, heard, news)

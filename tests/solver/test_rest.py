@@ -19,13 +19,13 @@ from tests.solver.oracle import random_instance
 SOLVED = 1e-6  # the gap at which a solve ends
 
 # The solver plans for neither lifetimes nor the cost of a loss.
-over_solved = pytest.mark.parametrize("process", ["mission", "per_leg"])
+over_solved = pytest.mark.parametrize("process", ["mission", "per_leg", "hazard"])
 
 
 def random_rest(seed: int, process: FailureProcess) -> Rest:
     """Robots anywhere, some with too little fuel or time to come home; every other seed without a metric."""
     rng = np.random.default_rng([seed, 11])
-    instance = random_team(seed, process, losses=False) if seed % 2 else \
+    instance = random_team(seed, process, losses=True) if seed % 2 else \
         replace(random_instance(seed), failure=process)
     names = instance.sites
     vehicles, taken = [], set()
