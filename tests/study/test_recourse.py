@@ -207,3 +207,20 @@ def test_only_what_isnt_solved_yet_is_solved_for_a_reaction(
     solved.clear()
     sb.run(world_of(tmp_path), scenario="half", plan_failure="mission", execute_failure="per_leg", **wanted)
     assert solved == [(1.0, 0.5**theta) for theta in (0.25, 0.5, 0.75, 1.0)]
+
+
+def test_lifetimes_are_sampled_where_a_robot_waits_to_be_told(tmp_path: Path) -> None:
+    # Its setting off is timed by the failure itself, which a history knows only to lie between two events.
+    world = world_of(tmp_path, SMALL.replace("{uv2: 0.5}", "{uv1: 0.8, uv2: 0.6}") + "failure: hazard\n")
+    costs = plan_costs(world, "prmstar", lambda *_: None)
+    scenario = world.scenarios[0]
+    means = Means(instance=instance_of(world, costs, scenario), plans_rest=plan_rest)
+    waits = sb.Plan(routes={"uv1": ("base", "p4", "p3", "base")})
+    both = sb.Plan(routes={"uv1": ("base", "p4", "p3", "base"), "uv2": ("base", "p1", "p2", "base")})
+    enumerated = []
+    asked: tuple[tuple[sb.Plan, News], ...] = ((both, "instant"), (waits, "instant"), (waits, "never"))
+    for plan, news in asked:
+        case = Case(scenario=scenario, planner="given", plan=plan, policy="resolve", news=news)
+        (run,) = react(world, costs, [case], [POLICIES["resolve"](means)], settings_of())
+        enumerated.append(run.enumerated)
+    assert enumerated == [True, False, True]
