@@ -300,10 +300,17 @@ def test_an_argument_of_a_wrong_type_is_a_value_error(world: sb.World, wrong: di
         sb.run(**{"world": world, **QUICK, **wrong})
 
 
-def test_given_plans_react_and_anticipate_nothing(world: sb.World) -> None:
+def test_given_plans_react_and_one_is_made_for_the_reaction(world: sb.World) -> None:
     plan = sb.Plan(routes={"uv1": ("base", "p1", "base")})
-    with pytest.raises(BadInput, match=r"^anticipate: execute makes no plans"):
-        sb.execute(world, plan, policy="resolve", anticipate=True, **QUICK)
+    with pytest.raises(BadInput, match=r"^anticipate: plans for a reaction"):
+        sb.execute(world, plan, anticipate=True, **QUICK)
+    made = sb.execute(world, {"mine": plan}, policy="resolve", anticipate=True, **QUICK)
+    for scenario in made.summary.scenarios:
+        assert scenario.reactions is not None
+        (reaction,) = scenario.reactions
+        assert set(reaction.plans) == {"mine", "anticipative"}
+        assert reaction.plans["anticipative"].modelled >= reaction.plans["mine"].modelled
+        assert set(scenario.plans) == {"mine"}
     with pytest.raises(BadInput, match=r"^news: no policy reacts"):
         sb.execute(world, plan, news="instant", **QUICK)
     sb.execute(world, plan, policy=["none", "resolve"], news=["report", "instant"], **QUICK)

@@ -36,13 +36,12 @@ from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder
 from sva_bench.study.bounds import MOST_TRIALS
 from sva_bench.study.libraries import PRELOAD, load_libraries
-from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_to_anticipate
+from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_the_name
 from sva_bench.workers.pool import local_workers
 
 if TYPE_CHECKING:
     from sva_bench.analysis.summaries import AnySummary
 
-AnticipateNothing = Annotated[bool, typer.Option("--anticipate", hidden=True)]
 """Refused: whoever looks for it here is told where it is."""
 
 
@@ -131,7 +130,7 @@ def execute(
     execute_failure: ExecuteFailure = None,
     policy: PolicyNames = None,
     news: NewsNames = None,
-    anticipate: AnticipateNothing = False,
+    anticipate: Anticipate = False,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -147,12 +146,12 @@ def execute(
         from sva_bench.study.inputs import about, by_name, load
 
     set_up_logging(verbose)
-    refuse_to_anticipate(asked=anticipate)
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
     named = by_name(plans)
     loaded = load(world, scenario, margin, execute_failure=execute_failure)
-    check_reactions(loaded, policies, heard)
+    check_reactions(loaded, policies, heard, anticipate=anticipate)
+    refuse_the_name(named, anticipate=anticipate)
     read = read_plans(loaded, named)
     load_libraries()
     with loading():
@@ -164,7 +163,7 @@ def execute(
 
     tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
-                      policies=policies, news=heard)
+                      policies=policies, news=heard, anticipate=anticipate)
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)

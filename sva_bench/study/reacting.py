@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -112,12 +112,12 @@ def check_reactions(
         raise BadInput(f"--{found.option}: {found.problem}")
 
 
-def refuse_to_anticipate(*, asked: bool) -> None:
-    """Refuse to plan for a reaction where plans are given.
+def refuse_the_name(plans: Iterable[str], *, anticipate: bool) -> None:
+    """Refuse a given plan that goes by the name of the one that is made for a reaction.
 
     Raises:
-        BadInput: If that is asked for.
+        BadInput: If one does.
     """
-    if asked:
-        raise BadInput("--anticipate: execute makes no plans; run --anticipate does, and keeps them under plans/ in "
-                       "its run folder: execute takes those")
+    if anticipate and "anticipative" in plans:
+        raise BadInput("--anticipate: the plan made for the reaction goes by the name 'anticipative', as one of the "
+                       "given plans does; give that another name")

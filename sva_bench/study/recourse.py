@@ -18,7 +18,7 @@ from sva_bench.execution.execute import Executed, drives_ahead, execute, planned
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import Reacted, modelled_values, react
-from sva_bench.mission.certify import expected_value
+from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.solver.rest import plan_rest
@@ -139,7 +139,9 @@ def _react(
     executed = [run for run in stage.executed if run.case.scenario.name == scene.scenario.name]
     made: dict[Reaction, Anticipated] = {}
     if options.anticipate:
-        made = plan_for_reactions(scene, pairs, [run.case for run in executed], options.limits)
+        drivable = [run.case for run in executed
+                    if certify(scene.instance, replace(run.case.plan, value=None)).feasible]
+        made = plan_for_reactions(scene, pairs, drivable, options.limits)
     ours = [run.case for run in executed]
     anticipative = {pair: Case(scenario=scene.scenario, planner="anticipative", plan=plan, role="anticipative")
                     for pair, (plan, _) in made.items()}

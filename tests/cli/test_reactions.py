@@ -80,10 +80,11 @@ def test_nothing_is_anticipated_where_nobody_reacts(
         assert asks_for in said
 
 
-@pytest.mark.usefixtures("folder")
-def test_execute_says_who_makes_plans_for_a_reaction(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_command_line(["execute", "w.yaml", "p.json", "--policy", "resolve", "--anticipate"]) == 2
-    assert "execute makes no plans; run --anticipate does" in capsys.readouterr().err
+def test_execute_refuses_a_plan_by_the_name_of_the_one_that_it_makes(
+        folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "anticipative.json").write_text((folder / "p.json").read_text())
+    assert run_command_line(["execute", "w.yaml", "anticipative.json", "--policy", "resolve", "--anticipate"]) == 2
+    assert "give that another name" in capsys.readouterr().err
 
 
 def test_a_run_keeps_what_was_asked_for_and_is_named_as_ever_where_nothing_was(folder: Path) -> None:

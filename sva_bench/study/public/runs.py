@@ -45,7 +45,7 @@ from sva_bench.study.public.arguments import (
 from sva_bench.study.public.plans import plan_given
 from sva_bench.study.public.results import Result
 from sva_bench.study.publish import record_team
-from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_to_anticipate
+from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_the_name
 from sva_bench.study.run import measure, publish_run
 from sva_bench.workers.pool import count_of, local_workers
 from sva_bench.workers.progress import OnProgress
@@ -139,8 +139,8 @@ def execute(
         world: The world, or its file.
         plans: One plan, which goes by the name ``plan``; plans by their names; or plan files, which go by their stems.
         allow_infeasible: Drive plans that break fuel capacity or mission limit too; each is warned of.
-        seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure, policy, news: As for ``run``.
-        anticipate: Refused, as no plans are made here; ``run`` makes them.
+        seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure, policy, news, anticipate: As for
+            ``run``.
         out, workers, progress: As for ``run``.
 
     Returns:
@@ -157,13 +157,14 @@ def execute(
         KeyboardInterrupt: On Ctrl-C; nothing is left behind.
     """
     told, place, count = progress_of(progress), _place(out), _workers(workers)
-    refuse_to_anticipate(asked=flag("anticipate", anticipate))
     options = _options(seed, trials, rollouts, fidelity, planner, Options(
-        policies=policies_of(names_of("policy", policy) or ()), news=news_of(names_of("news", news) or ())))
+        policies=policies_of(names_of("policy", policy) or ()), news=news_of(names_of("news", news) or ()),
+        anticipate=flag("anticipate", anticipate)))
     allowed = flag("allow_infeasible", allow_infeasible)
     named = _named(plans)
     read, path = world_given(world, scenario, margin, None, _process("execute_failure", execute_failure))
-    check_reactions(read, options.policies, options.news)
+    check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
+    refuse_the_name(named, anticipate=options.anticipate)
     bare = without_times(read)
     labels: dict[str, Path | str] = {name: _label(plans, name, plan) for name, plan in named.items()}
     given = {name: drivable(read, bare, plan_given(str(labels[name]), plan, bare), labels[name])
