@@ -60,7 +60,7 @@ def reaction_result(
         noisy: Whether noise draws differ.
     """
     some = next(iter(plans.values())).reacted
-    ranked = sorted(plans, key=lambda name: -_modelled(plans[name].reacted))  # of equals the first
+    ranked = _ranked(plans)
     best = plans[ranked[0]]
     results = {name: _plan(plan, noisy=noisy) for name, plan in plans.items()}
 
@@ -75,6 +75,18 @@ def reaction_result(
         driven_whole=_whole(plans),
         vss_with_recourse=gain("deterministic"), anticipation=gain("stochastic"),
         best=_best(plans, ranked, noisy=noisy), candidates=tuple(candidates))
+
+
+def _ranked(plans: Mapping[str, PlanReacted]) -> list[str]:
+    """The plans from best to worst by modelled value, of equals the first.
+
+    Where missions are sampled, the plan made for the reaction was chosen on others, and stays the best: a choice by the
+    missions on which it is measured would flatter it.
+    """
+    made = plans.get("anticipative")
+    chosen = None if made is None or made.reacted.enumerated else made.reacted.case.plan
+    return sorted(plans, key=lambda name: (
+        chosen is not None and not plans[name].reacted.case.plan.drives_like(chosen), -_modelled(plans[name].reacted)))
 
 
 def compared_reaction(
