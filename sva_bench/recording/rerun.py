@@ -66,7 +66,7 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str, new
         recording.set_log_tick_enabled(False)
         # In memory: on a full disk the library's writer thread would hang.
         memory = recording.memory_recording()
-        recording.send_blueprint(_layout(story), make_active=False)
+        recording.send_blueprint(_layout(story))  # made active: the viewer in a browser takes no default from a file
         recording.send_recording_name(title)
         _write_solids(recording, story.solids)
         for marks in story.marks:
