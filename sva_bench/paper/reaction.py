@@ -82,6 +82,8 @@ def reaction_page(rows: Sequence[ReactedWorld], settings: Settings) -> str:
         f"`sva-bench reproduce reaction`: {counted(len(worlds), 'world')} ({', '.join(worlds)}), "
         f"{counted(settings.rollouts, 'noise draw')}, fidelity {settings.fidelity}, seed {settings.seed}.", "",
         _ASSUMED, "",
+        "## What it means for the paper's claim", "",
+        _meaning(rows), "",
         "## VSS against news", "",
         "How much more the stochastic plan is worth than the deterministic one under the same reaction, in per cent of "
         "the stochastic plan: the mean over worlds, and its 95 % interval with the worlds as the sample. `never` is "
@@ -114,6 +116,30 @@ _ASSUMED = (
     "`resolve` plans the rest of the mission again, exactly and for that process; robots finish the leg that they are "
     "on. News comes when it happens (`instant`), when the planned arrival at the next stop passes without a report "
     "(`report`), or to each robot as it leaves a station (`station`).")
+
+
+def _meaning(rows: Sequence[ReactedWorld]) -> str:
+    """What is left of the value of planning for failures, at the least availability."""
+    least = min(row.availability for row in rows)
+
+    def mean(process: FailureProcess, news: News, figure: _Figure = lambda result: result.vss.executed_pct) -> str:
+        found = [figure(row.by_news[news]) for row in rows
+                 if (row.process, row.availability) == (process, least) and news in row.by_news]
+        return f"{_mean(found)} %"
+
+    missed, known = mean("mission", "report"), mean("mission", "instant")
+    best = mean("mission", "report", lambda result: result.vss_with_recourse.pct)
+    return (
+        "The paper plans for failures because a vehicle that fails takes its incentives along; its introduction speaks "
+        "of recourse, and its model has none in flight. Without a reaction the hedge is worth "
+        f"{mean('mission', 'never')} at {100 * least:.0f} % availability, as means over the worlds (`mission`). If the "
+        f"team plans again when a report is missed, {missed} is left, and {known} if it knows at once: below zero the "
+        "deterministic plan is worth more, since the stochastic one pays for its hedge in missions in which nobody "
+        "fails. Where any leg may be the last, re-planning comes too late for what was not hedged, and more is left: "
+        f"{mean('per_leg', 'report')} under `per_leg`; of lifetimes it is {mean('hazard', 'report')}. The best plan "
+        f"for the reaction is worth {best} more than the deterministic one under `mission` and missed reports. So what "
+        "planning for failures is worth depends on when a team hears of them no less than on how often they happen; "
+        "the paper's figures hold for teams that never hear.")
 
 
 def _table(rows: Sequence[ReactedWorld], figure: _Figure) -> list[str]:

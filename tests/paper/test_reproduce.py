@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from sva_bench.__main__ import run_command_line
+from sva_bench.choices import NEWS
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Settings
+from sva_bench.mission.failures import PROCESSES
+from sva_bench.paper.reaction import reaction, reaction_page
 from sva_bench.paper.rewards import rewards, rewards_page, three_vehicles
 from sva_bench.paper.simulation import simulation, simulation_page
 from sva_bench.study.costs import nominal_scenario
@@ -52,6 +55,25 @@ def test_the_simulation_is_executed_as_in_the_paper_and_as_planned(tmp_path: Pat
     page = simulation_page(rows, SETTINGS)
     assert "400 trials, 4 noise draws, fidelity kinematic, seed 0" in page
     assert page.count("| small | half |") == 2
+
+
+def test_reactions_are_measured_under_every_process_and_kind_of_news(tmp_path: Path) -> None:
+    world = world_of(tmp_path, SMALL.replace("limit_s: 120", "limit_s: 30"))
+    rows = reaction([world], replace(SETTINGS, rollouts=2), None, lambda *_: None)
+    assert [(row.process, row.availability) for row in rows] == [
+        (process, share) for process in PROCESSES for share in (0.25, 0.5, 0.75)]
+    for row in rows:
+        assert list(row.by_news) == list(NEWS)
+        never = row.by_news["never"]
+        assert all(gain.mean == 0 for gain in never.value_of_recourse.values())
+        for result in row.by_news.values():
+            assert result.vss_with_recourse.mean >= -1e-9
+        if row.process == "mission":  # known at the start, whatever was planned is planned again
+            instant = row.by_news["instant"]
+            assert instant.best.plan == "deterministic" or instant.vss_with_recourse.mean == pytest.approx(0.0)
+    page = reaction_page(rows, SETTINGS)
+    assert page.count("| mission | 25 % |") == 6  # five tables over worlds, and the world's own row
+    assert "| process | availability | never | station | report | instant |" in page
 
 
 def test_a_world_without_scenarios_is_no_such_study(tmp_path: Path) -> None:
