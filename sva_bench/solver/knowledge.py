@@ -175,7 +175,8 @@ class Progress:
         seconds: Wall-clock time of each phase [s].
         grain: Every plan's value is a multiple of it; 0 = unknown.
         rounding: Difference up to which a bound and a value are the same.
-        constant: Part of every plan's value that is left out here; relative gaps include it.
+        constants: Parts of every plan's value that are left out here, by two ways to count them; a relative gap is that
+            of the smaller value.
     """
 
     orders: VisitOrders
@@ -189,7 +190,7 @@ class Progress:
     seconds: dict[str, float] = field(default_factory=dict)
     grain: float = 0.0
     rounding: float = 0.0
-    constant: float = 0.0
+    constants: tuple[float, ...] = (0.0,)
 
     def tighten(self, bound: float) -> None:
         """Lower the bound, rounded down to a multiple of the grain."""
@@ -199,11 +200,15 @@ class Progress:
 
     def closed(self, gap: float) -> bool:
         """Whether the incumbent is proved within a relative gap."""
-        return self.bound - self.value <= max(gap * abs(self.value + self.constant), self.rounding)
+        return self.bound - self.value <= max(gap * self._size(), self.rounding)
+
+    def _size(self) -> float:
+        """What a gap is relative to."""
+        return min(abs(self.value + constant) for constant in self.constants)
 
     def slack(self, gap: float) -> float:
         """Least improvement over the incumbent that matters: beyond the gap, the grain and rounding."""
-        return max(gap * abs(self.value + self.constant), (1 - 1e-5) * self.grain - 2 * self.rounding,
+        return max(gap * self._size(), (1 - 1e-5) * self.grain - 2 * self.rounding,
                    self.rounding / 2)
 
 

@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)
 
 def solve(
     instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method = "auto",
-    recourse: Outcomes | None = None, cuts: Cuts = "single", starts: int = STARTS,
+    recourse: Outcomes | None = None, cuts: Cuts = "single", starts: int = STARTS, beyond: float = 0.0,
 ) -> Solution:
     """The best plan for a goal, with a proof unless time runs out or Ctrl-C is pressed.
 
@@ -53,18 +53,20 @@ def solve(
         recourse: The second stage, for the methods that keep it.
         cuts: Kind of optimality cuts of ``lshaped``.
         starts: Starts of the heuristic; with discounts one does.
+        beyond: What every plan's value has besides the goal's; a gap is relative to the smaller of the values with it
+            and without.
 
     Raises:
         BadInput: If the method doesn't support the instance or the goal.
         ValueError: If the goal has floors and no known plan reaches them.
     """
     with deferring_ctrl_c():
-        return _solve(instance, goal, known, clock, gap, method, recourse, cuts, starts)
+        return _solve(instance, goal, known, clock, gap, method, recourse, cuts, starts, beyond)
 
 
 def _solve(
     instance: Instance, goal: Goal, known: Knowledge, clock: Clock, gap: float, method: Method,
-    recourse: Outcomes | None, cuts: Cuts, starts: int,
+    recourse: Outcomes | None, cuts: Cuts, starts: int, beyond: float,
 ) -> Solution:
     start = best_known(goal, known)
     if start is None:
@@ -73,14 +75,16 @@ def _solve(
     scopes = tuple(scope_of(instance, v, rewarded[m]) for m, v in enumerate(instance.vehicles))
     reach = np.array([scope.legs.any(axis=0) for scope in scopes]).reshape(goal.weights.shape)
     goal = goal.within(reach, None if goal.discounts is None else _arrival(instance, goal, scopes))
-    constant = 0.0
+    constants: tuple[float, ...] = (0.0,)
     if goal.risk is not None:
-        goal = goal.essential()
-        constant = 0.0 if goal.risk is None else goal.risk.constant
+        value, goal = value_of(goal, known.legs_by_vehicle, start), goal.essential()
+        left_out = value - value_of(goal, known.legs_by_vehicle, start)
+        constants = left_out, left_out + beyond
     factor = factor_of(goal)
     goal = goal.times(factor)
     progress = Progress(orders=start, value=value_of(goal, known.legs_by_vehicle, start), bound=trivial_bound(goal),
-                        grain=grain_of(goal), rounding=ROUNDING * most_of_a_visit(goal), constant=factor * constant)
+                        grain=grain_of(goal), rounding=ROUNDING * most_of_a_visit(goal),
+                        constants=tuple(factor * constant for constant in constants))
     problem = Problem(instance=instance, scopes=scopes, goal=goal, known=known, clock=clock, gap=gap, progress=progress,
                       recourse=None if recourse is None else recourse.times(factor), cuts=cuts,
                       starts=starts if goal.discounts is None else 1)  # columns find it sooner than further starts

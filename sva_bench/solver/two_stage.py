@@ -113,8 +113,10 @@ def plan_averse(
     own, unit = in_own_units(instance)
     # A target beyond all incentives together adds a constant to every plan's shortfall, and would drown the rest.
     most = float(incentives_of(own).max(axis=0, initial=0.0).sum())
-    in_own = replace(measure, target=min(float(in_unit(np.array([measure.target]), unit)[0]), most))
-    solution = solve(own, _averse(own, in_own), known, clock, limits.gap)
+    target = float(in_unit(np.array([measure.target]), unit)[0])
+    in_own = replace(measure, target=min(target, most))
+    solution = solve(own, _averse(own, in_own), known, clock, limits.gap,
+                     beyond=measure.weight * (in_own.target - target))
     value = value_of(_averse(instance, measure), known.legs_by_vehicle, solution.orders)
     return finished(instance, measure.kind, solution.routes, value=value,
                    bound=value + unit * (solution.bound - solution.value), status=solution.status,
