@@ -13,7 +13,10 @@ from sva_bench.choices import Fidelity, News, PolicyName
 from sva_bench.files.fields import NonNegativeInt
 from sva_bench.files.records import Record, stands_after
 
-BATCH: Literal["sva-bench/batch@1"] = "sva-bench/batch@1"
+BatchFormat = Literal["sva-bench/batch@1", "sva-bench/batch@2"]
+BATCH: BatchFormat = "sva-bench/batch@1"
+BATCH_OF_REACTIONS: BatchFormat = "sva-bench/batch@2"
+"""The format of a batch's summary with ``reactions``."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +136,7 @@ class GivenUp(Record):
 class BatchSummary(Record):
     """``summary.json`` of a batch."""
 
-    format: Literal["sva-bench/batch@1"] = BATCH
+    format: BatchFormat = BATCH
     trials: int
     fidelity: Fidelity
     worlds: tuple[str, ...]

@@ -16,7 +16,10 @@ from sva_bench.files.fields import Name, NonNegativeInt, Probability
 from sva_bench.files.printable import is_name
 from sva_bench.files.records import Record, stands_after
 
-SUMMARY: Literal["sva-bench/summary@1"] = "sva-bench/summary@1"
+SummaryFormat = Literal["sva-bench/summary@1", "sva-bench/summary@2"]
+SUMMARY: SummaryFormat = "sva-bench/summary@1"
+SUMMARY_OF_REACTIONS: SummaryFormat = "sva-bench/summary@2"
+"""The format of a summary whose scenarios have ``reactions``."""
 MOST_TRIALS, MOST_ROLLOUTS = 10_000_000, 10_000_000
 
 

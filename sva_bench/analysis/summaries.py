@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, Generic, Literal, Self, TypeVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, SUMMARY, Amount, ScenarioFacts, ScenarioPlans
+from sva_bench.analysis.results import (
+    MOST_ROLLOUTS,
+    MOST_TRIALS,
+    SUMMARY,
+    SUMMARY_OF_REACTIONS,
+    Amount,
+    ScenarioFacts,
+    SummaryFormat,
+)
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary, not_null
 from sva_bench.analysis.shown import headline, lines_of, table_of
 from sva_bench.choices import FailureProcess, Fidelity
@@ -16,7 +24,7 @@ from sva_bench.errors import UnknownName, nearest
 from sva_bench.files.fields import Name, NonNegativeInt, Seed
 from sva_bench.files.records import Record, stands_after
 
-ScenarioT = TypeVar("ScenarioT", bound=ScenarioPlans)
+ScenarioT = TypeVar("ScenarioT", ScenarioSummary, ComparedScenario)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +82,7 @@ class Head(Record):
         reproducible: Whether every solve was proved within its gap, so that the plans don't depend on the machine.
     """
 
-    format: Literal["sva-bench/summary@1"] = SUMMARY
+    format: SummaryFormat = SUMMARY
     world: Name
     seed: Seed
     trials: Annotated[int, Field(strict=True, ge=1, le=MOST_TRIALS)]
@@ -111,6 +119,11 @@ class OfScenarios(Head, Generic[ScenarioT]):
                 return scenario
         raise UnknownName(f"{self.world} has no scenario {name!r}; {nearest(name, [s.name for s in self.scenarios])}")
 
+    def with_reactions(self, reactions: Mapping[str, Sequence[Any]]) -> Self:
+        """The summary with the results of teams that react, by scenario."""
+        return replace(self, format=SUMMARY_OF_REACTIONS, scenarios=tuple(
+            replace(scenario, reactions=tuple(reactions[scenario.name])) for scenario in self.scenarios))
+
     def __repr__(self) -> str:
         return "\n".join([self._headline(), *lines_of(self.scenarios)])
 
@@ -129,6 +142,10 @@ class OfScenarios(Head, Generic[ScenarioT]):
         for number, scenario in enumerate(self.scenarios):
             if (list(scenario.plans), list(scenario.availability)) != (list(first.plans), list(first.availability)):
                 raise ValueError(f"scenarios[{number}]: other plans or robots than in the first scenario")
+        form = SUMMARY if first.reactions is None else SUMMARY_OF_REACTIONS
+        if self.format != form or any((s.reactions is None) != (first.reactions is None) for s in self.scenarios):
+            raise ValueError(f"format: expected {form!r}, as the first scenario has "
+                             f"{'no ' if first.reactions is None else ''}reactions, and the others like it")
         return self
 
 

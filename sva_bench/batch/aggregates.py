@@ -8,7 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from sva_bench.analysis.moments import Figure, pooled
-from sva_bench.analysis.over_maps import BatchSummary, GivenUp, MapRow, MapVss, OverMaps, UnitSummary
+from sva_bench.analysis.over_maps import (
+    BATCH,
+    BATCH_OF_REACTIONS,
+    BatchSummary,
+    GivenUp,
+    MapRow,
+    MapVss,
+    OverMaps,
+    UnitSummary,
+)
 from sva_bench.analysis.results import Estimate, VssFigures
 from sva_bench.analysis.statistics import estimate
 from sva_bench.batch.folder import shard_path
@@ -26,12 +35,14 @@ def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failur
     """
     notes = list(_notes(grid, folder, done))
     units = [unit_summary(note) for note in notes]
+    reactions = reactions_over_maps(units)
     return BatchSummary(
+        format=BATCH_OF_REACTIONS if reactions else BATCH,
         trials=grid.options.trials, fidelity=grid.options.fidelity,
         worlds=tuple(dict.fromkeys(point.world.name for point in grid.points)), seeds=tuple(grid.seeds),
         variants=tuple(dict.fromkeys(point.variant for point in grid.points)), units=tuple(units),
         maps=map_rows(units, over_seeds(notes)), aggregate=aggregate(units),
-        failed=tuple(failures), reactions=reactions_over_maps(units))
+        failed=tuple(failures), reactions=reactions)
 
 
 def _notes(grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> Iterator[Note]:

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
 from sva_bench.analysis.reaction_table import REACTION_COLUMNS, reaction_rows
-from sva_bench.analysis.results import SUMMARY
+from sva_bench.analysis.results import SUMMARY, SUMMARY_OF_REACTIONS
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, summary_form
 from sva_bench.choices import ENDS, NEWS, POLICY_NAMES
@@ -160,7 +160,8 @@ def _write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
 def _summary_in(folder: Path) -> tuple[Document, AnySummary]:
     """The summary of a run folder, as read and as checked."""
     document = read_json(folder / "summary.json", MOST_BYTES)
-    return document, validate(document, summary_form(document.data), SUMMARY)
+    grown = isinstance(document.data, dict) and document.data.get("format") == SUMMARY_OF_REACTIONS
+    return document, validate(document, summary_form(document.data), SUMMARY_OF_REACTIONS if grown else SUMMARY)
 
 
 def read_content(folder: Path) -> Content:

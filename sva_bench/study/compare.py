@@ -83,8 +83,7 @@ def measure_plans(
             world=world, costs=costs, instances=instances, executed=executed, settings=settings, executor=executor,
             drives=drives), options, compared_reaction, progress)
     if reactions:
-        summary = replace(summary, scenarios=tuple(
-            replace(scenario, reactions=reactions[scenario.name].results) for scenario in summary.scenarios))
+        summary = summary.with_reactions({name: found.results for name, found in reactions.items()})
     return Compared(instances=instances, executed=executed, summary=summary, clock=clock,
                     reacted=tuple(run for found in reactions.values() for run in found.reacted))
 

@@ -101,8 +101,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
             executed=[run for run in executed if run.case.role in ("stochastic", "deterministic")], executor=executor,
             drives=drives), options, reaction_result, progress)
     if reactions:
-        summary = replace(summary, scenarios=tuple(
-            replace(scenario, reactions=reactions[scenario.name].results) for scenario in summary.scenarios))
+        summary = summary.with_reactions({name: found.results for name, found in reactions.items()})
     return Measured(costs=costs, planned=planned, clock=clock, summary=summary,
                     reacted=tuple(run for found in reactions.values() for run in found.reacted),
                     executed=[run for run in executed if run.case.role != "worst_tie"])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from pydantic import ValidationError
 
 import sva_bench as sb
 from sva_bench.analysis.reaction_results import ReactionResult
@@ -19,7 +20,7 @@ from sva_bench.execution import react as reacting
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import Reacted, react
-from sva_bench.files.records import as_dict
+from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.solver.rest import plan_rest
 from sva_bench.solver.two_stage import plan_stochastic
@@ -224,3 +225,12 @@ def test_lifetimes_are_sampled_where_a_robot_waits_to_be_told(tmp_path: Path) ->
         (run,) = react(world, costs, [case], [POLICIES["resolve"](means)], settings_of())
         enumerated.append(run.enumerated)
     assert enumerated == [True, False, True]
+
+
+def test_a_summary_with_reactions_is_of_another_format(world: sb.World, ours: sb.Result[Summary]) -> None:
+    assert ours.summary.format == "sva-bench/summary@2"
+    assert sb.run(world, scenario="half", **QUICK).summary.format == "sva-bench/summary@1"
+    data = as_dict(ours.summary)
+    assert from_dict(Summary, data) == ours.summary
+    with pytest.raises(ValidationError, match="format: expected 'sva-bench/summary@2'"):
+        from_dict(Summary, {**data, "format": "sva-bench/summary@1"})
