@@ -63,6 +63,9 @@ def test_every_shipped_world_has_the_figures_that_were_stored(world: str, tmp_pa
         assert found[name]["plans"]["informed"]["promised"] == pytest.approx(found[name]["ws"])
         del informed["promised"], informed["ledger"]["promised"], informed["ledger"]["assumption"]
         informed.pop("bound", None)
+        # There was no third process then, and its plan and failures are rows beside the others.
+        found[name]["assumptions"] = [row for row in found[name]["assumptions"]
+                                      if "hazard" not in (row["executed_under"], row["planned_for"])]
     assert differences(found, stored) == []
 
 
