@@ -66,6 +66,9 @@ def test_every_shipped_world_has_the_figures_that_were_stored(world: str, tmp_pa
         # There was no third process then, and its plan and failures are rows beside the others.
         found[name]["assumptions"] = [row for row in found[name]["assumptions"]
                                       if "hazard" not in (row["executed_under"], row["planned_for"])]
+    # A robot that never gets anywhere was given a route under per_leg; now it stays, as in the other plans.
+    for row in stored["S4"]["assumptions"]:
+        del row["loss"]["same_plan"]
     assert differences(found, stored) == []
 
 
