@@ -35,6 +35,18 @@ from tests.worlds_for_tests import SMALL, world_of
 # 30 s instead of 120 s, so that no robot can have all; robots may fail before each POI.
 TEXT = SMALL.replace("limit_s: 120", "limit_s: 30").replace("name: small\n", "name: small\nfailure: per_leg\n")
 HEARD: tuple[News, ...] = ("report", "instant")
+WAITING = """
+format: sva-bench/world@1
+name: waiting
+map: {shapes: {bounds_m: [0, 0, 8, 6]}}
+sites:
+  base: {at_m: [1, 1]}
+  pois: {p1: {at_m: [1, 5]}, p2: {at_m: [6, 1]}}
+robots:
+  uv1: {model: turtlebot2, fuel_capacity_s: 60, mission_limit_s: 90, availability: 0.9, incentives: {p1: 20, p2: 25}}
+  uv2: {model: turtlebot2, fuel_capacity_s: 60, mission_limit_s: 90, availability: 0.3, incentives: {p1: 20, p2: 25}}
+noise: {wheel_gain_sd: 0.01}
+"""
 
 
 @pytest.fixture(scope="module", params=["enumerated", "sampled"])
@@ -237,3 +249,18 @@ def test_a_run_is_the_same_whether_it_reacts_beside_or_not(finished: Run, tmp_pa
     assert isinstance(finished.summary, Summary)
     for told, kept in zip(as_dict(alone.summary)["scenarios"], as_dict(finished.summary)["scenarios"], strict=True):
         assert told == {key: value for key, value in kept.items() if key != "reactions"}
+
+
+def test_a_robot_that_is_sent_out_from_the_base_and_fails_at_once_is_recorded(tmp_path: Path) -> None:
+    # uv1 takes both POIs and uv2, which is seldom there, waits; missing from the start, uv1 is replaced by uv2.
+    world = world_of(tmp_path, WAITING)
+    finished = run(world, Options(trials=4, rollouts=1, fidelity="kinematic", policies=("resolve",)),
+                   tmp_path / "runs", None, lambda *_: None)
+    sent = [row for row in outcomes_of(finished.folder) if row["policy"] == "resolve" and row["end"] == "failed"
+            and row["end_time_s"] > 0]
+    assert sent, "uv2 was to be sent out, and to fail in some history"
+    for row in sent:
+        wanted = Wanted(scenario=None, trial=row["trial"], planner=row["planner"], policy="resolve")
+        (found,) = replay(finished.folder, wanted, None, lambda *_: None)
+        assert found.recording.is_file()
+    assert read_content(finished.folder).lacking == ()
