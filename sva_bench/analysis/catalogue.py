@@ -34,7 +34,7 @@ class Statistic:
     Attributes:
         key: Its key in a plan of ``summary.json``; of a measured one, below ``statistics``.
         label: Heading of its column.
-        unit: Its unit; empty = that of incentives in the world file.
+        unit: Its unit; empty = that of value: of incentives in the world file.
         meaning: What it is, for the docs.
         read: Reads it from the result of a plan; ``None`` for one with ``measure``.
         measure: Measures it from a plan's trials.
@@ -157,7 +157,7 @@ def csv_cells(plan: PlanFigures) -> list[float | None]:
 def as_markdown() -> str:
     """The table of all statistics, as ``docs/statistics.md`` holds it."""
     rows = ["| in `summary.json` | column | unit | what it is | shown on |", "| --- | --- | --- | --- | --- |"]
-    rows += [f"| `{entry.place}` | {entry.label} | {entry.unit or 'incentive'} | {entry.meaning} | "
+    rows += [f"| `{entry.place}` | {entry.label} | {entry.unit or 'value'} | {entry.meaning} | "
              f"{', '.join(place for place in ('terminal', 'page', 'csv') if place in entry.shown)} |"
              for entry in STATISTICS]
     return "\n".join(rows) + "\n"

@@ -9,9 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sva_bench.choices import METHODS, Cuts, Method, Objective, PathPlanner, RiskKind
+from sva_bench.choices import METHODS, Cuts, FailureProcess, Method, Objective, PathPlanner, RiskKind
 from sva_bench.cli.loading import loading
-from sva_bench.cli.options import AsJson, Gap, MarginOption, PlannerOption, TimeLimit, Verbose, WorldArgument, finite
+from sva_bench.cli.options import (
+    AsJson,
+    Gap,
+    MarginOption,
+    PlanFailure,
+    PlannerOption,
+    TimeLimit,
+    Verbose,
+    WorldArgument,
+    finite,
+)
 from sva_bench.cli.terminal import (
     messages,
     print_json,
@@ -69,12 +79,13 @@ def plan(
     beta: Annotated[float | None, typer.Option(min=0, max=0.999999, callback=finite, help="cvar: the mean of the worst "
                                                "1 - BETA share of outcomes.", show_default="0.9")] = None,
     weight: Annotated[float | None, typer.Option(min=0, max=1, callback=finite, help="Share of the risk measure in the "
-                                                 "objective; the rest is the expected incentive.",
+                                                 "objective; the rest is the expected value.",
                                                  show_default="1")] = None,
-    target: Annotated[float | None, typer.Option(min=0, callback=finite, help="excess: the incentive below which the "
+    target: Annotated[float | None, typer.Option(min=0, callback=finite, help="excess: the value below which the "
                                                  "shortfall counts.", show_default=False)] = None,
     scenario: Annotated[str | None, typer.Option(help="Availabilities of this scenario of a world; default: those "
                                                       "under robots.", show_default=False)] = None,
+    plan_failure: PlanFailure = None,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
     verbose: Verbose = False,
@@ -92,9 +103,11 @@ def plan(
         objective=objective, method=method, cuts=cuts, risk=risk, beta=beta, weight=weight, target=target)
     with progress_bars() as progress:
         if source.suffix.lower() in YAML_SUFFIXES:
-            instance = _instance_of_world(source, scenario, "prmstar", None, progress)
+            instance = _instance_of_world(source, scenario, "prmstar", None, progress, plan_failure)
         elif scenario is not None:
             raise BadInput("--scenario belongs to a world; an instance has its availabilities in it")
+        elif plan_failure is not None:
+            raise BadInput("--plan-failure belongs to a world; an instance has its process in it, under failure")
         else:
             instance = read_instance(source)
         with loading():  # after reading: what is wrong is said at once
@@ -142,7 +155,7 @@ def certify(
         print_json(certificate.as_dict())
     else:
         console = results()
-        verdict = f"feasible, expected incentive {certificate.expected:.6g}" if certificate.feasible else "infeasible"
+        verdict = f"feasible, expected value {certificate.expected:.6g}" if certificate.feasible else "infeasible"
         console.print(verdict, highlight=False)
         for reason in certificate.reasons:
             console.print(f"  {reason}", highlight=False, markup=False)
@@ -152,12 +165,13 @@ def certify(
 
 def _instance_of_world(
     path: Path, scenario: str | None, planner: PathPlanner, margin: float | None, progress: OnProgress,
+    plan_failure: FailureProcess | None = None,
 ) -> Instance:
     """The instance of a world's scenario; of the availabilities under ``robots:`` by default."""
     with loading():
         from sva_bench.study.inputs import about, load
 
-    world = load(path, [scenario] if scenario else None, margin)
+    world = load(path, [scenario] if scenario else None, margin, plan_failure)
     with loading():  # after the world: its errors are said at once
         from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs
 

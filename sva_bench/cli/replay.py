@@ -37,7 +37,8 @@ def replay(
 ) -> None:
     """Play one trial of a finished run again, and record it.
 
-    The recordings go to the run's folder; --json prints the trial's rows as they stand in outcomes.parquet.
+    The recordings go to the run's folder; Of teams that react it is said what was heard when, and how orders changed.
+    --json prints the trial's rows as they stand in outcomes.parquet, and these reactions.
     """
     set_up_logging(verbose)
     policies, heard = policies_of([policy]), news_of([] if news is None else [news])
@@ -56,12 +57,15 @@ def replay(
     with progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         found = play_again(folder, wanted, executor, progress)
     if as_json:
-        print_json({"format": "sva-bench/replay@1", "rows": [row for one in found for row in one.rows]})
+        print_json({"format": "sva-bench/replay@1", "rows": [row for one in found for row in one.rows],
+                    "reactions": [heard for one in found for heard in one.reactions_as_dicts()]})
     else:
         for one in found:
             for row in one.rows:
                 results().print(f"{row['scenario']}, {row['planner']}, {row['robot']}: {row['end']} at "
                                 f"{row['end_time_s']:.1f} s, value {row['value']:g}", highlight=False, markup=False)
+            for line in one.told():
+                results().print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
     for one in found:
         messages.print(f"recorded in [bold]{escape(str(one.recording))}[/bold]", highlight=False, soft_wrap=True)
         if view:

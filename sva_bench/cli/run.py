@@ -65,8 +65,8 @@ def run(
                                                       "takes.")] = False,
     informed: Annotated[bool, typer.Option("--informed", help="Execute as well what somebody would plan who knew "
                                                               "beforehand who is available.")] = False,
-    assumptions: Annotated[bool, typer.Option("--assumptions", help="Execute plans made for mission under per_leg and "
-                                              "the reverse: what does the wrong assumption cost?")] = False,
+    assumptions: Annotated[bool, typer.Option("--assumptions", help="Execute the plans made for each failure process "
+                                              "under all of them: what does the wrong assumption cost?")] = False,
     precision: Annotated[str | None, typer.Option(
         metavar="PCT%", help="Go on with more trials and noise draws until the interval of the executed VSS is within "
         "so many per cent of the stochastic plan's mean.", show_default="none")] = None,

@@ -6,6 +6,7 @@ from collections import Counter
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from sva_bench.analysis.catalogue import statistics
 from sva_bench.analysis.reach import lost_robots
@@ -27,11 +28,19 @@ from sva_bench.report.wording import (
     vss_verdict,
 )
 
+_ALWAYS_SHOWN = 3
+"""Robots that have a column however narrow the terminal is."""
+
 
 def print_summary(summary: AnySummary) -> None:
     """Print a summary as a table, and what it comes to."""
     console, travel = results(), summary.travel
-    console.print(_plans_table(summary))
+    robots = list(summary.scenarios[0].availability)
+    shown = _robots_that_fit(summary, console, robots)
+    console.print(_plans_table(summary, shown))
+    if len(shown) < len(robots):
+        console.print(f"{counted(len(robots) - len(shown), 'robot')} of {len(robots)} left out of the table for want "
+                      "of room; summary.json and report.html have all.", highlight=False)
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
                   f"{travel.max_excess_pct:.1f} %; {assumed(summary)}.", highlight=False)
     _print_unhappy(summary, console)
@@ -51,14 +60,26 @@ def print_summary(summary: AnySummary) -> None:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
 
 
-def _plans_table(summary: AnySummary) -> Table:
+def _robots_that_fit(summary: AnySummary, console: Console, robots: list[str]) -> list[str]:
+    """The first robots that have room for a column each; a table that is too wide would lose the figures of all."""
+    def fits(count: int) -> bool:
+        wanted = _plans_table(summary, robots[:count]).columns
+        widths = [max(Text(str(cell)).cell_len for cell in (column.header, *column.cells)) for column in wanted]
+        return sum(widths) + 3 * len(widths) + 1 <= console.width
+
+    # Few robots are shown as ever: their headings and intervals wrap where it is narrow.
+    least = min(len(robots), _ALWAYS_SHOWN)
+    return robots[:max(least, next((count for count in range(len(robots), 0, -1) if fits(count)), 0))]
+
+
+def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
     scenarios, shown = summary.scenarios, statistics("terminal")
     compared, given = isinstance(summary, Summary), not isinstance(summary, Summary)  # given plans may lose robots
     table = Table(title=f"{summary.world}, seed {summary.seed}: {counted(summary.trials, 'trial')}, "
                         f"{counted(summary.rollouts, 'rollout')}, {summary.fidelity}", title_justify="left")
     for heading in ("scenario", "plan", *(("robots lost",) if given else ()),
                     *(f"{entry.heading} [95 %]" if entry.interval else entry.heading for entry in shown),
-                    *scenarios[0].availability, *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
+                    *robots, *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
         table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
     for scenario in scenarios:
         for number, (name, plan) in enumerate(scenario.plans.items()):
@@ -71,7 +92,7 @@ def _plans_table(summary: AnySummary) -> Table:
                          "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]
             table.add_row(
                 "" if number else scenario.name, name + proof, *((lost,) if given else ()),
-                *(cell(entry, plan) for entry in shown), *(f"{x:.1f}" for x in plan.by_robot.values()),
+                *(cell(entry, plan) for entry in shown), *(f"{plan.by_robot[robot]:.1f}" for robot in robots),
                 *(worth if compared else ()), end_section=number == len(scenario.plans) - 1)
     return table
 

@@ -24,7 +24,8 @@ class Certificate:
 
     Attributes:
         feasible: Whether every vehicle can drive its route within its fuel and limit, and no POI is visited twice.
-        expected: Expected incentive under the instance's failure process; ``None`` if infeasible.
+        expected: Expected value, which is incentive less the cost of lost vehicles, under the instance's failure
+            process; ``None`` if infeasible.
         nominal: Incentive if every vehicle is available; ``None`` if infeasible.
         fuel_s: Fuel that each vehicle burns [s of driving]; ``inf`` if a leg does not exist.
         duration_s: Driving and stops of each vehicle [s].
@@ -51,7 +52,7 @@ class Certificate:
 
     def _verdict(self) -> str:
         return "infeasible" if self.expected is None else \
-            f"feasible, expected incentive {self.expected:.6g}, {self.nominal:.6g} if all are available"
+            f"feasible, expected value {self.expected:.6g}, {self.nominal:.6g} if all are available"
 
     def as_dict(self) -> dict[str, Any]:
         """The certificate as ``sva-bench certify --json`` prints it."""

@@ -11,7 +11,7 @@ from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.reactions import reaction_result
 from sva_bench.analysis.statistics import sample_mean
 from sva_bench.choices import NEWS, FailureProcess, News
-from sva_bench.execution.case import Settings
+from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.files.printable import counted
@@ -29,12 +29,17 @@ AVAILABILITIES = (0.25, 0.5, 0.75)
 
 @dataclass(frozen=True, kw_only=True)
 class ReactedWorld:
-    """A world under one failure process and availability: the results by news."""
+    """A world under one failure process and availability: the results by news.
+
+    Attributes:
+        last_stays: Whether the last robot, the uncertain one, stays at the base in all plans.
+    """
 
     world: str
     process: FailureProcess
     availability: float
     by_news: Mapping[News, ReactionResult]
+    last_stays: bool = False
 
 
 def reaction(
@@ -58,9 +63,15 @@ def reaction(
                 world=here, costs=costs, instances={name: p.instance for name, p in planned.items()}, settings=own,
                 executed=executed, executor=executor, drives=drives), options, reaction_result, progress)
             rows += [ReactedWorld(world=world.name, process=process, availability=availability,
-                                  by_news={result.news: result for result in found[scenario.name].results})
+                                  by_news={result.news: result for result in found[scenario.name].results},
+                                  last_stays=_stays(world.robots[-1].name, scenario.name, cases))
                      for scenario, availability in zip(here.scenarios, AVAILABILITIES, strict=True)]
     return rows
+
+
+def _stays(robot: str, scenario: str, cases: Sequence[Case]) -> bool:
+    """Whether a robot has no route in any plan of a scenario."""
+    return all(len(set(case.plan.routes.get(robot, ()))) < 2 for case in cases if case.scenario.name == scenario)
 
 
 def _with_availabilities(world: World) -> World:
@@ -81,7 +92,8 @@ def reaction_page(rows: Sequence[ReactedWorld], settings: Settings) -> str:
         "# What stochastic planning is worth if the team reacts", "",
         f"`sva-bench reproduce reaction`: {counted(len(worlds), 'world')} ({', '.join(worlds)}), "
         f"{counted(settings.rollouts, 'noise draw')}, fidelity {settings.fidelity}, seed {settings.seed}.", "",
-        _ASSUMED, "",
+        _assumed(rows), "",
+        *_idle(rows),
         "## What it means for the paper's claim", "",
         _meaning(rows), "",
         "## VSS against news", "",
@@ -109,13 +121,30 @@ def reaction_page(rows: Sequence[ReactedWorld], settings: Settings) -> str:
     return "\n".join([*lines, ""])
 
 
+def _assumed(rows: Sequence[ReactedWorld]) -> str:
+    """What is taken for granted; of stations only where a world has one."""
+    stations = any("station" in row.by_news for row in rows)
+    return (_ASSUMED + "News comes when it happens (`instant`)" + (
+        ", when the planned arrival at the next stop passes without a report (`report`), or to each robot as it leaves "
+        "a station (`station`)." if stations else
+        ", or when the planned arrival at the next stop passes without a report (`report`)."))
+
+
+def _idle(rows: Sequence[ReactedWorld]) -> list[str]:
+    """Worlds whose last robot stays at the base in all plans: its failures cost nothing there."""
+    idle = [world for world in dict.fromkeys(row.world for row in rows)
+            if all(row.last_stays for row in rows if row.world == world)]
+    return [f"In {', '.join(idle)} the last robot stays at the base in all plans: it earns nothing there, its failures "
+            "cost nothing, and the figures are zero for that reason alone.", ""] if idle else []
+
+
 _ASSUMED = (
-    "In each world the last robot is uncertain and the others are certain. Its availability is the probability to be "
+    "In each world the availability of the last robot is set here, whatever the world file says: it is uncertain and "
+    "the others are certain. Its availability is the probability to be "
     "there for the mission (`mission`), to survive until its next POI (`per_leg`), or to survive driving for the whole "
     "mission limit (`hazard`). Plans are made for the process that is executed. When a failure is heard of, the policy "
     "`resolve` plans the rest of the mission again, exactly and for that process; robots finish the leg that they are "
-    "on. News comes when it happens (`instant`), when the planned arrival at the next stop passes without a report "
-    "(`report`), or to each robot as it leaves a station (`station`).")
+    "on. ")
 
 
 def _meaning(rows: Sequence[ReactedWorld]) -> str:

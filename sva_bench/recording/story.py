@@ -344,7 +344,8 @@ def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
 def _stood_at(trace: Trace, event: Event) -> str:
     """Site that a robot stood at, or was last, when something happened."""
     before = [e.site for e in trace.outcome.events if e.kind in ("departed", "arrived") and e is not event]
-    return before[-1] if before else trace.orders.route[0]
+    # One that never departed stands where it failed: at the base, sent out or not.
+    return before[-1] if before else event.site
 
 
 def _eye(bounds_m: FloatArray) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

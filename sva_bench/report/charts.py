@@ -18,8 +18,8 @@ _COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#
 _HATCHES = ("", "///", "...", "xxx", "\\\\\\", "ooo", "+++", "---")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
-def incentive_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence[str] = ()) -> str:
-    """Bars: what each robot collected, scenario by scenario (Figures 4 and 7 of the paper).
+def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence[str] = ()) -> str:
+    """Bars: the value of each robot, scenario by scenario (Figures 4 and 7 of the paper).
 
     Args:
         scenarios: Of a summary.
@@ -33,27 +33,27 @@ def incentive_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequ
 
     def draw(axes: Axes) -> None:
         _bars(axes, [s.name for s in scenarios], heights, {})
-        axes.set_ylabel("mean incentive [world file's units]")
-        axes.set_title(f"Incentive by robot, {plan} plan")
+        axes.set_ylabel("mean value [world file's units]")
+        axes.set_title(f"Value by robot, {plan} plan")
         if most > least:
             axes.set_ylim(1.05 * least, 1.05 * most)
 
-    return chart(_name("robots", plan), f"Mean incentive that each robot collects in each scenario, {plan} plan",
+    return chart(_name("robots", plan), f"Mean value of each robot in each scenario, {plan} plan",
                  (_width(len(scenarios), len(robots)), 3.6), draw)
 
 
 def plans_compared(scenarios: Sequence[AnyScenario]) -> str:
-    """Bars with intervals: what each plan collected, scenario by scenario (Figure 8)."""
+    """Bars with intervals: the value of each plan, scenario by scenario (Figure 8)."""
     plans = list(scenarios[0].plans)
     heights = {name: [s.plans[name].executed.mean for s in scenarios] for name in plans}
     ends = {name: [s.plans[name].executed.ci95 for s in scenarios] for name in plans}
 
     def draw(axes: Axes) -> None:
         _bars(axes, [s.name for s in scenarios], heights, ends)
-        axes.set_ylabel("mean incentive [world file's units]")
-        axes.set_title("Executed incentive, 95 % intervals")
+        axes.set_ylabel("mean value [world file's units]")
+        axes.set_title("Executed value, 95 % intervals")
 
-    return chart("plans", "Mean executed incentive of each plan in each scenario with 95 % intervals",
+    return chart("plans", "Mean executed value of each plan in each scenario with 95 % intervals",
                  (_width(len(scenarios), len(plans)), 3.6), draw)
 
 
@@ -75,7 +75,7 @@ def differences(rows: Sequence[tuple[str, Estimate]], title: str, unit: str) -> 
 
 
 def distributions(scenarios: Sequence[AnyScenario]) -> str:
-    """Boxes: how a plan's incentive varies over trials."""
+    """Boxes: how a plan's value varies over trials."""
     plans = list(scenarios[0].plans)
 
     def draw(axes: Axes) -> None:
@@ -92,11 +92,11 @@ def distributions(scenarios: Sequence[AnyScenario]) -> str:
                       label="mean of the worst tenth" if number == 0 else None)
             axes.bar(0, 0, facecolor=_colour(number), hatch=_hatch(number), edgecolor="black", label=name)
         _names(axes, [s.name for s in scenarios])
-        axes.set_ylabel("incentive of a trial [world file's units]")
+        axes.set_ylabel("value of a trial [world file's units]")
         axes.set_title("Over trials: 5, 25, 50, 75, 95 %")
         _legend(axes)
 
-    return chart("distributions", "Box plots of the incentive of single trials, by scenario and plan",
+    return chart("distributions", "Box plots of the value of single trials, by scenario and plan",
                  (max(6.0, _width(len(scenarios), len(plans))), 3.8), draw)
 
 

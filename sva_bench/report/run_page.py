@@ -30,6 +30,7 @@ from sva_bench.report.wording import (
     optional,
     per_cent,
     ranked,
+    reliability_told,
     remarks,
     vss_verdict,
     with_interval,
@@ -51,13 +52,14 @@ def write_report(path: Path, content: Content) -> None:
     question = "Is the stochastic plan worth it" if isinstance(summary, Summary) else "What are the plans worth"
     parts = [
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
-        *_answer(summary),
+        *_answer(summary, content.world),
         *(reactions_answered(summary) if isinstance(summary, Summary) else ()),
         *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
              f"{assumed(summary)}. "
-             "Incentive in the units of the world file; 95 % intervals in brackets, over trials and noise draws."),
+             "Values in the units of the world file's incentives; 95 % intervals in brackets, over trials and noise "
+             "draws."),
         *_charts(summary),
         *(reaction_section(summary) if isinstance(summary, Summary) else ()),
         *_world(content.world),
@@ -75,28 +77,28 @@ def write_report(path: Path, content: Content) -> None:
     write_page(path, summary.world, parts)
 
 
-def _answer(summary: AnySummary) -> list[str]:
+def _answer(summary: AnySummary, world: World) -> list[str]:
     lines = []
     if not summary.reach.nothing:
         lines = [f"<li><b>{text(name)}</b>{line}</li>" for name, line in (
-            _findings(summary) if isinstance(summary, Summary) else _rankings(summary))]
+            _findings(summary, world) if isinstance(summary, Summary) else _rankings(summary, world))]
     unproved = "" if summary.reproducible else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
             *(note(remark) for remark in remarks(summary)), unproved, "</div>"]
 
 
-def _findings(summary: Summary) -> Iterator[tuple[str, str]]:
+def _findings(summary: Summary, world: World) -> Iterator[tuple[str, str]]:
     for scenario in summary.scenarios:
-        doubtful = ", ".join(f"{robot} {per_cent(100 * p)}" for robot, p in scenario.availability.items() if p < 1)
-        known = f"availability: {doubtful}" if doubtful else "all available"
+        known = reliability_told(world, scenario.name, summary)
         yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}"
 
 
-def _rankings(summary: ComparisonSummary) -> Iterator[tuple[str, str]]:
+def _rankings(summary: ComparisonSummary, world: World) -> Iterator[tuple[str, str]]:
     for scenario in summary.scenarios:
         if scenario.comparisons:
-            yield scenario.name, f": {text(ranked(scenario))}"
+            known = reliability_told(world, scenario.name, summary)
+            yield scenario.name, f" ({sentence(known)}): {text(ranked(scenario))}"
 
 
 def _comparison(summary: Summary) -> list[str]:
@@ -104,8 +106,8 @@ def _comparison(summary: Summary) -> list[str]:
             "EVPI"]
     rows = [[s.name, *(with_interval(plan.executed) for plan in (s.stochastic, s.deterministic)), vss_verdict(s.vss),
              per_cent(s.vss.executed_pct), f"{s.vss.modelled:.1f}", optional(s.evpi)] for s in summary.scenarios]
-    return [table(head, rows, caption="Value of the stochastic solution (VSS): what the stochastic plan collects "
-                                      "beyond the deterministic one, in the same trials")]
+    return [table(head, rows, caption="Value of the stochastic solution (VSS): how much more the stochastic plan "
+                                      "is worth than the deterministic one, in the same trials")]
 
 
 def _ranking(summary: ComparisonSummary) -> list[str]:
@@ -131,12 +133,12 @@ def _charts(summary: AnySummary) -> list[str]:
              figure(charts.plans_compared(scenarios), "Mean over all trials, with its 95 % interval.")]
     if isinstance(summary, Summary):
         rows = [(s.name, s.vss.executed) for s in summary.scenarios]
-        parts.append(figure(charts.differences(rows, "VSS, executed", "incentive"), "Stochastic less deterministic in "
+        parts.append(figure(charts.differences(rows, "VSS, executed", "value"), "Stochastic less deterministic in "
                             "the same trials: right of zero, planning for failures pays."))
     shown = ["stochastic", "deterministic"] if isinstance(summary, Summary) else plans[:4]
-    robots = [figure(charts.incentive_by_robot(scenarios, plan, shown), f"What each robot collects by the {plan} plan.")
+    robots = [figure(charts.value_by_robot(scenarios, plan, shown), f"The value of each robot under the {plan} plan.")
               for plan in shown]
-    parts += ["</div>", heading("Incentive by robot and scenario"), "<div class=pair>", *robots, "</div>"]
+    parts += ["</div>", heading("Value by robot and scenario"), "<div class=pair>", *robots, "</div>"]
     names = list(scenarios[0].availability)
     return [*parts, table(["scenario", "plan", *names], [
         [s.name, name, *(f"{plan.by_robot[r]:.1f}" for r in names)] for s in scenarios
@@ -156,7 +158,7 @@ def _over_trials(scenarios: Scenarios) -> list[str]:
 def _from_promise(scenarios: Scenarios) -> list[str]:
     return [heading("From promise to execution"), _statistics(scenarios, "promise"),
             note("Assumption: the plan's value under the failures executed, against what its maker believed. Draws: "
-                 "failures as drawn, against their expectation. Then the incentive lost to each end of the execution.")]
+                 "failures as drawn, against their expectation. Then the value lost to each end of the execution.")]
 
 
 def _measured(scenarios: Scenarios) -> list[str]:
@@ -177,8 +179,8 @@ def _assumptions(summary: Summary) -> list[str]:
     if not rows:
         return []
     return [heading("The wrong assumption"), table(ASSUMPTION_HEAD, rows, words=(0, 1, 2, 3)),
-            note("Loss: what the stochastic plan for the failures that were executed collects beyond this one, in the "
-                 "same trials.")]
+            note("Loss: how much more the stochastic plan for the failures that were executed is worth than this one, "
+                 "in the same trials.")]
 
 
 def _ends(scenarios: Scenarios) -> list[str]:

@@ -12,6 +12,7 @@ from sva_bench.analysis.results import Comparison, Estimate, PlanFigures, VssFig
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.files.printable import counted
+from sva_bench.world.model import World
 
 
 class WithInterval(Protocol):
@@ -59,12 +60,12 @@ def _of_the_two_plans(summary: Summary) -> str:
         return f"Too few trials or noise draws for an interval: whether planning for failures pays can't be said.{same}"
     pays = [s for s in differing if s.vss.distinguishable and s.vss.executed.mean > 0]
     costs = [s.name for s in differing if s.vss.distinguishable and s.vss.executed.mean < 0]
-    loses = f" In {listed(costs)} it collects less." if costs else ""
+    loses = f" In {listed(costs)} it is worth less." if costs else ""
     named = listed([s.name + _share(s.vss) for s in pays]) if pays else ""
     rest = [s.name for s in differing if not s.vss.distinguishable]
     other = f" In {listed(rest)} the two can't be told apart." if rest and (pays or unproved) else ""
     if unproved:
-        more = f" The stochastic plan found collects more in {named}." if pays else ""
+        more = f" The stochastic plan found is worth more in {named}." if pays else ""
         return f"Whether planning for failures pays is not settled: {_UNPROVED}.{more}{other}{loses}{same}"
     if not pays:
         return f"Planning for failures pays in no scenario, as far as these trials can tell.{loses}{same}"
@@ -88,7 +89,7 @@ FEW_MAPS = 10
 """Maps below which an interval over them wants a word of caution: it is wide and shaky there."""
 FEW_DRAWS = 16
 """Noise draws below which an interval is mostly due to draws that were not observed."""
-VSS_PCT = "VSS in %: how much more the stochastic plan collects than the deterministic one, in per cent of the former."
+VSS_PCT = "VSS in %: how much more the stochastic plan is worth than the deterministic one, in per cent of the former."
 
 
 def ranked(scenario: ComparedScenario) -> str:
@@ -112,7 +113,7 @@ def finding(vss: VssFigures) -> str:
         return "the same plan is best either way: no difference in any trial"
     mean, interval = vss.executed.mean, vss.executed.ci95
     if interval is None:
-        return f"{mean:+.1f} collected by planning for failures; no interval: more trials or noise draws would tell " \
+        return f"{mean:+.1f} by planning for failures; no interval: more trials or noise draws would tell " \
                "how sure that is"
     if not vss.distinguishable:
         same = interval[0] == interval[1] == 0
@@ -121,9 +122,24 @@ def finding(vss: VssFigures) -> str:
     share = "" if vss.executed_pct is None else f" ({per_cent(vss.executed_pct)})"
     better = "stochastic" if mean > 0 else "deterministic"
     if interval[0] == interval[1]:
-        return f"the {better} plan collects {abs(mean):.1f} more{share}, in every trial"
-    return f"the {better} plan collects {abs(mean):.1f} more{share}, 95 % sure of " \
+        return f"the {better} plan is worth {abs(mean):.1f} more{share}, in every trial"
+    return f"the {better} plan is worth {abs(mean):.1f} more{share}, 95 % sure of " \
            f"{min(map(abs, interval)):.1f} to {max(map(abs, interval)):.1f}"
+
+
+def reliability_told(world: World, scenario: str, summary: AnySummary) -> str:
+    """How reliable the robots of a scenario are, and what it costs to lose them."""
+    known = world.scenario(scenario)
+    failure = summary.failure
+    processes = {failure.execute} if isinstance(summary, ComparisonSummary) else {failure.execute, failure.plan}
+    lifetimes = {name: mtbf for name, mtbf in known.mtbf_s.items() if "hazard" in processes}
+    doubtful = [f"{name} {per_cent(100 * p)}" for name, p in known.availability.items()
+                if p < 1 and not (name in lifetimes and processes == {"hazard"})]
+    parts = [("availability", doubtful),
+             ("mean driving time to failure", [f"{name} {mtbf:g} s" for name, mtbf in lifetimes.items()]),
+             ("cost of losing a robot", [f"{r.name} {r.loss_cost:g}" for r in world.robots if r.loss_cost > 0])]
+    told = [f"{what}: {', '.join(found)}" for what, found in parts if found]
+    return "; ".join(told if doubtful or lifetimes else ["all available", *told])
 
 
 def remarks(summary: AnySummary) -> list[str]:
@@ -149,7 +165,7 @@ def _precision(summary: Summary) -> list[str]:
     if asked is None:
         return []
     reached = "no interval" if asked.reached_pct is None else f"{asked.reached_pct:.2g} %"
-    return [f"Precision asked for: VSS within {asked.asked_pct:g} % of the stochastic plan's incentive; reached: "
+    return [f"Precision asked for: VSS within {asked.asked_pct:g} % of the stochastic plan's value; reached: "
             f"{reached} after {counted(summary.trials, 'trial')} under {counted(summary.rollouts, 'noise draw')}"
             f"{'' if asked.met else ', the most that were allowed'}."]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from sva_bench.arrays import IntArray
 from sva_bench.errors import BadFile
 from sva_bench.files.printable import counted
 from sva_bench.storage.run_folder import Legs
@@ -82,6 +83,7 @@ class _Sums:
         self.weight, self.by_column = 0.0, dict.fromkeys(("incentive", "value"), 0.0)
         self.lightest, self.heaviest = math.inf, -math.inf
         self.first_history, self.last_history = 2**63, -2**63
+        self.histories: dict[int, dict[str, list[IntArray]]] = {}  # numbers, by noise draw and robot
 
     def add(self, row: Mapping[str, Any], loss_cost: float) -> None:
         """Add what some rows of one robot sum up to."""
@@ -92,6 +94,19 @@ class _Sums:
         self.lightest, self.heaviest = min(self.lightest, row["weight_min"]), max(self.heaviest, row["weight_max"])
         self.first_history = min(self.first_history, row["history_min"])
         self.last_history = max(self.last_history, row["history_max"])
+
+
+    def number(self, rollout: int, robot: str, histories: IntArray) -> None:
+        """Add the numbers of some rows' histories."""
+        self.histories.setdefault(rollout, {}).setdefault(robot, []).append(histories)
+
+    def wrong_history(self, robots: int) -> int | None:
+        """A noise draw under which the histories of some robot aren't 0, 1, 2, ... once each; ``None`` = all are."""
+        for rollout, by_robot in self.histories.items():
+            numbers = [np.sort(np.concatenate(found)) for found in by_robot.values()]
+            if len(numbers) != robots or any(not np.array_equal(each, np.arange(len(numbers[0]))) for each in numbers):
+                return rollout
+        return None
 
 
 def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[str, float],
@@ -125,6 +140,8 @@ def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[st
                 whose = row["scenario"], row["planner"], row["robot"]
                 reached[whose] = reached.get(whose, StopsReached()).also(
                     row["stops_reached_min"], row["stops_reached_max"], home=row["end"] == "home")
+        for key, rollout, robot, histories in _numbered(piece):
+            sums[key].number(rollout, robot, histories)
     for key, claim in plans.items():
         _check_sums(path, key, claim, sums[key], robots)
     return Found(reached=reached, whole=frozenset(key for key, claim in plans.items() if claim.begins_whole) - lost)
@@ -143,6 +160,16 @@ def _grouped(piece: pa.Table) -> list[dict[str, Any]]:
     return found
 
 
+def _numbered(piece: pa.Table) -> Iterator[tuple[Key, int, str, IntArray]]:
+    """Numbers of the histories of each plan, noise draw and robot, of the rows that have one."""
+    found = piece.filter(pc.greater_equal(piece.column("history"), 0)).group_by(
+        ["scenario", "planner", "policy", "news", "rollout", "robot"]).aggregate([("history", "list")])
+    histories = found.column("history_list")
+    for number, row in enumerate(found.drop_columns("history_list").to_pylist()):
+        key = row["scenario"], row["planner"], row["policy"], row["news"]
+        yield key, row["rollout"], row["robot"], histories[number].values.to_numpy(zero_copy_only=False)
+
+
 def _check_sums(path: Path, key: Key, claim: Claim, found: _Sums, robots: int) -> None:
     """Check the rows of one plan against what the summary says of them."""
     if claim.trials is None:
@@ -150,6 +177,9 @@ def _check_sums(path: Path, key: Key, claim: Claim, found: _Sums, robots: int) -
                 or found.lightest < 0 or found.first_history != 0:
             raise BadFile(path, None, "weight", "these aren't all histories of failures: the probabilities of "
                           f"{_named(key)} add up to {found.weight / robots:.6g}; {_AGAIN}")
+        if (rollout := found.wrong_history(robots)) is not None:
+            raise BadFile(path, None, "history", f"expected the histories 0, 1, 2, ... once for each robot: those of "
+                          f"{_named(key)} under noise draw {rollout} aren't; {_AGAIN}")
     elif found.rows != claim.trials * robots or (found.lightest, found.heaviest) != (1, 1) \
             or (found.first_history, found.last_history) != (-1, -1):
         raise BadFile(path, None, "trial", f"these aren't the trials of summary.json: {_named(key)} has "

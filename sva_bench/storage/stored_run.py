@@ -237,14 +237,29 @@ def find_row(path: Path, key: Key, trial: int) -> tuple[int, int] | None:
     Raises:
         BadFile: If they can't be read.
     """
-    for piece in pieces_of(path, OUTCOMES):
-        mask = pc.equal(piece.column("trial"), trial)
-        for column, word in zip(("scenario", "planner", "policy", "news"), key, strict=True):
-            mask = pc.and_(mask, pc.equal(pc.cast(piece.column(column), pa.string()), word))
-        found = piece.filter(mask)
+    for piece in _rows_of(path, key):
+        found = piece.filter(pc.equal(piece.column("trial"), trial))
         if found.num_rows:
             return int(found.column("rollout")[0].as_py()), int(found.column("history")[0].as_py())
     return None
+
+
+def last_trial(path: Path, key: Key) -> int:
+    """The greatest number of a trial of outcomes; -1 where there is none.
+
+    Raises:
+        BadFile: If they can't be read.
+    """
+    return max((pc.max(piece.column("trial")).as_py() for piece in _rows_of(path, key) if piece.num_rows), default=-1)
+
+
+def _rows_of(path: Path, key: Key) -> Iterator[pa.Table]:
+    """The rows of one plan and reaction, piece by piece."""
+    for piece in pieces_of(path, OUTCOMES):
+        mask = pc.equal(pc.cast(piece.column("scenario"), pa.string()), key[0])
+        for column, word in zip(("planner", "policy", "news"), key[1:], strict=True):
+            mask = pc.and_(mask, pc.equal(pc.cast(piece.column(column), pa.string()), word))
+        yield piece.filter(mask)
 
 
 def _lacking(folder: Path, scenarios: Iterable[str], stems: Iterable[str]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ class PlanRequest:
         objective: Plan for failures, or take every robot as available.
         method: Solution method, for the proof of optimality.
         cuts: Optimality cuts of ``lshaped``; ``None`` = single.
-        risk: Measure of risk; ``None`` = the expected incentive.
+        risk: Measure of risk; ``None`` = the expected value.
         beta, weight, target: Of the measure; ``None`` = its default.
 
     Raises:

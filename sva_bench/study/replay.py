@@ -17,12 +17,13 @@ from sva_bench.execution.execute import Executed, execute
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import react_again
 from sva_bench.execution.reacted import Reacted
+from sva_bench.execution.team import Reaction
 from sva_bench.mission.plan_file import read_plan
 from sva_bench.recording.rerun import record
 from sva_bench.solver.rest import plan_rest
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.run_folder import made_for, recording_stem, stem_of
-from sva_bench.storage.stored_run import Content, find_row, read_content, run_folder_at
+from sva_bench.storage.stored_run import Content, find_row, last_trial, read_content, run_folder_at
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.given_plans import without_times
 from sva_bench.study.publish import record_team
@@ -50,10 +51,45 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Replayed:
-    """A trial again: its rows as in ``outcomes.parquet``, and where it was recorded."""
+    """A trial again.
 
+    Attributes:
+        case: Plan, scenario, policy and news.
+        rows: Its rows as in ``outcomes.parquet``.
+        recording: Where it was recorded.
+        reactions: News that was heard, in order, and how orders changed.
+    """
+
+    case: Case
     rows: Sequence[Mapping[str, Any]]
     recording: Path
+    reactions: Sequence[Reaction] = ()
+
+    def reactions_as_dicts(self) -> list[dict[str, Any]]:
+        """The reactions as ``--json`` prints them."""
+        case = self.case
+        return [{"scenario": case.scenario.name, "planner": case.planner, "policy": case.policy, "news": case.news,
+                 "time_s": heard.time_s, "failed": list(heard.failed), "learned": list(heard.learned),
+                 "orders": {robot: {"since": heard.since[robot], "before": list(heard.before[robot]),
+                                    "after": list(new)} for robot, new in heard.after.items()}}
+                for heard in self.reactions]
+
+    def told(self) -> list[str]:
+        """What was heard when, and whose orders changed to what, in plain lines."""
+        lines = []
+        for heard in self.reactions:
+            learned = ", ".join(heard.learned) or "nobody"
+            lines.append(f"at {heard.time_s:.1f} s {learned} learned that {', '.join(heard.failed)} failed" + (
+                "" if heard.after else "; no orders changed"))
+            lines += [f"  {robot}, from {heard.since[robot]}: {_stops(heard.before[robot])}; now {_stops(new)}"
+                      for robot, new in heard.after.items()]
+        if self.case.policy != "none" and not lines:
+            lines.append("nothing was heard of any failure")
+        return lines
+
+
+def _stops(orders: Sequence[str]) -> str:
+    return " → ".join(orders) or "no orders"
 
 
 def replay(folder: Path, wanted: Wanted, executor: Executor | None, progress: OnProgress) -> list[Replayed]:
@@ -83,6 +119,7 @@ def _again(
     world, summary = content.world, content.summary
     settings = Settings(seed=summary.seed, trials=summary.trials, rollouts=summary.rollouts, fidelity=summary.fidelity)
     run: Executed | Reacted
+    reactions: Sequence[Reaction] = ()
     if case.policy == "none":
         settings = replace(settings, first=trial, trials=1)
         (run,) = execute(world, costs, [case], settings, executor)
@@ -93,8 +130,9 @@ def _again(
         run = react_again(world, costs, case, policy, settings, trial, history, executor)
         assert run.shown is not None, "a mission that is played again is shown"
         record_team(path, world, case, run.shown)
+        reactions = run.played[0].reactions
     table = outcome_table(run, [robot.name for robot in world.robots], settings)
-    return Replayed(rows=table.to_pylist(), recording=path)
+    return Replayed(case=case, rows=table.to_pylist(), recording=path, reactions=reactions)
 
 
 def _cases(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case, tuple[int, int] | None]]:
@@ -109,25 +147,35 @@ def _cases(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case, t
     told, scenario, instance = scenarios[number], content.world.scenarios[number], without_times(content.world)
     plans: Sequence[str] = list(told.plans)
     news: News = "never"
+    reactions = told.reactions or ()
     if wanted.policy != "none":
-        mine = {r.news: r for r in told.reactions or () if r.policy == wanted.policy}
+        mine = {r.news: r for r in reactions if r.policy == wanted.policy}
         if not mine:
             raise BadInput(f"--policy {wanted.policy}: the run measured no such reaction; run its command again with "
                            f"--policy {wanted.policy}")
+        if wanted.news is not None and wanted.news not in mine:
+            raise BadInput(f"--news {wanted.news}: not measured with {wanted.policy}; " + (
+                "to see the trial without a reaction, leave out --policy; " if wanted.news == "never" else "")
+                + f"the run has {', '.join(mine)}")
         news = {str(when): when for when in mine}[_one_of("--news", wanted.news, list(mine))]
         plans = list(mine[news].plans)
     elif wanted.news not in (None, "never"):
         raise BadInput(f"--news {wanted.news}: nobody reacts to it without a policy; add --policy resolve")
     if wanted.planner is None:
         plans = [name for name in plans if name != "informed"]
+    elif wanted.planner not in plans and (others := dict.fromkeys(
+            r.policy for r in reactions if wanted.planner in r.plans)):
+        raise BadInput(f"--planner {wanted.planner}: this plan was made for a reaction; add --policy "
+                       f"{next(iter(others))}")
     elif _one_of("--planner", wanted.planner, list(plans)) == "informed":
         raise BadInput("--planner informed: it has another plan for each set of robots; replay one of the others")
     cases = []
     for name in plans if wanted.planner is None else [wanted.planner]:
         row = find_row(folder / "outcomes.parquet", (scenario.name, name, wanted.policy, news), wanted.trial)
         if row is None:
-            raise BadInput(f"--trial {wanted.trial}: {scenario.name}, {name} has no such trial; the first is 0, and "
-                           "outcomes.parquet lists all")
+            last = last_trial(folder / "outcomes.parquet", (scenario.name, name, wanted.policy, news))
+            raise BadInput(f"--trial {wanted.trial}: {scenario.name}, {name} has no such trial; the first is 0, the "
+                           f"last {last}")
         kept = name if (scenario.name, name) in content.stems else made_for(name, news)
         foreign = isinstance(content.summary, ComparisonSummary)
         plan = read_plan(folder / "plans" / f"{stem_of(scenario.name, kept, foreign=foreign)}.json", instance)

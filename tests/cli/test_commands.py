@@ -228,7 +228,8 @@ def test_bad_worlds_give_one_clear_error_and_leave_nothing(
     ("view", "nothing.rrd"), ("times", "small.yaml", "-o", "no/such/folder/i.json"),
     ("plan", "small.yaml", "-o", "./small.yaml"), ("times", "small.yaml", "-o", "small.yaml"),
     ("world", "draw", "small.yaml", "-o", "no/such/folder/p.png"), ("plan", "small.yaml", "--beta", "0.5"),
-    ("plan", "small.yaml", "--weight", "0.5"), ("plan", "small.yaml", "--cuts", "multi"), ("fly",)])
+    ("plan", "small.yaml", "--weight", "0.5"), ("plan", "small.yaml", "--cuts", "multi"),
+    ("plan", "tiny.json", "--plan-failure", "hazard"), ("plan", "small.yaml", "--plan-failure", "never"), ("fly",)])
 def test_bad_usage_exits_with_two(arguments: tuple[str, ...], tmp_path: Path) -> None:
     world_file(tmp_path)
     done = sva_bench(*arguments, cwd=tmp_path)

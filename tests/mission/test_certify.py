@@ -29,7 +29,7 @@ def route(*sites: str, **more: tuple[str, ...]) -> Plan:
     return Plan(routes={"a": sites, **more})
 
 
-def test_the_value_of_a_feasible_plan_is_its_expected_incentive() -> None:
+def test_the_value_of_a_feasible_plan_is_its_expected_value() -> None:
     # base -4-> p1 -3-> r1: 7 of 12; r1 -3-> p2 -7-> base: 10 of 12. 17 s in all.
     certificate = certify(instance(), route("base", "p1", "r1", "p2", "base"))
     assert certificate.feasible
@@ -38,6 +38,7 @@ def test_the_value_of_a_feasible_plan_is_its_expected_incentive() -> None:
     assert certificate.fuel_s == certificate.duration_s == {"a": 17.0, "b": 0.0}
     assert certificate.as_dict() == {"format": "sva-bench/certificate@1", "feasible": True, "expected": 7.0,
                                      "reasons": []}
+    assert "expected value 7, 14 if all" in repr(certificate)
 
 
 def test_stops_take_time_but_burn_no_fuel() -> None:

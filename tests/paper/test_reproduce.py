@@ -74,6 +74,13 @@ def test_reactions_are_measured_under_every_process_and_kind_of_news(tmp_path: P
     page = reaction_page(rows, SETTINGS)
     assert page.count("| mission | 25 % |") == 6  # five tables over worlds, and the world's own row
     assert "| process | availability | never | station | report | instant |" in page
+    assert "(`station`)" in page
+    assert "stays at the base in all plans" not in page
+    bare = [replace(row, by_news={news: found for news, found in row.by_news.items() if news != "station"},
+                    last_stays=True) for row in rows]
+    page = reaction_page(bare, SETTINGS)
+    assert "station" not in page
+    assert "In small the last robot stays at the base in all plans: it earns nothing there" in page
 
 
 def test_a_world_without_scenarios_is_no_such_study(tmp_path: Path) -> None:

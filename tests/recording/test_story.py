@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from sva_bench.execution.outcome import Event
 from sva_bench.recording.colors import ALARM, BLUE, PURPLE, ROBOT_COLORS, VERMILLION, YELLOW, pale
 from sva_bench.recording.story import Level, Story, corners, dashes, story_of
 from tests.recording.missions import WORLD, mission_with_news, trace
@@ -164,3 +165,13 @@ def test_who_was_lost_is_marked_where_it_stands_and_in_its_lane_with_who_learned
 def test_a_mission_without_news_has_neither_lanes_nor_changes() -> None:
     story = story_of(WORLD, [trace("uv1", fails_before=1)], "alone")
     assert (story.lanes, story.changes, len(story.lost)) == ((), (), 1)
+
+
+def test_a_robot_that_fails_as_it_is_sent_out_from_the_base_is_logged_there() -> None:
+    # uv3 had no route; sent out after 4 s, it fails at once: it never departed, and its orders hold no route.
+    at_home = trace("uv3", ())
+    failed = replace(at_home, outcome=replace(
+        at_home.outcome, end="failed", end_time_s=4.0, events=(Event(time_s=4.0, kind="failed", site="base"),)))
+    story = story_of(WORLD, [trace("uv1"), failed], "t")
+    assert (4.0, "ERROR", "uv3 failed at base, with 0 collected") in entries(story)
+    assert all("stays home" not in entry.text for entry in story.log)

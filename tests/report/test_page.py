@@ -20,7 +20,7 @@ import pytest
 from sva_bench.analysis.over_maps import BatchSummary, Percentage, UnitSummary
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ScenarioSummary, UnitScenario
-from sva_bench.analysis.summaries import Summary
+from sva_bench.analysis.summaries import Failures, Summary
 from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.report import charts
@@ -32,19 +32,20 @@ from sva_bench.report.wording import (
     finding,
     over_few_maps,
     percentage,
+    reliability_told,
     remarks,
     vss_verdict,
     with_interval,
 )
 from sva_bench.storage.stored_run import write_csv
 from sva_bench.study.compare import execute_plans
-from sva_bench.study.costs import plan_costs
+from sva_bench.study.costs import nominal_scenario, plan_costs
 from sva_bench.study.given_plans import read_plans
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run, report_again
 from sva_bench.study.run import run
 from tests.results_for_tests import over_maps
-from tests.worlds_for_tests import world_of
+from tests.worlds_for_tests import SMALL, world_of
 
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
                None)
@@ -327,3 +328,20 @@ def test_a_percentage_over_fewer_maps_gives_their_number() -> None:
     assert percentage(Percentage(mean=9.5, ci95=None, maps=1)) == "9.5 (1 map)"
     assert percentage(Percentage(mean=9.5, ci95=(1.0, 18.0), maps=2)) == "9.5 [1.0, 18.0] (2 maps)"
     assert percentage(Percentage(mean=None, ci95=None, maps=0)) == ""
+
+
+def test_a_page_says_lifetimes_and_loss_costs_beside_the_availabilities_and_speaks_of_value(tmp_path: Path) -> None:
+    text = SMALL.replace("name: small", "name: small\nfailure: hazard").replace(
+        "availability: 0.75", "mtbf_s: 90\n    loss_cost: 25").replace("{uv2: 0.5}", "{uv1: 0.5, uv2: 0.8}")
+    done = run(world_of(tmp_path, text), Options(trials=10, rollouts=2, fidelity="kinematic"), tmp_path / "runs", None,
+               lambda *_: None)
+    page = html.unescape((done.folder / "report.html").read_text(encoding="utf-8")).replace("\u00a0", " ")
+    # An availability of a scenario says how long a robot lives, in the place of its lifetime.
+    assert "half</b> (availability: uv1 50 %, uv2 80 %; cost of losing a robot: uv2 25): " in page
+    assert not re.search(r"[Mm]ean incentive|Executed incentive|collects|Incentive by", page)
+    nominal = replace(world_of(tmp_path, text), scenarios=(nominal_scenario(world_of(tmp_path, text)),))
+    assert reliability_told(nominal, "nominal", done.summary) == \
+        "mean driving time to failure: uv2 90 s; cost of losing a robot: uv2 25"
+    mission = replace(done.summary, failure=Failures(plan="mission", execute="mission"))
+    assert reliability_told(nominal, "nominal", mission) == \
+        "availability: uv2 26 %; cost of losing a robot: uv2 25"  # exp(-120 s / 90 s)

@@ -35,6 +35,18 @@ from tests.worlds_for_tests import SMALL, world_of
 # 30 s instead of 120 s, so that no robot can have all; robots may fail before each POI.
 TEXT = SMALL.replace("limit_s: 120", "limit_s: 30").replace("name: small\n", "name: small\nfailure: per_leg\n")
 HEARD: tuple[News, ...] = ("report", "instant")
+WAITING = """
+format: sva-bench/world@1
+name: waiting
+map: {shapes: {bounds_m: [0, 0, 8, 6]}}
+sites:
+  base: {at_m: [1, 1]}
+  pois: {p1: {at_m: [1, 5]}, p2: {at_m: [6, 1]}}
+robots:
+  uv1: {model: turtlebot2, fuel_capacity_s: 60, mission_limit_s: 90, availability: 0.9, incentives: {p1: 20, p2: 25}}
+  uv2: {model: turtlebot2, fuel_capacity_s: 60, mission_limit_s: 90, availability: 0.3, incentives: {p1: 20, p2: 25}}
+noise: {wheel_gain_sd: 0.01}
+"""
 
 
 @pytest.fixture(scope="module", params=["enumerated", "sampled"])
@@ -164,6 +176,24 @@ def test_rows_that_do_not_agree_with_the_summary_are_refused(
     assert refused.value.key in ([column] if isinstance(column, str) else column)
 
 
+@pytest.mark.parametrize("change", [
+    lambda rows: rows[1].update(history=77), lambda rows: rows[1].update(history=0),
+    lambda rows: rows[1].update(rollout=1 - rows[1]["rollout"]),
+    lambda rows: rows[-1].update(robot="uv1")])  # twice for one robot, and missing of the other
+def test_histories_are_numbered_without_gaps_once_for_each_robot(
+        change: Callable[[list[dict[str, Any]]], None], folder: Path) -> None:
+    if "enumerated" not in (folder / "summary.json").read_text():
+        pytest.skip("sampled trials have no numbers of histories")
+    path = folder / "outcomes.parquet"
+    rows = outcomes_of(folder)
+    change([row for row in rows if row["policy"] == "resolve" and row["robot"] == "uv2"])
+    schema = pq.read_schema(path)
+    write_table(path, schema, [pa.Table.from_pylist(rows, schema=schema)])
+    with pytest.raises(BadFile) as refused:
+        read_content(folder)
+    assert refused.value.key == "history"
+
+
 def test_a_plan_made_for_a_reaction_that_was_not_the_one_driven_is_refused(folder: Path) -> None:
     if "enumerated" not in (folder / "summary.json").read_text():
         pytest.skip("only in an enumerated trial 0 it is known that nothing happens")
@@ -195,10 +225,15 @@ def test_every_trial_and_history_replayed_gives_its_rows_to_the_bit(folder: Path
 @pytest.mark.parametrize(("wanted", "said"), [
     (Wanted(scenario=None, trial=0), "--scenario: the run has several; name one of half, safe"),
     (Wanted(scenario="hlaf", trial=0), "did you mean 'half'"),
-    (Wanted(scenario="half", trial=100_000), "--trial 100000: half, stochastic has no such trial"),
-    (Wanted(scenario="half", trial=0, planner="anticipative"), "--planner 'anticipative'"),
+    (Wanted(scenario="half", trial=100_000), "--trial 100000: half, stochastic has no such trial; the first is 0, the "
+     "last 39"),
+    (Wanted(scenario="half", trial=0, planner="anticipative"),
+     "--planner anticipative: this plan was made for a reaction; add --policy resolve"),
+    (Wanted(scenario="half", trial=0, planner="nobody"), "--planner 'nobody'"),
     (Wanted(scenario="half", trial=0, policy="resolve"), "--news: the run has several; name one of report, instant"),
-    (Wanted(scenario="half", trial=0, policy="resolve", news="station"), "--news 'station'"),
+    (Wanted(scenario="half", trial=0, policy="resolve", news="station"),
+     "--news station: not measured with resolve; the run has report, instant"),
+    (Wanted(scenario="half", trial=0, policy="resolve", news="never"), "leave out --policy"),
     (Wanted(scenario="half", trial=0, news="report"), "nobody reacts to it without a policy")])
 def test_what_the_run_does_not_hold_is_not_replayed(wanted: Wanted, said: str, finished: Run) -> None:
     with pytest.raises(BadInput) as refused:
@@ -215,6 +250,28 @@ def test_the_command_prints_the_rows_of_each_plan(folder: Path, capsys: pytest.C
         row["scenario"], row["policy"], row["news"], row["trial"]) == ("half", "resolve", "report", 1)]
     assert run_command_line([*words, "--planner", "stochastic", "--workers", "1"]) == 0
     assert capsys.readouterr().out.startswith("half, stochastic, uv1: ")
+
+
+def test_a_replay_says_what_was_heard_when_and_how_orders_changed(
+        folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    key, trial = next(((row["scenario"], row["planner"], row["news"]), row["trial"]) for row in outcomes_of(folder)
+                      if row["policy"] == "resolve" and row["end"] == "failed")
+    words = ["replay", str(folder), "--scenario", key[0], "--planner", key[1], "--policy", "resolve", "--news", key[2],
+             "--trial", str(trial), "--workers", "1"]
+    assert run_command_line([*words, "--json"]) == 0
+    heard = json.loads(capsys.readouterr().out)["reactions"]
+    assert heard
+    assert all(set(each) == {"scenario", "planner", "policy", "news", "time_s", "failed", "learned", "orders"}
+               for each in heard)
+    assert run_command_line(words) == 0
+    said = capsys.readouterr().out
+    for each in heard:
+        assert f"at {each['time_s']:.1f} s {', '.join(each['learned']) or 'nobody'} learned that " in said
+        for robot, orders in each["orders"].items():
+            assert f"{robot}, from {orders['since']}: " in said
+            assert "now " + (" → ".join(orders["after"]) or "no orders") in said
+    assert run_command_line([*words[:6], "--trial", "0", "--workers", "1"]) == 0
+    assert "heard" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("foreign", "planners"), [
@@ -237,3 +294,18 @@ def test_a_run_is_the_same_whether_it_reacts_beside_or_not(finished: Run, tmp_pa
     assert isinstance(finished.summary, Summary)
     for told, kept in zip(as_dict(alone.summary)["scenarios"], as_dict(finished.summary)["scenarios"], strict=True):
         assert told == {key: value for key, value in kept.items() if key != "reactions"}
+
+
+def test_a_robot_that_is_sent_out_from_the_base_and_fails_at_once_is_recorded(tmp_path: Path) -> None:
+    # uv1 takes both POIs and uv2, which is seldom there, waits; missing from the start, uv1 is replaced by uv2.
+    world = world_of(tmp_path, WAITING)
+    finished = run(world, Options(trials=4, rollouts=1, fidelity="kinematic", policies=("resolve",)),
+                   tmp_path / "runs", None, lambda *_: None)
+    sent = [row for row in outcomes_of(finished.folder) if row["policy"] == "resolve" and row["end"] == "failed"
+            and row["end_time_s"] > 0]
+    assert sent, "uv2 was to be sent out, and to fail in some history"
+    for row in sent:
+        wanted = Wanted(scenario=None, trial=row["trial"], planner=row["planner"], policy="resolve")
+        (found,) = replay(finished.folder, wanted, None, lambda *_: None)
+        assert found.recording.is_file()
+    assert read_content(finished.folder).lacking == ()

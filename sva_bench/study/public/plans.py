@@ -52,8 +52,8 @@ def plan(
         cuts: Optimality cuts of the method ``lshaped``; by default ``single``.
         risk: Plan for the worst outcomes: their mean (``cvar``), or the shortfall below a target (``excess``).
         beta: ``cvar``: the mean of the worst 1 - beta share of outcomes, 0.9 by default.
-        weight: Share of the risk measure in the objective, 1 by default; the rest is the expected incentive.
-        target: ``excess``: the incentive below which the shortfall counts; beyond all that can be earned, the plan is
+        weight: Share of the risk measure in the objective, 1 by default; the rest is the expected value.
+        target: ``excess``: the value below which the shortfall counts; beyond all that can be earned, the plan is
             the stochastic one.
         scenario: Availabilities of this scenario of a world; by default those under ``robots:``.
         time_limit: Stop after so many seconds and take the best plan; none by default.
@@ -100,7 +100,7 @@ def certify(instance: Instance | PathLike, plan: Plan | PathLike) -> Certificate
         plan: The plan, or its file (JSON): ours or anybody's.
 
     Returns:
-        The certificate: ``feasible``, ``expected`` incentive, fuel and time of each vehicle [s], and the ``reasons``
+        The certificate: ``feasible``, ``expected`` value, fuel and time of each vehicle [s], and the ``reasons``
         of an infeasible plan.
 
     Raises:

@@ -11,7 +11,7 @@ from typing import cast
 
 from sva_bench.analysis.precision import Precision, precision_of
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
-from sva_bench.choices import FailureProcess, Fidelity, News, PathPlanner, PolicyName
+from sva_bench.choices import NEWS, FailureProcess, Fidelity, News, PathPlanner, PolicyName
 from sva_bench.errors import BadInput, nearest
 from sva_bench.files.outputs import check_folder, check_output
 from sva_bench.mission.plan import Plan
@@ -87,7 +87,7 @@ def run(
         gap: Relative gap at which a plan counts as optimal.
         evpi: Work out the value of perfect information however long it takes.
         informed: Execute as well what somebody would plan who knew beforehand who is available.
-        assumptions: Execute plans for either failure process under both.
+        assumptions: Execute the plans made for each failure process under all of them.
         precision: Go on until the interval of the executed VSS is within so many per cent of the stochastic plan's
             mean: 1 or ``"1%"``.
         max_trials: With ``precision``: trials at which to stop all the same, 100 000 by default.
@@ -232,7 +232,9 @@ def record(
 def _one_of(name: str, value: str | None, known: list[str]) -> str:
     if value is None:
         return known[0]
-    if is_a(name, value, str, "a name") not in known:
+    if is_a(name, value, str, "a name") not in known and value in NEWS:
+        raise BadInput(f"{name} {value!r}: not measured; the result has {', '.join(known)}")
+    if value not in known:
         raise BadInput(f"{name} {value[:60]!r}: there is none of that name; {nearest(value, known)}")
     return value
 
