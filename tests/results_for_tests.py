@@ -100,6 +100,7 @@ def reaction(news: News, values: Mapping[str, tuple[float, float]], half: float 
         vss=replace(vss(gap, around(gap).ci95, 100 * gap / of if of else None), same_plan=same_plan),
         driven_whole=DrivenWhole(missions=1, differing=0),
         value_of_recourse={name: gain(after[name] - kept[name], kept[name]) for name in after},
+        vss_without_reaction=gain(kept["stochastic"] - kept["deterministic"], kept["stochastic"]),
         vss_with_recourse=gain(after[best] - after["deterministic"], after[best]),
         anticipation=gain(after[best] - after["stochastic"], after[best]),
         best=BestPlan(plan=best, over=over, mean=0.0 if over is None else after[best] - after[over],

@@ -47,7 +47,7 @@ class ReactingPlan(PlanFigures):
         distribution: Distribution over histories, weighted, or over trials.
         end_shares: Probability of each end, by robot.
         missions: Number of missions played: all histories under each noise draw, or trials.
-        reacted: Probability that orders change in a mission.
+        reacted: Probability that orders change in a mission, of a robot that lives to take them.
         doubled: Expected number of POIs that two robots visit.
     """
 
@@ -142,6 +142,8 @@ class ReactionResult(ReactionFigures):
 
     Attributes:
         vss: Stochastic less deterministic plan under the policy; of either sign.
+        vss_without_reaction: The same if nobody reacts, by the same histories or trials, in per cent of the stochastic
+            plan's value then. The VSS of the run is by its own trials, and no match for ``vss``.
         vss_with_recourse: The best plan for the policy less the deterministic one, in per cent of the best.
         anticipation: The best plan for the policy less the stochastic one, in per cent of the best.
         best: Which plan is the best.
@@ -149,6 +151,7 @@ class ReactionResult(ReactionFigures):
     """
 
     vss: VssFigures = field(metadata=stands_after("plans"))
+    vss_without_reaction: Gain
     vss_with_recourse: Gain
     anticipation: Gain
     best: BestPlan

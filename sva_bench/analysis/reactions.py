@@ -70,7 +70,7 @@ def reaction_result(
 
     return ReactionResult(
         policy=some.case.policy, news=some.case.news, histories="enumerated" if some.enumerated else "sampled",
-        plans=results, vss=_vss(plans, results, noisy=noisy),
+        plans=results, vss=_vss(plans, results, noisy=noisy), vss_without_reaction=_vss_kept(plans, noisy=noisy),
         value_of_recourse={name: _recourse(plan, noisy=noisy) for name, plan in plans.items()},
         driven_whole=_whole(plans),
         vss_with_recourse=gain("deterministic"), anticipation=gain("stochastic"),
@@ -155,12 +155,24 @@ def _vss(plans: Mapping[str, PlanReacted], results: Mapping[str, ReactingPlan], 
         verdict=verdict_of(found, "stochastic", "deterministic", same=same))
 
 
+def _vss_kept(plans: Mapping[str, PlanReacted], *, noisy: bool) -> Gain:
+    """The VSS if nobody reacts, by the histories or trials of those who do."""
+    s, d = plans["stochastic"], plans["deterministic"]
+    found = estimate(_difference(s, d, noisy=noisy, kept=True))
+    return Gain(mean=found.mean, ci95=found.ci95, pct=percent(found.mean, _mean(s.kept)))
+
+
 def _recourse(plan: PlanReacted, *, noisy: bool) -> Gain:
-    """What reacting adds to a plan, by the same histories or trials."""
+    """What reacting adds to a plan, by the same histories or trials: exactly nothing if no orders change in any.
+
+    A sample without such a mission doesn't show that there is none.
+    """
+    run = plan.reacted
+    if not run.reacted.any() and (run.enumerated or run.case.news == "never"):
+        return Gain(mean=0.0, ci95=(0.0, 0.0), pct=percent(0.0, _mean(plan.kept)))
     low, high = _taken(plan, noisy=noisy)
-    found = estimate(_figure(plan.reacted, plan.kept, (low - high, high - low), noisy=noisy))
-    return Gain(mean=found.mean, ci95=found.ci95, pct=percent(found.mean, float(
-        plan.kept.weight @ plan.kept.value.sum(axis=1))))
+    found = estimate(_figure(run, plan.kept, (low - high, high - low), noisy=noisy))
+    return Gain(mean=found.mean, ci95=found.ci95, pct=percent(found.mean, _mean(plan.kept)))
 
 
 def _best(plans: Mapping[str, PlanReacted], ranked: Sequence[str], *, noisy: bool) -> BestPlan:
@@ -173,12 +185,12 @@ def _best(plans: Mapping[str, PlanReacted], ranked: Sequence[str], *, noisy: boo
     return BestPlan(plan=ranked[0], over=others[0], mean=found.mean, ci95=found.ci95)
 
 
-def _difference(a: PlanReacted, b: PlanReacted, *, noisy: bool) -> Figure:
-    """Value of one plan less that of another, by the same histories or trials."""
+def _difference(a: PlanReacted, b: PlanReacted, *, noisy: bool, kept: bool = False) -> Figure:
+    """Value of one plan less that of another, by the same histories or trials; ``kept``: if nobody reacts."""
     (least_a, most_a), (least_b, most_b) = _taken(a, noisy=noisy), _taken(b, noisy=noisy)
     same = a.reacted.case.plan.drives_like(b.reacted.case.plan)
     bounds = (0.0, 0.0) if same else (least_a - most_b, most_a - least_b)
-    return _figure(a.reacted, b.reacted, bounds, noisy=noisy)
+    return _figure(a.kept if kept else a.reacted, b.kept if kept else b.reacted, bounds, noisy=noisy)
 
 
 def _figure(a: Reacted, b: Reacted | None, taken_bounds: Bounds, *, noisy: bool) -> Figure:
@@ -216,6 +228,10 @@ def _taken(plan: PlanReacted, *, noisy: bool) -> Bounds:
 
 def _modelled(run: Reacted) -> float:
     return float(np.mean(run.nominal)) + 0.0
+
+
+def _mean(run: Reacted) -> float:
+    return float(run.weight @ run.value.sum(axis=1)) + 0.0
 
 
 def _distribution(run: Reacted) -> Distribution:

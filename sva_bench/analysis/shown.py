@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.reaction_results import ComparedReaction, ReactionResult
 from sva_bench.analysis.results import PlanFigures, ScenarioPlans, VssFigures
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.files.notebook import notebook_table
@@ -27,8 +27,7 @@ def lines_of(scenarios: Sequence[ScenarioPlans]) -> list[str]:
                           for name, plan in scenario.plans.items())
         vss = _vss(scenario)
         lines.append(f"{scenario.name}: {plans}" + (f"; VSS {vss}" if vss else ""))
-        lines += [f"  {reaction.name}: VSS {_difference(reaction.vss)}; best plan tried: {reaction.best.plan}"
-                  for reaction in _reactions(scenario)]
+        lines += [f"  {reaction.name}: {_told(reaction)}" for reaction in _reactions(scenario)]
     more = len(scenarios) - _MOST_LINES
     return [*lines, f"and {more} more"] if more > 0 else lines
 
@@ -41,7 +40,8 @@ def table_of(title: str, scenarios: Sequence[ScenarioPlans]) -> str:
         rows += [["" if number else scenario.name, name, *_cells(plan),
                   *([] if compared else ["" if number else _vss(scenario)])]
                  for number, (name, plan) in enumerate(scenario.plans.items())]
-        rows += [["", f"{name}, {reaction.name}", *_cells(plan), "" if number else _difference(reaction.vss)]
+        rows += [["", f"{name}, {reaction.name}", *_cells(plan), *(
+            [] if isinstance(reaction, ComparedReaction) else ["" if number else _difference(reaction.vss)])]
                  for reaction in _reactions(scenario) for number, (name, plan) in enumerate(reaction.plans.items())]
     return notebook_table(title, _HEAD[:-1] if compared else _HEAD, rows)
 
@@ -50,8 +50,16 @@ def _cells(plan: PlanFigures) -> list[str]:
     return [f"{plan.promised:.1f}", f"{plan.expected:.1f}", _figure(plan.executed.mean, plan.executed.ci95)]
 
 
-def _reactions(scenario: ScenarioPlans) -> tuple[ReactionResult, ...]:
-    return scenario.reactions or () if isinstance(scenario, ScenarioSummary) else ()
+def _reactions(scenario: ScenarioPlans) -> tuple[ReactionResult | ComparedReaction, ...]:
+    return scenario.reactions or () if isinstance(scenario, ScenarioSummary | ComparedScenario) else ()
+
+
+def _told(reaction: ReactionResult | ComparedReaction) -> str:
+    """The VSS and the best plan; of given plans, what each collected."""
+    if isinstance(reaction, ComparedReaction):
+        return ", ".join(f"{name} {_figure(plan.executed.mean, plan.executed.ci95)}"
+                         for name, plan in reaction.plans.items())
+    return f"VSS {_difference(reaction.vss)}; best plan tried: {reaction.best.plan}"
 
 
 def _vss(scenario: ScenarioPlans) -> str:

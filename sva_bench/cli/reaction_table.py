@@ -5,7 +5,8 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
-from sva_bench.analysis.results import VssFigures
+from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import Summary
 from sva_bench.report.reaction_wording import (
     DOUBTED,
@@ -18,7 +19,9 @@ from sva_bench.report.reaction_wording import (
     reaction_answers,
     reaction_assumptions,
     recourse_pct,
+    tell,
     vss_pct,
+    without_pct,
 )
 from sva_bench.report.wording import listed
 
@@ -32,8 +35,10 @@ def print_reactions(summary: Summary, console: Console) -> None:
         return
     for policy in dict.fromkeys(row.reaction.policy for row in rows):
         console.print(reaction_table([row for row in rows if row.reaction.policy == policy]))
-    console.print("Adds: value of recourse of the stochastic and the deterministic plan, in per cent of its value "
-                  "without reaction. Lead: of the best plan tried over the next. Orders change: in so many missions. "
+    console.print("Adds: value of recourse of the stochastic and the deterministic plan; in per cent, of its value "
+                  "without reaction. VSS: in per cent of the stochastic plan's value. Lead: of the best plan tried "
+                  "over the next, in per cent of its own value. All in incentive where the value in question is too "
+                  "little for per cent. Orders change: in so many per cent of missions. "
                   f"{DOUBTED}: not distinguishable from zero.", highlight=False)
     for said in (*map(str, reaction_answers(summary)), *reaction_assumptions(summary)):
         console.print(said, highlight=False)
@@ -44,25 +49,37 @@ def print_reactions(summary: Summary, console: Console) -> None:
 
 def reaction_table(rows: list[Reacting]) -> Table:
     """VSS against news, what re-planning adds to each of the two plans, and the best plan."""
-    table = Table(title=f"If the team re-plans (policy {rows[0].reaction.policy}), in per cent", title_justify="left")
+    pct = all(tell(own for own, _ in _figures(reaction)[:4 if reaction.best.over is None else 5])
+              for _, reaction in rows)
+    unit = "in per cent" if pct else "in incentive"
+    table = Table(title=f"If the team re-plans (policy {rows[0].reaction.policy}), {unit}", title_justify="left")
     for heading in ("scenario", "news", "VSS [95 %]", "adds to\nsto.", "adds to\ndet.", "best plan", "lead",
                     "orders\nchange"):
         words = heading in ("scenario", "news", "best plan")
         table.add_column(heading, justify="left" if words else "right", no_wrap=True)
     for number, (scenario, reaction) in enumerate(rows):
-        first = not number or rows[number - 1].scenario is not scenario
-        if first:
-            table.add_row(scenario.name, "none", _vss(scenario.vss, scenario.stochastic.executed.mean), *[""] * 5)
+        vss, without, sto, det, lead = (own if pct else plain for own, plain in _figures(reaction))
+        if not number or rows[number - 1].scenario is not scenario:
+            table.add_row(scenario.name, "none", _vss(reaction, without), *[""] * 5)
         told = reaction.best.over is not None
         table.add_row(
-            "", reaction.news, _vss(reaction.vss, reaction.plans["stochastic"].executed.mean),
-            *(doubted(recourse_pct(reaction, name), lambda found: f"{found.mean:.1f}")
-              for name in ("stochastic", "deterministic")),
-            reaction.best.plan if told else "all alike",
-            doubted(lead_pct(reaction), lambda found: f"{found.mean:.1f}") if told else "", changed(reaction),
+            "", reaction.news, _vss(reaction, vss), _mean(sto), _mean(det),
+            reaction.best.plan if told else "all alike", _mean(lead) if told else "", changed(reaction),
             end_section=number == len(rows) - 1 or rows[number + 1].scenario is not scenario)
     return table
 
 
-def _vss(vss: VssFigures, stochastic: float) -> str:
-    return "same plan" if vss.same_plan else doubted(vss_pct(vss, stochastic))
+def _figures(reaction: ReactionResult) -> list[tuple[Estimate | None, Estimate]]:
+    """VSS with and without reaction, what it adds to the two plans, and the lead: in per cent, and in incentive."""
+    gains, best = reaction.value_of_recourse, reaction.best
+    return [(vss_pct(reaction), reaction.vss.executed), (without_pct(reaction), reaction.vss_without_reaction),
+            *((recourse_pct(reaction, name), gains[name]) for name in ("stochastic", "deterministic")),
+            (lead_pct(reaction), Estimate(mean=best.mean, ci95=best.ci95))]
+
+
+def _vss(reaction: ReactionResult, found: Estimate | None) -> str:
+    return "same plan" if reaction.vss.same_plan else doubted(found)
+
+
+def _mean(found: Estimate | None) -> str:
+    return doubted(found, lambda shown: f"{shown.mean:.1f}")

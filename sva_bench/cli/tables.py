@@ -48,12 +48,13 @@ def print_summary(summary: AnySummary) -> None:
         for scenario in summary.scenarios:
             if scenario.comparisons:
                 console.print(f"{scenario.name}: {ranked(scenario)}", highlight=False, markup=False)
-        for said in reaction_lines(summary):
-            console.print(said, highlight=False, markup=False)
     console.print(answer(summary), highlight=False)
     for said in remarks(summary):
         console.print(said, highlight=False)
-    if not isinstance(summary, ComparisonSummary):
+    if isinstance(summary, ComparisonSummary):
+        for said in reaction_lines(summary):
+            console.print(said, highlight=False, markup=False)
+    else:
         print_reactions(summary, console)
         _print_assumptions(summary, console)
     if not summary.reproducible:

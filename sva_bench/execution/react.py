@@ -242,7 +242,7 @@ class _Plays:
         played = play(self._team, chance, driven)
         left = [_worth(own, pois) for own, pois in zip(self._team.orders, played.left_over, strict=True)]
         return _Mission(figures=np.array([*figures_of(played.robots).values(), left]), doubled=played.doubled,
-                        reacted=any(reaction.after for reaction in played.reactions),
+                        reacted=played.orders_change,
                         played=played if self._settings.recorded else None)
 
     def _reacted(self, rows: _Rows, trial: IntArray, nominal: FloatArray, *, enumerated: bool) -> Reacted:

@@ -52,6 +52,8 @@ class Reaction:
         learned: Robots that it reached.
         before, after: Remaining orders of the robots whose orders changed.
         since: Site from which these go on: where the robot stands or is going.
+        lived: Robots of these that get there. One that is dead, or dies on the way, and isn't missed yet is told in
+            vain.
     """
 
     time_s: float
@@ -60,6 +62,7 @@ class Reaction:
     before: Mapping[str, tuple[str, ...]]
     after: Mapping[str, tuple[str, ...]]
     since: Mapping[str, str] = field(default_factory=dict)
+    lived: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,6 +85,11 @@ class TeamOutcome:
     fates: tuple[RobotFate, ...]
     left_over: tuple[tuple[str, ...], ...]
     doubled: int
+
+    @property
+    def orders_change(self) -> bool:
+        """Whether a robot that lives to take them gets other orders."""
+        return any(reaction.lived for reaction in self.reactions)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -333,15 +341,18 @@ class _Play:
         state = self._state(now, {robot.number for robot in reached})
         orders = self._team.policy(state) if reached else {}
         before, after, since = {}, {}, {}
+        lived = []
         for robot in reached:
             new = orders.get(names[robot.number], robot.remaining)
             if new != robot.remaining:
                 before[names[robot.number]], after[names[robot.number]] = robot.remaining, new
                 since[names[robot.number]] = state.robots[robot.number].site
                 self._give(robot, new, now)
+                if _lives(robot):
+                    lived.append(names[robot.number])
         self._reactions.append(Reaction(
             time_s=now, failed=tuple(names[k] for k in sorted(failed)), before=before, after=after, since=since,
-            learned=tuple(names[robot.number] for robot in reached)))
+            lived=tuple(lived), learned=tuple(names[robot.number] for robot in reached)))
 
     def _state(self, now: float, reached: set[int]) -> TeamState:
         taken = {site for robot in self._robots for site in self._taken_by(robot, now)}
@@ -403,3 +414,9 @@ class _Play:
             left_over=left_over,
             stops=tuple(tuple(robot.stops) if robot.mission is not None else () for robot in self._robots),
             doubled=len(visits) - len(set(visits)))
+
+
+def _lives(robot: _Robot) -> bool:
+    """Whether a robot gets to the stop from which its new orders go on, or is well there and told to stay."""
+    return robot.mission is not None and robot.mission.end in (None, "home") and (
+        robot.leg is None or robot.leg.window is None)

@@ -149,7 +149,7 @@ def typical(missions: Iterable[Played]) -> Played | None:
     weights: dict[tuple[object, ...], float] = {}
     first: dict[tuple[object, ...], Played] = {}
     for mission in missions:
-        if any(reaction.after for reaction in mission.outcome.reactions):
+        if mission.outcome.orders_change:
             course = mission.outcome.stops, tuple(robot.end for robot in mission.outcome.robots)
             weights[course] = weights.get(course, 0.0) + mission.weight
             first.setdefault(course, mission)

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sva_bench.analysis.results import Estimate, VssFigures
-from sva_bench.analysis.summaries import Summary
+from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.summaries import AnySummary, ComparisonSummary
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.compared_reactions import given_answers, given_reacting
 from sva_bench.report.page import figure, heading, note, sentence, table, text
 from sva_bench.report.reaction_wording import (
     DOUBTED,
     Answer,
+    AnyReacting,
     Reacting,
+    assumptions_of,
     definitions,
     doubles,
     doubted,
@@ -20,21 +24,27 @@ from sva_bench.report.reaction_wording import (
     of_best_pct,
     reacting,
     reaction_answers,
-    reaction_assumptions,
     recourse_pct,
+    tell,
+    value_without,
     vss_pct,
+    without_pct,
 )
-from sva_bench.report.wording import with_interval
+from sva_bench.report.wording import adjusted, with_interval
 
 
-def reactions_answered(summary: Summary) -> list[str]:
+def _rows(summary: AnySummary) -> Sequence[AnyReacting]:
+    return given_reacting(summary) if isinstance(summary, ComparisonSummary) else reacting(summary)
+
+
+def reactions_answered(summary: AnySummary) -> list[str]:
     """The answers that belong on top of the page; none where nobody reacts."""
-    answers = reaction_answers(summary)
+    answers = given_answers(summary) if isinstance(summary, ComparisonSummary) else reaction_answers(summary)
     if not answers:
         return []
     return ["<div class=answer><p>What if the robots re-plan?</p>",
             f"<ul>{''.join(map(_answered, answers))}</ul>",
-            *(note(said) for said in reaction_assumptions(summary)), "</div>"]
+            *(note(said) for said in assumptions_of(_rows(summary))), "</div>"]
 
 
 def _answered(answer: Answer) -> str:
@@ -43,21 +53,33 @@ def _answered(answer: Answer) -> str:
     return f"<li><b>{sentence(answer.condition)}</b> {sentence(first)}{below}</li>"
 
 
-def reaction_section(summary: Summary) -> list[str]:
+def reaction_section(summary: AnySummary) -> list[str]:
     """Charts, tables and the meaning of their figures; none where nobody reacts."""
-    rows = reacting(summary)
-    if not rows:
+    if not _rows(summary):
         return []
-    return [heading("What reacting is worth"), *_charts(rows), _values(rows), _plans(rows),
-            note(f"In the world file's units, 95 % intervals in brackets; {DOUBTED}: not distinguishable from zero. "
-                 "No reaction: the trials of the table on top. All else: the missions counted here, played with the "
-                 "reaction and without."),
+    units = f"In the world file's units, 95 % intervals in brackets; {DOUBTED}: not distinguishable from zero. " \
+            "The missions counted here were played with the reaction and without, and all figures are by them; the " \
+            "table on top is by the trials of the run."
+    if isinstance(summary, ComparisonSummary):
+        return [heading("What reacting is worth"), *_recourse_charts(given_reacting(summary)), _pairs(summary),
+                _plans(given_reacting(summary)), note(units)]
+    rows = reacting(summary)
+    return [heading("What reacting is worth"), *_charts(rows), _values(rows), _plans(rows), note(units),
             *_candidates(rows), _meanings(rows)]
 
 
-def reaction_ledgers(summary: Summary) -> list[str]:
+def _pairs(summary: ComparisonSummary) -> str:
+    """Every pair of given plans under each reaction; nothing where only one was given."""
+    caption = "Differences with the reaction, by the same failures and noise"
+    cells = [[scenario.name, reaction.name, f"{c.a} − {c.b}", with_interval(c), adjusted(c)]
+             for scenario, reaction in given_reacting(summary) for c in reaction.comparisons]
+    return table(["scenario", "reaction", "plans", "difference", "adjusted for the number of pairs"], cells,
+                 words=(0, 1, 2), caption=caption) if cells else ""
+
+
+def reaction_ledgers(summary: AnySummary) -> list[str]:
     """The way from promise to execution of each plan whose team reacts; none where nobody does."""
-    rows = reacting(summary)
+    rows = _rows(summary)
     if not rows:
         return []
     head = ["scenario", "news", "plan", "promised", "assumption", "reaction", "draws", "out of fuel", "late", "stuck",
@@ -71,7 +93,7 @@ def reaction_ledgers(summary: Summary) -> list[str]:
                  "an anticipative plan has the reaction in it, which the assumption takes out again.")]
 
 
-def _policies(rows: Sequence[Reacting]) -> str:
+def _policies(rows: Sequence[AnyReacting]) -> str:
     return "policy " + ", ".join(dict.fromkeys(row.reaction.policy for row in rows))
 
 
@@ -79,7 +101,7 @@ def _charts(rows: Sequence[Reacting]) -> list[str]:
     with holding_back_ctrl_c():
         from sva_bench.report import reaction_charts
 
-    parts = []
+    parts: list[str] = []
     scenarios = len({row.scenario.name for row in rows})
     cut = f" The first {reaction_charts.MOST_SCENARIOS} of {counted(scenarios, 'scenario')}." \
         if scenarios > reaction_charts.MOST_SCENARIOS else ""
@@ -87,10 +109,21 @@ def _charts(rows: Sequence[Reacting]) -> list[str]:
         mine = [row for row in rows if row.reaction.policy == policy]
         parts += ["<div class=pair>", figure(
             reaction_charts.vss_against_news(mine), "Above zero the stochastic plan is worth more, below it the "
-            f"deterministic one. The news comes earlier from left to right.{cut}"), figure(
-            reaction_charts.recourse_by_plan(mine), "Right of zero the plan gains by the reaction. A plan that loses "
-            f"much by failures has much to gain.{cut}"), "</div>"]
+            f"deterministic one. The news comes earlier from left to right.{cut}"), *_recourse_charts(mine), "</div>"]
     return parts
+
+
+def _recourse_charts(rows: Sequence[AnyReacting]) -> list[str]:
+    """What reacting adds to each plan, a chart for each policy."""
+    with holding_back_ctrl_c():
+        from sva_bench.report import reaction_charts
+
+    scenarios = len({row.scenario.name for row in rows})
+    cut = f" The first {reaction_charts.MOST_SCENARIOS} of {counted(scenarios, 'scenario')}." \
+        if scenarios > reaction_charts.MOST_SCENARIOS else ""
+    return [figure(reaction_charts.recourse_by_plan([row for row in rows if row.reaction.policy == policy]),
+                   "Right of zero the plan gains by the reaction. A plan that loses much by failures has much to "
+                   f"gain.{cut}") for policy in dict.fromkeys(row.reaction.policy for row in rows)]
 
 
 def _values(rows: Sequence[Reacting]) -> str:
@@ -101,12 +134,12 @@ def _values(rows: Sequence[Reacting]) -> str:
     sections: list[str] = []
     for number, (scenario, reaction) in enumerate(rows):
         if not number or rows[number - 1].scenario is not scenario:
-            plain = scenario.stochastic.executed.mean
-            cells.append(["no reaction", *_vss(scenario.vss, plain), *[""] * 8])
+            cells.append(["no reaction", *_vss(
+                reaction, reaction.vss_without_reaction, without_pct(reaction)), *[""] * 8])
         ahead = Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
         best = [reaction.best.plan, *_difference(ahead, lead_pct(reaction)), reaction.best.over]
         cells.append([
-            reaction.news, *_vss(reaction.vss, reaction.plans["stochastic"].executed.mean),
+            reaction.news, *_vss(reaction, reaction.vss.executed, vss_pct(reaction)),
             *_difference(reaction.vss_with_recourse, of_best_pct(reaction, reaction.vss_with_recourse)),
             *_difference(reaction.anticipation, of_best_pct(reaction, reaction.anticipation)),
             *(["all the same", "", "", ""] if reaction.best.over is None else [str(word) for word in best])])
@@ -115,22 +148,22 @@ def _values(rows: Sequence[Reacting]) -> str:
                                                                           f"team hears of one ({_policies(rows)})")
 
 
-def _vss(vss: VssFigures, stochastic: float) -> tuple[str, str]:
-    return ("the same plan", "") if vss.same_plan else _difference(vss.executed, vss_pct(vss, stochastic))
+def _vss(reaction: ReactionResult, found: Estimate, pct: Estimate | None) -> tuple[str, str]:
+    return ("the same plan", "") if reaction.vss.same_plan else _difference(found, pct)
 
 
 def _difference(found: Estimate, pct: Estimate | None) -> tuple[str, str]:
-    """A difference with its interval, and in per cent."""
-    return doubted(found), doubted(pct, lambda shown: f"{shown.mean:.1f}")
+    """A difference with its interval, and in per cent; a dash where that would tell nothing."""
+    return doubted(found), doubted(pct, lambda shown: f"{shown.mean:.1f}") if tell([pct]) else "–"
 
 
-def _plans(rows: Sequence[Reacting]) -> str:
+def _plans(rows: Sequence[AnyReacting]) -> str:
     """Each plan with the reaction and without."""
     twice = bool(doubles(rows))
     head = ["news", "plan", "without reaction", "with it", "value of recourse", "value of recourse [%]",
             "orders changed [% of missions]", *(["doubled visits [per mission]"] if twice else []), "missions played",
             "histories"]
-    cells = [[reaction.news, name, f"{plan.executed.mean - reaction.value_of_recourse[name].mean:.1f}",
+    cells = [[reaction.news, name, f"{value_without(reaction, name):.1f}",
               with_interval(plan.executed),
               *_difference(reaction.value_of_recourse[name], recourse_pct(reaction, name)),
               f"{100 * plan.reacted:.1f}", *([f"{plan.doubled:.3g}"] if twice else []), str(plan.missions),

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from sva_bench.analysis.over_trials import percent
-from sva_bench.analysis.reaction_results import Gain, ReactionResult
-from sva_bench.analysis.results import Estimate, VssFigures
-from sva_bench.analysis.scenarios import ScenarioSummary
+from sva_bench.analysis.reaction_results import ComparedReaction, Gain, ReactionFigures, ReactionResult
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import Summary
 from sva_bench.choices import News, PolicyName
 from sva_bench.files.printable import counted
@@ -18,7 +18,7 @@ _MOST_NAMED = 6
 
 _DOES: dict[PolicyName, str] = {"resolve": "re-plans", "none": "keeps its orders"}
 _HEARS: dict[News, str] = {
-    "never": "but never hears of a failure", "station": "at the stations where robots hear of a failure",
+    "never": "on news of failures but never has any", "station": "at the stations where robots hear of a failure",
     "report": "when a robot misses a report", "instant": "the moment a robot fails"}
 KNOWS: dict[News, str] = {
     "never": "nobody ever learns of a failure",
@@ -50,6 +50,16 @@ class Reacting(NamedTuple):
     reaction: ReactionResult
 
 
+class GivenReacting(NamedTuple):
+    """The same of plans that were given."""
+
+    scenario: ComparedScenario
+    reaction: ComparedReaction
+
+
+AnyReacting = Reacting | GivenReacting
+
+
 def reacting(summary: Summary) -> list[Reacting]:
     """Every scenario under every policy and news, scenario by scenario."""
     return [Reacting(scenario, reaction) for scenario in summary.scenarios for reaction in scenario.reactions or ()]
@@ -58,20 +68,28 @@ def reacting(summary: Summary) -> list[Reacting]:
 def reaction_answers(summary: Summary) -> list[Answer]:
     """What planning for failures is worth to a team that re-plans: an answer for each policy and news.
 
-    News that come to the same, in the digits shown, share an answer.
+    News that come to the same, in the digits shown, share an answer; no news has its own.
     """
-    found: dict[tuple[PolicyName, tuple[str, ...]], list[News]] = {}
+    found: dict[tuple[PolicyName, bool, tuple[str, ...]], list[News]] = {}
     for policy, news in dict.fromkeys((row.reaction.policy, row.reaction.news) for row in reacting(summary)):
         rows = [row for row in reacting(summary) if (row.reaction.policy, row.reaction.news) == (policy, news)]
         said = tuple(part for part in (_worth(rows), _recourse(rows), _best(rows)) if part)
-        found.setdefault((policy, said), []).append(news)
-    return [Answer(f"If the team {_DOES[policy]} {', or '.join(_HEARS[own] for own in news)},", said)
-            for (policy, said), news in found.items()]
+        found.setdefault((policy, news == "never", said), []).append(news)
+    return [Answer(condition(policy, news), said) for (policy, _, said), news in found.items()]
+
+
+def condition(policy: PolicyName, news: Sequence[News]) -> str:
+    """Under which something is said: what the team does, and when."""
+    return f"If the team {_DOES[policy]} {', or '.join(_HEARS[own] for own in news)},"
 
 
 def reaction_assumptions(summary: Summary) -> list[str]:
     """What the answers rest on: who knows what when, what re-planning is, and whether failures were sampled."""
-    rows = reacting(summary)
+    return assumptions_of(reacting(summary))
+
+
+def assumptions_of(rows: Sequence[AnyReacting]) -> list[str]:
+    """What answers about these rest on."""
     if not rows:
         return []
     news = dict.fromkeys(row.reaction.news for row in rows)
@@ -82,7 +100,7 @@ def reaction_assumptions(summary: Summary) -> list[str]:
             f"{_histories(rows)}{_driven_whole(rows)}{tried}"]
 
 
-def _driven_whole(rows: Sequence[Reacting]) -> str:
+def _driven_whole(rows: Sequence[AnyReacting]) -> str:
     """The check of missions put together from legs; nothing where there was none."""
     missions = sum(row.reaction.driven_whole.missions for row in rows)
     differing = sum(row.reaction.driven_whole.differing for row in rows)
@@ -93,7 +111,7 @@ def _driven_whole(rows: Sequence[Reacting]) -> str:
            f"{'was' if missions == 1 else 'were'} driven whole in physics: {found}."
 
 
-def _histories(rows: Sequence[Reacting]) -> str:
+def _histories(rows: Sequence[AnyReacting]) -> str:
     least, most = (extreme(plan.missions for row in rows for plan in row.reaction.plans.values())
                    for extreme in (min, max))
     number = f"{least} to {counted(most, 'mission')}" if least < most else counted(most, "mission")
@@ -110,17 +128,21 @@ def _histories(rows: Sequence[Reacting]) -> str:
 
 def _worth(rows: Sequence[Reacting]) -> str:
     """Value of planning for failures under the reaction, beside that without."""
-    pays, loses, even, same, unsure = _sorted_by_verdict(rows)
+    pays, loses, even, zero, same, unsure = _sorted_by_verdict(rows)
     said = []
     if pays:
         said.append("planning for failures is worth " + _some(
-            [f"{_amount(r.vss)} in {s.name} in place of {_without(s.vss)}" for s, r in pays]))
+            [f"{_amount_of_vss(r)} in {s.name}{_without(r)}" for s, r in pays]))
     if loses:
         said.append("the deterministic plan is worth more in " + _some(
-            [f"{s.name} (VSS {_amount(r.vss)} in place of {_without(s.vss)})" for s, r in loses]))
+            [f"{s.name} (VSS {_amount_of_vss(r)}{_without(r)})" for s, r in loses]))
     if even:
         said.append("the value of planning for failures is not distinguishable from zero in " + _some(
-            [f"{s.name} (in place of {_without(s.vss)})" for s, r in even]))
+            [s.name + _where_uneven(r) for s, r in even]))
+    if idle := [s.name for s, r in zero if _is_worthless(r)]:
+        said.append(f"every plan is worth exactly nothing in {_some(idle)}, whether the team reacts or not")
+    if level := [s.name + _where_uneven(r) for s, r in zero if not _is_worthless(r)]:
+        said.append(f"both plans are worth exactly the same in {_some(level)}")
     if unsure:
         said.append("too few noise draws give an interval in " + _some([s.name for s, _ in unsure]))
     if same:
@@ -132,32 +154,66 @@ def _sorted_by_verdict(rows: Sequence[Reacting]) -> tuple[list[Reacting], ...]:
     pays: list[Reacting] = []
     loses: list[Reacting] = []
     even: list[Reacting] = []
+    zero: list[Reacting] = []
     same: list[Reacting] = []
     unsure: list[Reacting] = []
     for row in rows:
         vss = row.reaction.vss
-        if vss.same_plan:
+        if _is_worthless(row.reaction):
+            zero.append(row)
+        elif vss.same_plan:
             same.append(row)
         elif vss.executed.ci95 is None:
             unsure.append(row)
+        elif vss.executed.ci95 == (0.0, 0.0):
+            zero.append(row)
         elif not vss.distinguishable:
             even.append(row)
         else:
             (pays if vss.executed.mean > 0 else loses).append(row)
-    return pays, loses, even, same, unsure
+    return pays, loses, even, zero, same, unsure
 
 
-def _without(vss: VssFigures) -> str:
-    """The VSS without reaction, in a word."""
-    if vss.same_plan:
-        return "none"
-    if vss.executed.ci95 is None:
-        return f"{_amount(vss)}, no interval"
-    return _amount(vss) if vss.distinguishable else "one not distinguishable from zero"
+def _is_worthless(reaction: ReactionFigures) -> bool:
+    """Whether every plan is worth nothing with certainty, with the reaction and without."""
+    return all(own == Estimate(mean=0.0, ci95=(0.0, 0.0)) for own in (
+        *(Estimate(mean=plan.executed.mean, ci95=plan.executed.ci95) for plan in reaction.plans.values()),
+        *(Estimate(mean=gain.mean, ci95=gain.ci95) for gain in reaction.value_of_recourse.values())))
 
 
-def _amount(vss: VssFigures) -> str:
-    return per_cent(vss.executed_pct) if vss.executed_pct is not None else f"{vss.executed.mean:.1f}"
+def _without(reaction: ReactionResult) -> str:
+    """What is to be said of the VSS without reaction, behind that with it."""
+    found = reaction.vss_without_reaction
+    if found.excludes_zero and amount(found) == _amount_of_vss(reaction):
+        return ", as without reaction"
+    if found.excludes_zero:
+        return f" in place of {amount(found)}"
+    if found.ci95 is None:
+        return f" in place of {amount(found)}, which has no interval"
+    return " in place of nothing" if found.ci95 == (0.0, 0.0) else \
+        ", where without reaction it is not distinguishable from zero"
+
+
+def _where_uneven(reaction: ReactionResult) -> str:
+    """The VSS without reaction where that is another than none, in brackets."""
+    found = reaction.vss_without_reaction
+    return f" (without reaction {amount(found)})" if found.excludes_zero else ""
+
+
+def _amount_of_vss(reaction: ReactionResult) -> str:
+    vss = reaction.vss
+    return amount(Gain(mean=vss.executed.mean, ci95=vss.executed.ci95, pct=vss.executed_pct))
+
+
+MOST_PER_CENT = 1000.0
+"""Beyond it a percentage says more about how little its base is than about what it is of."""
+
+
+def amount(gain: Gain) -> str:
+    """A difference in per cent; in incentive where there is no percentage, or an absurd one."""
+    if gain.pct is None or abs(gain.pct) > MOST_PER_CENT:
+        return f"{gain.mean:.1f} of incentive"
+    return per_cent(gain.pct)
 
 
 def _recourse(rows: Sequence[Reacting]) -> str:
@@ -165,24 +221,27 @@ def _recourse(rows: Sequence[Reacting]) -> str:
     gains = [(s.name, r.value_of_recourse["deterministic"], r.value_of_recourse["stochastic"]) for s, r in rows]
     telling = [row for row in gains if row[1].excludes_zero or row[2].excludes_zero]
     if not telling:
-        return "Re-planning changes no plan's value distinguishably."
+        changed_at_all = any(gain.ci95 != (0.0, 0.0) for _, *both in gains for gain in both)
+        return f"Re-planning changes no plan's value{' distinguishably' if changed_at_all else ''}."
     falls = any(gain.excludes_zero and gain.mean < 0 for _, *both in telling for gain in both)
     (name, det, sto), *more = telling
-    first = f"the deterministic plan by {_gained(det)} and the stochastic one by {_gained(sto)} in {name}" if falls \
-        else f"{_gained(det)} to the deterministic plan and {_gained(sto)} to the stochastic one in {name}"
-    others = [f"{_gained(det)} and {_gained(sto)} in {name}" for name, det, sto in more]
+    first = f"the deterministic plan by {gained(det)} and the stochastic one by {gained(sto)} in {name}" if falls \
+        else f"{gained(det)} to the deterministic plan and {gained(sto)} to the stochastic one in {name}"
+    others = [f"{gained(det)} and {gained(sto)} in {name}" for name, det, sto in more]
     return f"Re-planning {'changes' if falls else 'adds'} {_some([first, *others], '; ')}."
 
 
-def _gained(gain: Gain) -> str:
+def gained(gain: Gain) -> str:
+    """What reacting adds to a plan, in words."""
     if not gain.excludes_zero:
         return "nothing" if gain.ci95 == (0.0, 0.0) else "nothing distinguishable"
-    return per_cent(gain.pct) if gain.pct is not None else f"{gain.mean:.1f}"
+    return amount(gain)
 
 
 def _best(rows: Sequence[Reacting]) -> str:
     """Which of the plans tried is the best for the reaction, and by how much."""
-    said = [f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over})" for s, r in rows if r.best.over is not None]
+    said = [f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over}{_by_as_much(r)})"
+            for s, r in rows if r.best.over is not None and not _is_worthless(r)]
     return f"The best plan for it, of those tried: {_some(said)}." if said else ""
 
 
@@ -191,8 +250,18 @@ def lead(reaction: ReactionResult) -> str:
     ahead = lead_pct(reaction)
     known = Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
     if not known.excludes_zero:
-        return "not distinguishable from the"
-    return f"{f'{known.mean:+.1f}' if ahead is None else _signed(ahead.mean)} over the"
+        return "exactly as good as the" if known.ci95 == (0.0, 0.0) else "not distinguishable from the"
+    if _by_as_much(reaction):
+        return "over the"
+    told = ahead is not None and abs(ahead.mean) <= MOST_PER_CENT
+    return f"{_signed(ahead.mean) if told and ahead is not None else f'{known.mean:+.1f} of incentive'} over the"
+
+
+def _by_as_much(reaction: ReactionResult) -> str:
+    """Behind a lead that is the VSS just told: in per cent of the other plan it would be another figure."""
+    best = reaction.best
+    same = (best.plan, best.over) == ("deterministic", "stochastic") and reaction.vss.distinguishable
+    return " by as much" if same else ""
 
 
 def _signed(pct: float) -> str:
@@ -206,7 +275,12 @@ def _some(words: Sequence[str], comma: str = ", ") -> str:
 
 
 def in_per_cent(found: Estimate, of: float) -> Estimate | None:
-    """A difference and its interval in per cent of a value; ``None`` of a value of nothing, or less, or next to it."""
+    """A difference and its interval in per cent of a value; ``None`` of a value of nothing, or less, or next to it.
+
+    No difference at all is none in per cent of anything.
+    """
+    if found.mean == 0 and found.ci95 == (0.0, 0.0):
+        return Estimate(mean=0.0, ci95=(0.0, 0.0))
     low, mean, high = (percent(figure, of) for figure in (
         (found.ci95 or (found.mean,))[0], found.mean, (found.ci95 or (found.mean,))[-1]))
     if of <= 0 or low is None or mean is None or high is None:
@@ -214,15 +288,25 @@ def in_per_cent(found: Estimate, of: float) -> Estimate | None:
     return Estimate(mean=mean, ci95=found.ci95 and (low, high))
 
 
-def vss_pct(vss: VssFigures, stochastic: float) -> Estimate | None:
+def vss_pct(reaction: ReactionResult) -> Estimate | None:
     """VSS in per cent of the stochastic plan's value."""
-    return in_per_cent(vss.executed, stochastic)
+    return in_per_cent(reaction.vss.executed, reaction.plans["stochastic"].executed.mean)
 
 
-def recourse_pct(reaction: ReactionResult, plan: str) -> Estimate | None:
+def without_pct(reaction: ReactionResult) -> Estimate | None:
+    """VSS without reaction in per cent of the stochastic plan's value without."""
+    return in_per_cent(reaction.vss_without_reaction, value_without(reaction, "stochastic"))
+
+
+def value_without(reaction: ReactionFigures, plan: str) -> float:
+    """Value of a plan if nobody reacts, by the same histories or trials."""
+    return reaction.plans[plan].executed.mean - reaction.value_of_recourse[plan].mean
+
+
+def recourse_pct(reaction: ReactionFigures, plan: str) -> Estimate | None:
     """Value of recourse in per cent of the plan's value without."""
     gain = reaction.value_of_recourse[plan]
-    return in_per_cent(gain, reaction.plans[plan].executed.mean - gain.mean)
+    return in_per_cent(gain, value_without(reaction, plan))
 
 
 def of_best_pct(reaction: ReactionResult, gain: Estimate) -> Estimate | None:
@@ -233,6 +317,11 @@ def of_best_pct(reaction: ReactionResult, gain: Estimate) -> Estimate | None:
 def lead_pct(reaction: ReactionResult) -> Estimate | None:
     """Lead of the best plan over the next in per cent of its value."""
     return of_best_pct(reaction, Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95))
+
+
+def tell(found: Iterable[Estimate | None]) -> bool:
+    """Whether percentages tell something: each is there, and none is absurd for the little that it is of."""
+    return all(pct is not None and abs(pct.mean) <= MOST_PER_CENT for pct in found)
 
 
 DOUBTED = "°"
@@ -247,13 +336,13 @@ def doubted(found: Estimate | None, show: Callable[[Estimate], str] = with_inter
     return mean + ("" if found.excludes_zero or found.ci95 in (None, (0.0, 0.0)) else DOUBTED) + bracket + ends
 
 
-def doubles(rows: Iterable[Reacting]) -> list[str]:
+def doubles(rows: Iterable[AnyReacting]) -> list[str]:
     """Scenarios, news and plans in which two robots visit a POI, if any."""
     return [f"{plan.doubled:.2g} a mission in {s.name} on {r.news} news ({name})"
             for s, r in rows for name, plan in r.plans.items() if plan.doubled > 0]
 
 
-def changed(reaction: ReactionResult) -> str:
+def changed(reaction: ReactionFigures) -> str:
     """Share of missions in which orders change, over the plans [%]."""
     shares = [100 * plan.reacted for plan in reaction.plans.values()]
     least, most = f"{min(shares):.0f}", f"{max(shares):.0f}"
@@ -274,12 +363,12 @@ DEFINITIONS: tuple[tuple[str, str], ...] = (
      "those tried"),
     ("Anticipation", "V(best, π) − V(stochastic, π), in per cent of V(best, π): what knowing of the reaction when "
      "planning adds to planning for failures"),
-    ("Orders changed", "share of missions in which some robot's orders change"),
+    ("Orders changed", "share of missions in which the orders of some robot change that lives to take them"),
 )
 """What each figure is."""
 
 
-def definitions(rows: Sequence[Reacting]) -> Iterator[tuple[str, str]]:
+def definitions(rows: Sequence[AnyReacting]) -> Iterator[tuple[str, str]]:
     """Figures with what they are, as far as the tables have them."""
     yield from DEFINITIONS
     if doubles(rows):

@@ -53,7 +53,7 @@ def write_report(path: Path, content: Content) -> None:
     parts = [
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
         *_answer(summary, content.world),
-        *(reactions_answered(summary) if isinstance(summary, Summary) else ()),
+        *reactions_answered(summary),
         *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
@@ -61,11 +61,11 @@ def write_report(path: Path, content: Content) -> None:
              "Values in the units of the world file's incentives; 95 % intervals in brackets, over trials and noise "
              "draws."),
         *_charts(summary),
-        *(reaction_section(summary) if isinstance(summary, Summary) else ()),
+        *reaction_section(summary),
         *_world(content.world),
         *_over_trials(scenarios),
         *_from_promise(scenarios),
-        *(reaction_ledgers(summary) if isinstance(summary, Summary) else ()),
+        *reaction_ledgers(summary),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
         *_measured(scenarios),

@@ -31,7 +31,11 @@ def answer(summary: AnySummary) -> str:
     """In one sentence: which plan is worth more, and by how much."""
     if summary.reach.nothing:
         return f"There is nothing to compare, for {NOTHING}."
-    return _of_given_plans(summary) if isinstance(summary, ComparisonSummary) else _of_the_two_plans(summary)
+    given = isinstance(summary, ComparisonSummary)
+    said = _of_given_plans(summary) if isinstance(summary, ComparisonSummary) else _of_the_two_plans(summary)
+    reacts = any(scenario.reactions for scenario in summary.scenarios) and not (
+        given and len(summary.scenarios[0].plans) == 1)
+    return f"If the team keeps its plan, {said[0].lower()}{said[1:]}" if reacts else said
 
 
 def _of_given_plans(summary: ComparisonSummary) -> str:

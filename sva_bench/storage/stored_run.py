@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
-from sva_bench.analysis.reaction_table import REACTION_COLUMNS, reaction_rows
+from sva_bench.analysis.reaction_table import reaction_columns, reaction_rows
 from sva_bench.analysis.results import SUMMARY, SUMMARY_OF_REACTIONS
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, summary_form
@@ -145,7 +145,7 @@ def write_csv(folder: Path) -> list[Path]:
              for scenario in summary.scenarios for name, plan in scenario.plans.items()]
     written.append(_write_rows(folder / "statistics.csv", ["scenario", "planner", *csv_columns()], plans))
     if reactions := reaction_rows(summary):
-        written.append(_write_rows(folder / "reactions.csv", REACTION_COLUMNS, reactions))
+        written.append(_write_rows(folder / "reactions.csv", reaction_columns(summary), reactions))
     return written
 
 

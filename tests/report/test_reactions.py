@@ -36,6 +36,7 @@ from sva_bench.report.reaction_wording import (
     reaction_answers,
     reaction_assumptions,
 )
+from sva_bench.report.wording import answer
 from sva_bench.storage.stored_run import write_csv
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run
@@ -90,7 +91,7 @@ def test_nothing_is_claimed_where_intervals_hold_zero() -> None:
     found = summary_of(reaction("report", PAYS, half=50.0, best="anticipative", over="stochastic"))
     assert said(found) == (
         "If the team re-plans when a robot misses a report, the value of planning for failures is not distinguishable "
-        "from zero in S (in place of 20 %). Re-planning changes no plan's value distinguishably. The best plan for it, "
+        "from zero in S. Re-planning changes no plan's value distinguishably. The best plan for it, "
         "of those tried: the anticipative in S (not distinguishable from the stochastic).")
 
 
@@ -110,7 +111,7 @@ def test_the_same_plan_is_called_so_and_not_a_matter_of_statistics() -> None:
     found = summary_of(reaction("report", {"stochastic": (100.0, 100.0), "deterministic": (100.0, 100.0)}, half=0.0,
                                 over=None, same_plan=True))
     assert said(found) == ("If the team re-plans when a robot misses a report, both plans are the same in S. "
-                           "Re-planning changes no plan's value distinguishably.")
+                           "Re-planning changes no plan's value.")
     assert "all alike" in printed(found)
 
 
@@ -126,6 +127,53 @@ def test_news_that_come_to_the_same_share_an_answer_and_others_have_their_own() 
     assert [answer.condition for answer in answers] == [
         "If the team re-plans at the stations where robots hear of a failure, or when a robot misses a report,",
         "If the team re-plans the moment a robot fails,"]
+
+
+def test_the_vss_without_reaction_is_by_the_missions_of_the_reaction_and_not_by_the_trials_of_the_run() -> None:
+    # 100 - 90 = 10 of 100 by the missions; the run's own trials, in summary_of, say 20.
+    found = summary_of(reaction("report", {"stochastic": (100.0, 101.0), "deterministic": (90.0, 100.0)}, half=0.5))
+    assert "worth 1.0 % in S in place of 10 %" in said(found)
+    for shown in (printed(found), page_of(found)):
+        assert "10.0 [9.5, 10.5]" in shown
+        assert "20.0" not in shown
+
+
+def test_no_news_stands_apart_even_where_news_changes_nothing() -> None:
+    still = {"stochastic": (100.0, 100.0), "deterministic": (80.0, 80.0)}
+    answers = reaction_answers(summary_of(*(reaction(news, still, half=0.5) for news in ("report", "never"))))
+    assert [answer.condition for answer in answers] == [
+        "If the team re-plans when a robot misses a report,", "If the team re-plans on news of failures but never has any,"]
+    assert "worth 20 % in S, as without reaction" in str(answers[0])
+
+
+def test_a_difference_is_told_in_one_percentage_and_not_in_that_of_another_base_too() -> None:
+    # -9 is 8.9 % of 101 and 8.2 % of 110.
+    found = summary_of(reaction("report", LOSES, half=0.5, best="deterministic", over="stochastic"))
+    assert "the deterministic in S (over the stochastic by as much)" in said(found)
+    assert "8.2" not in said(found)
+
+
+@pytest.mark.parametrize("kept", [0.0, -50.0, 0.1])
+def test_where_per_cent_tell_nothing_sentences_table_and_charts_are_in_incentive(kept: float) -> None:
+    found = summary_of(reaction("report", {"stochastic": (kept, 30.0), "deterministic": (kept, 10.0)}, half=0.5))
+    assert f"{30 - kept:.1f} of incentive to the stochastic one" in " ".join(said(found).split())
+    assert "in incentive" in printed(found).splitlines()[0]
+    assert f"{30 - kept:.1f}" in printed(found)
+    shown = page_of(found)
+    assert "VSS in incentive without reaction" in shown
+    assert "Value of recourse of each plan in incentive" in shown
+
+
+def test_that_nothing_can_be_collected_is_said_plainly() -> None:
+    found = summary_of(reaction("report", {"stochastic": (0.0, 0.0), "deterministic": (0.0, 0.0)}, half=0.0, over=None))
+    assert said(found) == (
+        "If the team re-plans when a robot misses a report, every plan is worth exactly nothing in S, whether the team "
+        "reacts or not. Re-planning changes no plan's value.")
+
+
+def test_the_headline_is_of_a_team_that_keeps_its_plan_where_another_reacts() -> None:
+    assert answer(summary_of()).startswith("Planning for failures pays in S")
+    assert answer(summary_of(reaction("report", LOSES))).startswith("If the team keeps its plan, planning for failures pays")
 
 
 def test_where_nobody_reacts_nothing_is_said_or_shown() -> None:
