@@ -46,7 +46,7 @@ def first_complaint(
     message = _in_plain_words(detail)
     found = detail["input"]
     text = (written(loc) if written else None) or (None if found is None else str(found).lower())
-    if detail["type"] == "string_type" and not isinstance(found, dict | list) and text is not None:
+    if detail["type"] == "string_type" and not isinstance(found, dict | list) and text is not None and len(text) <= 60:
         if written is None:
             kind = f"the number {text}" if not isinstance(found, bool) else text
             return loc, f'expected a word, found {kind}; if it is a name, write "{text}"'

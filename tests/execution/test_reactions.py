@@ -278,6 +278,12 @@ def test_orders_after_news_are_the_best_of_the_rest(seed: int, process: FailureP
     check_resolve(seed, process)
 
 
+@pytest.mark.parametrize("seed", [1227, 1354])
+def test_lifetimes_by_an_availability_are_those_of_the_whole_limit(seed: int) -> None:
+    # What is left of it was taken once, and robots planned for shorter lifetimes than theirs.
+    check_resolve(seed, "hazard")
+
+
 @pytest.mark.long
 @over_solved
 @pytest.mark.parametrize("seed", range(1000, 1500))

@@ -18,6 +18,7 @@ from sva_bench.files.documents import MAX_YAML_BYTES, Loc, parse_yaml, read_json
 from sva_bench.files.fields import Bounded, Name, Section
 from sva_bench.files.pretty import pretty_json
 from sva_bench.files.yaml_text import pretty_yaml
+from sva_bench.mission.instance_file import read_instance
 from tests.worlds_for_tests import SMALL, world_of
 
 
@@ -265,3 +266,12 @@ def test_a_name_that_yaml_reads_as_another_type_gets_a_hint_at_quotes(
 def test_a_missing_name_gets_no_hint_at_quotes(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="name: expected a word, found nothing"):
         world_of(tmp_path, SMALL.replace("name: small", "name:"))
+
+
+def test_a_number_of_any_length_in_place_of_a_word_is_a_short_complaint(tmp_path: Path) -> None:
+    path = tmp_path / "instance.json"
+    path.write_text('{"format": "sva-bench/instance@1",\n "name": 1' + "0" * 600 + "}")
+    with pytest.raises(BadFile) as told:
+        read_instance(path)
+    assert "..." in str(told.value)
+    assert len(str(told.value)) < 300 + len(str(path))

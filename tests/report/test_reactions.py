@@ -142,7 +142,8 @@ def test_no_news_stands_apart_even_where_news_changes_nothing() -> None:
     still = {"stochastic": (100.0, 100.0), "deterministic": (80.0, 80.0)}
     answers = reaction_answers(summary_of(*(reaction(news, still, half=0.5) for news in ("report", "never"))))
     assert [answer.condition for answer in answers] == [
-        "If the team re-plans when a robot misses a report,", "If the team re-plans on news of failures but never has any,"]
+        "If the team re-plans when a robot misses a report,",
+        "If the team re-plans on news of failures but never has any,"]
     assert "worth 20 % in S, as without reaction" in str(answers[0])
 
 
@@ -173,7 +174,8 @@ def test_that_nothing_can_be_collected_is_said_plainly() -> None:
 
 def test_the_headline_is_of_a_team_that_keeps_its_plan_where_another_reacts() -> None:
     assert answer(summary_of()).startswith("Planning for failures pays in S")
-    assert answer(summary_of(reaction("report", LOSES))).startswith("If the team keeps its plan, planning for failures pays")
+    assert answer(summary_of(reaction("report", LOSES))).startswith(
+        "If the team keeps its plan, planning for failures pays")
 
 
 def test_where_nobody_reacts_nothing_is_said_or_shown() -> None:
@@ -320,9 +322,9 @@ def test_page_and_terminal_of_a_run_answer_alike(finished: Run) -> None:
     shown = printed(found, 10_000)
     answers = reaction_answers(found)
     assert answers
-    for answer in answers:
-        assert str(answer) in shown
-        assert all(sentence in text for sentence in (answer.condition, *answer.sentences))
+    for said in answers:
+        assert str(said) in shown
+        assert all(sentence in text for sentence in (said.condition, *said.sentences))
     assert text.index("What if the robots re-plan?") < text.index("<table")
 
 
