@@ -83,7 +83,7 @@ def reaction(news: News, values: Mapping[str, tuple[float, float]], half: float 
         return Estimate(mean=mean, ci95=(mean - half, mean + half))
 
     def gain(mean: float, of: float) -> Gain:
-        return Gain(**vars(around(mean)), pct=100 * mean / of if of else None)
+        return Gain(**vars(around(mean)), pct=100 * mean / of if of > 0 else None)
 
     kept = {name: without for name, (without, _) in values.items()}
     after = {name: value for name, (_, value) in values.items()}

@@ -12,6 +12,7 @@ from sva_bench.analysis.results import Comparison, Estimate, PlanFigures, VssFig
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.files.printable import counted
+from sva_bench.mission.failures import process_of
 from sva_bench.world.model import World
 
 
@@ -136,9 +137,10 @@ def reliability_told(world: World, scenario: str, summary: AnySummary) -> str:
     known = world.scenario(scenario)
     failure = summary.failure
     processes = {failure.execute} if isinstance(summary, ComparisonSummary) else {failure.execute, failure.plan}
-    lifetimes = {name: mtbf for name, mtbf in known.mtbf_s.items() if "hazard" in processes}
+    in_time = {name for name in processes if process_of(name).terms([]).rate is not None}
+    lifetimes = dict(known.mtbf_s) if in_time else {}
     doubtful = [f"{name} {per_cent(100 * p)}" for name, p in known.availability.items()
-                if p < 1 and not (name in lifetimes and processes == {"hazard"})]
+                if p < 1 and not (name in lifetimes and processes == in_time)]
     parts = [("availability", doubtful),
              ("mean driving time to failure", [f"{name} {mtbf:g} s" for name, mtbf in lifetimes.items()]),
              ("cost of losing a robot", [f"{r.name} {r.loss_cost:g}" for r in world.robots if r.loss_cost > 0])]

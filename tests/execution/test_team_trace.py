@@ -82,7 +82,7 @@ def mission(course: str, weight: float, trial: int, *, reacts: bool = True) -> P
     outcome = Outcome(available=True, incentive=0, lost=False, value=0, pois_reached=0, stops_reached=1, end="home",
                       end_time_s=1, fuel_used_s=1, contacts=0, events=())
     reaction = Reaction(time_s=0, failed=("uv2",), learned=("uv1",), before={"uv1": ()} if reacts else {},
-                        after={"uv1": ("base",)} if reacts else {})
+                        after={"uv1": ("base",)} if reacts else {}, lived=("uv1",) if reacts else ())
     return Played(case=Case(scenario=None, planner="p", plan=Plan(routes={})),  # type: ignore[arg-type]
                   trial=trial, rollout=0, weight=weight,
                   outcome=TeamOutcome(robots=(outcome,), stops=(("base", course),), reactions=(reaction,),

@@ -70,9 +70,11 @@ def test_a_line_for_each_reaction_ranks_the_plans_and_says_what_reacting_adds(wo
     plans = {"split": sb.Plan(routes={"uv1": ("base", "p4", "p3", "base"), "uv2": ("base", "p1", "p2", "base")}),
              "idle": sb.Plan(routes={})}
     summary = sb.execute(world, plans, scenario="half", policy="resolve", news="instant", **QUICK).summary
-    (line,) = reaction_lines(summary)
-    assert line.startswith("half, resolve on instant news (all histories of failures): 1. split 120.0 [")
-    assert "reacting adds 15.0 [15.0, 15.0] to split" in line
+    line, knows, histories = reaction_lines(summary)
+    assert line.startswith("If the team re-plans the moment a robot fails, in half split is worth 120.0 [")
+    assert "Re-planning adds 14 % to split" in line
+    assert knows.startswith("Who knows what when: instant news:")
+    assert "all histories of failures were played" in histories
 
 
 def test_every_robot_of_an_infeasible_plan_that_has_no_safe_way_on_keeps_its_orders(tmp_path: Path) -> None:
