@@ -25,7 +25,8 @@ from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.reacted import Reacted as Reacted
 from sva_bench.execution.rules import LegDriven
 from sva_bench.execution.settling import FIGURES, figures_of
-from sva_bench.execution.team import Team, TeamOutcome, play
+from sva_bench.execution.team import Team, play
+from sva_bench.execution.team_outcome import TeamOutcome
 from sva_bench.execution.team_trace import Played, legs_used, trace_teams, typical
 from sva_bench.execution.whole import WholeDrives
 from sva_bench.files.printable import counted

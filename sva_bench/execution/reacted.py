@@ -10,7 +10,7 @@ import numpy as np
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.execution.case import Case
 from sva_bench.execution.execute import LegTime
-from sva_bench.execution.team import TeamOutcome
+from sva_bench.execution.team_outcome import TeamOutcome
 from sva_bench.execution.team_trace import TeamTrace
 
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from sva_bench.choices import News, Standing
 from sva_bench.execution.chance import Chance, Window
-from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
+from sva_bench.execution.outcome import Assignment, RobotFate
 from sva_bench.execution.policies.policy import Policy, RobotState, TeamState
 from sva_bench.execution.rules import LegDriven, RobotMission
+from sva_bench.execution.team_outcome import Reaction, TeamOutcome
 
 _NEWS, _STOP = 0, 1  # news comes before departures at the same time
 
@@ -40,56 +41,6 @@ class Team:
     policy: Policy
     news: News
     scheduled_s: Callable[[int, str, str], float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reaction:
-    """News of failures, and what a policy made of it.
-
-    Attributes:
-        time_s: When the news came [s on the mission clock].
-        failed: Robots that are known to be dead from now on.
-        learned: Robots that it reached.
-        before, after: Remaining orders of the robots whose orders changed.
-        since: Site from which these go on: where the robot stands or is going.
-        lived: Robots of these that get there. One that is dead, or dies on the way, and isn't missed yet is told in
-            vain.
-    """
-
-    time_s: float
-    failed: tuple[str, ...]
-    learned: tuple[str, ...]
-    before: Mapping[str, tuple[str, ...]]
-    after: Mapping[str, tuple[str, ...]]
-    since: Mapping[str, str] = field(default_factory=dict)
-    lived: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TeamOutcome:
-    """What came of a team's mission.
-
-    Attributes:
-        robots: Each robot's outcome.
-        stops: Stops that each robot was sent to one after the other, the base first, up to the one at which it ended or
-            which it was on its way to.
-        reactions: News that came, in order.
-        fates: When each robot failed, in this mission.
-        left_over: POIs that each robot had yet to visit when it ended, or visited too late, and that nobody collected.
-        doubled: POIs that two robots visited.
-    """
-
-    robots: tuple[Outcome, ...]
-    stops: tuple[tuple[str, ...], ...]
-    reactions: tuple[Reaction, ...]
-    fates: tuple[RobotFate, ...]
-    left_over: tuple[tuple[str, ...], ...]
-    doubled: int
-
-    @property
-    def orders_change(self) -> bool:
-        """Whether a robot that lives to take them gets other orders."""
-        return any(reaction.lived for reaction in self.reactions)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -142,6 +93,7 @@ class _Robot:
     heard_s: float = math.inf
     visited: list[str] = field(default_factory=list)
     learned: set[int] = field(default_factory=set)
+
 
 def play(team: Team, chance: Chance, legs: Callable[[int, tuple[str, ...]], LegDriven]) -> TeamOutcome:
     """Play one mission.

@@ -15,7 +15,7 @@ from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all
 from sva_bench.execution.execute import NOTHING, LegTime, orders_of, planned_legs
 from sva_bench.execution.known_legs import KnownLegs
 from sva_bench.execution.outcome import Outcome, Trace, trace_of
-from sva_bench.execution.team import Reaction, TeamOutcome
+from sva_bench.execution.team_outcome import Reaction, TeamOutcome
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 

@@ -10,7 +10,8 @@ from sva_bench.execution.case import Settings
 from sva_bench.execution.chance import Drawn
 from sva_bench.execution.drives import Courses, Drives, drive_all
 from sva_bench.execution.known_legs import KnownLegs, longest
-from sva_bench.execution.team import Team, TeamOutcome, play
+from sva_bench.execution.team import Team, play
+from sva_bench.execution.team_outcome import TeamOutcome
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 

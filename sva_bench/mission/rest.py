@@ -84,7 +84,7 @@ def _vehicle(whole: Instance, afield: Afield, kept: list[int], worth: float) -> 
     fuel[base, base] = 0.0
     # By an availability alone, lifetimes would be those of the limit that is left.
     rate = process_of(whole.failure).terms([vehicle.reliability]).rate
-    mtbf_s = vehicle.mtbf_s if rate is None else float(np.divide(1.0, rate[0])) if rate[0] > 0 else math.inf
+    mtbf_s = vehicle.mtbf_s if rate is None else 1.0 / float(rate[0]) if rate[0] > 0 else math.inf
     return replace(vehicle, fuel_s=fuel, mtbf_s=mtbf_s, incentives=vehicle.incentives[kept] * worth,
                    loss_cost=vehicle.loss_cost * worth, availability=afield.availability,
                    mission_limit_s=max(vehicle.mission_limit_s - afield.ready_s + afield.burnt_s, 0.0))

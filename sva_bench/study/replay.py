@@ -17,7 +17,7 @@ from sva_bench.execution.execute import Executed, execute
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import react_again
 from sva_bench.execution.reacted import Reacted
-from sva_bench.execution.team import Reaction
+from sva_bench.execution.team_outcome import Reaction
 from sva_bench.mission.plan_file import read_plan
 from sva_bench.recording.rerun import record
 from sva_bench.solver.rest import plan_rest

@@ -11,7 +11,8 @@ from sva_bench.execution.outcome import Assignment
 from sva_bench.execution.policies.policy import Orders, Policy, TeamState
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.rules import LegDriven
-from sva_bench.execution.team import Team, TeamOutcome, play
+from sva_bench.execution.team import Team, play
+from sva_bench.execution.team_outcome import TeamOutcome
 from sva_bench.mission.failures import process_of
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.rest import plan_rest

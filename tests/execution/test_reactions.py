@@ -19,7 +19,8 @@ from sva_bench.execution.outcome import RobotFate
 from sva_bench.execution.policies.policy import TeamState
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.rules import LegDriven
-from sva_bench.execution.team import TeamOutcome, play
+from sva_bench.execution.team import play
+from sva_bench.execution.team_outcome import TeamOutcome
 from sva_bench.mission.failures import NEVER, RouteProfile, process_of
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.rest import Afield, Rest

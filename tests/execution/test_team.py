@@ -19,7 +19,8 @@ from sva_bench.execution.policies.none import none
 from sva_bench.execution.policies.policy import Orders, Policy, TeamState
 from sva_bench.execution.policies.registry import POLICIES
 from sva_bench.execution.rules import LegDriven, settle
-from sva_bench.execution.team import Team, TeamOutcome, play
+from sva_bench.execution.team import Team, play
+from sva_bench.execution.team_outcome import TeamOutcome
 
 SITES = ("base", "r1", "p1", "p2", "p3", "p4")
 LEG_S = 10.0

@@ -8,7 +8,7 @@ import pytest
 from sva_bench.execution.case import Case
 from sva_bench.execution.outcome import Outcome, RobotFate
 from sva_bench.execution.reacted import Reacted
-from sva_bench.execution.team import Reaction, TeamOutcome
+from sva_bench.execution.team_outcome import Reaction, TeamOutcome
 from sva_bench.execution.team_trace import Played, typical
 from sva_bench.mission.plan import Plan
 from sva_bench.study.options import Options
