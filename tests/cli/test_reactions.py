@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import csv
+import html
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+import sva_bench as sb
 from sva_bench.__main__ import run_command_line
+from sva_bench.analysis.reaction_table import GIVEN_COLUMNS
+from sva_bench.analysis.summaries import ComparisonSummary
 from sva_bench.choices import NEWS, POLICY_NAMES
-from tests.worlds_for_tests import SMALL
+from sva_bench.files.records import from_dict
+from sva_bench.report.compared_reactions import given_answers
+from tests.worlds_for_tests import SMALL, world_of
 
 STATION = "  stations:\n    r1: {at_m: [3.2, 5.2], stop_s: 4}\n"
 PLAN = '{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}'
@@ -140,3 +148,71 @@ def test_help_lists_every_policy_and_all_news(command: str, capsys: pytest.Captu
     for option, words in (("--policy", POLICY_NAMES), ("--news", NEWS)):
         assert ", ".join(words) in shown[option]
     assert "--anticipate" in shown
+
+
+OTHER = '{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p4", "base"], "uv2": ["base", "p1", "base"]}}'
+
+
+def test_execute_with_reactions_prints_json_writes_csv_with_ranks_and_a_page(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "both.json").write_text(OTHER)
+    words = ["execute", "w.yaml", "p.json", "both.json", *QUICK, "--trials", "40", "--rollouts", "8",
+             "--policy", "none,resolve", "--news", "report,instant"]
+    assert run_command_line([*words, "--json", "--csv", "--out", "out"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    (run,) = (folder / "out").iterdir()
+    assert told == json.loads((run / "summary.json").read_text())
+    assert told["format"] == "sva-bench/summary@2"
+    with (run / "reactions.csv").open(newline="", encoding="utf-8") as file:
+        header, *lines = list(csv.reader(file))
+    assert header == list(GIVEN_COLUMNS)
+    assert "rank" in header
+    assert not {"best", "vss", "lead"} & set(header)
+    rows = [dict(zip(header, line, strict=True)) for line in lines]
+    expected = [
+        (scenario["name"], "resolve", reaction["news"], name,
+         next(ranked["rank"] for ranked in reaction["ranking"] if ranked["plan"] == name),
+         plan["executed"]["mean"], reaction["value_of_recourse"][name]["mean"])
+        for scenario in told["scenarios"] for reaction in scenario["reactions"]
+        for name, plan in reaction["plans"].items()]
+    assert len(expected) == 2 * 2 * 2  # scenarios, news, plans
+    assert [(row["scenario"], row["policy"], row["news"], row["planner"], int(row["rank"]), float(row["executed"]),
+             float(row["value_of_recourse"])) for row in rows] == expected
+    # uv1 takes p1 for 10 by one plan, and by the other p4 for 40, whatever becomes of uv2.
+    assert {(row["planner"], row["rank"]) for row in rows} == {("both", "1"), ("p", "2")}
+    page = html.unescape((run / "report.html").read_text()).replace("\u00a0", " ")
+    shown = page[page.index("What reacting is worth"):]
+    assert "Differences with the reaction" in shown
+    assert "With the reaction (policy resolve)" in shown
+    assert "VSS" not in shown.split("Each plan with the reaction")[1].split("</table>")[0]
+    for answer in given_answers(from_dict(ComparisonSummary, told)):
+        assert all(said in page for said in (answer.condition, *answer.sentences))
+
+
+def test_execute_prints_its_answers_and_writes_no_csv_unasked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command_line(["execute", "w.yaml", "p.json", *QUICK, "--policy", "resolve", "--out", "out"]) == 0
+    assert "If the team re-plans when a robot misses a report, in half p is worth" in " ".join(
+        capsys.readouterr().out.split())
+    (run,) = (folder / "out").iterdir()
+    assert not list(run.glob("*.csv"))
+
+
+def test_a_notebook_shows_given_plans_with_and_without_the_reaction(tmp_path: Path) -> None:
+    plans = {"<i>": sb.Plan(routes={"uv1": ("base", "p1", "base")}),
+             "both": sb.Plan(routes={"uv1": ("base", "p4", "base"), "uv2": ("base", "p1", "base")})}
+    given = sb.execute(world_of(tmp_path), plans, policy="resolve", news=["report", "instant"], trials=10, rollouts=1,
+                       fidelity="kinematic", workers=1)
+    shown = given._repr_html_()
+    assert shown == given.summary._repr_html_()
+    heads = re.findall("<th>(.*?)</th>", shown)
+    assert not any("VSS" in head for head in heads)
+    rows = [dict(zip(heads, cells, strict=True)) for row in shown.split("<tr>")
+            if (cells := [html.unescape(cell) for cell in re.findall("<td>(.*?)</td>", row)])]
+    expected = [(name + whose, plan.executed.mean) for scenario in given.summary.scenarios for whose, measured in (
+        ("", scenario.plans), *((f", {own.name}", own.plans) for own in scenario.reactions or ()))
+        for name, plan in measured.items()]
+    assert len(expected) == 2 * 3 * 2  # scenarios; without reaction and with each; plans
+    assert [(row["plan"], float(row["executed [95 %]"].split()[0])) for row in rows] == [
+        (name, round(mean, 1)) for name, mean in expected]
+    assert "&lt;i&gt;, resolve on instant news" in shown
