@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sva_bench.execution import react as reacting
+from sva_bench.execution import plays
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.policies.policy import Orders, TeamState
 from sva_bench.execution.policies.resolve import Resolve
@@ -96,11 +96,11 @@ def played(
     world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], policy: Heard, most: int
 ) -> tuple[Reacted, float]:
     """The last case played without what was driven before, and the processor time of it [s]."""
-    before, reacting.MOST_HISTORIES = reacting.MOST_HISTORIES, most
+    before, plays.MOST_HISTORIES = plays.MOST_HISTORIES, most
     begun = time.process_time()
     found = react(world, costs, cases, [policy] * len(cases), Settings(
         seed=0, trials=TRIALS, rollouts=ROLLOUTS, fidelity="kinematic", recorded=False))[-1]
-    reacting.MOST_HISTORIES = before
+    plays.MOST_HISTORIES = before
     return found, time.process_time() - begun
 
 

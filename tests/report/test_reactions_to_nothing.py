@@ -17,7 +17,7 @@ from sva_bench.analysis.reaction_results import ReactionFigures
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import NEWS, News
 from sva_bench.cli.reaction_table import print_reactions
-from sva_bench.execution import react as reacting
+from sva_bench.execution import plays
 from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.reaction_page import reaction_section, reactions_answered
 from sva_bench.report.reaction_wording import DOUBTED, reaction_answers
@@ -60,7 +60,7 @@ def test_a_value_of_recourse_is_exactly_zero_where_no_orders_can_change(
     enumerated: bool, scenario: str, news: News, exactly: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not enumerated:
-        monkeypatch.setattr(reacting, "MOST_HISTORIES", 0)
+        monkeypatch.setattr(plays, "MOST_HISTORIES", 0)
     summary = sb.run(world_of(tmp_path), scenario=scenario, policy="resolve", news=news, **QUICK).summary
     (reaction,) = reactions_of(summary)
     assert reaction.histories == ("enumerated" if enumerated else "sampled")

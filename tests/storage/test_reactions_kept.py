@@ -18,7 +18,7 @@ from sva_bench.__main__ import run_command_line
 from sva_bench.analysis.summaries import Summary
 from sva_bench.choices import News
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.execution import react
+from sva_bench.execution import plays
 from sva_bench.files.records import as_dict
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance_file import read_instance
@@ -57,7 +57,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
                       anticipate=True)
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "sampled":
-            patch.setattr(react, "MOST_HISTORIES", 1)
+            patch.setattr(plays, "MOST_HISTORIES", 1)
         yield run(world_of(folder, TEXT), options, folder / "runs", None, lambda *_: None)
 
 

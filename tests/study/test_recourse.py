@@ -16,6 +16,7 @@ from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import News, PolicyName
 from sva_bench.errors import BadInput
+from sva_bench.execution import plays
 from sva_bench.execution import react as reacting
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.policies.registry import POLICIES, Means
@@ -141,7 +142,7 @@ def test_what_isnt_recorded_holds_no_missions_and_is_the_same(world: sb.World) -
 def test_sampled_trials_are_those_of_their_ranges_together(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(reacting, "MOST_HISTORIES", 0)
+    monkeypatch.setattr(plays, "MOST_HISTORIES", 0)
     world = per_leg(tmp_path)
     whole = reacted(world, settings_of(trials=30))
     parts = [reacted(world, settings_of(first=first, trials=15)) for first in (0, 15)]
@@ -155,7 +156,7 @@ def test_sampled_trials_are_those_of_their_ranges_together(
 def test_a_sample_of_histories_means_what_all_of_them_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     world = per_leg(tmp_path)
     exact = [run.weight @ run.value.sum(axis=1) for run in reacted(world, settings_of())]
-    monkeypatch.setattr(reacting, "MOST_HISTORIES", 0)
+    monkeypatch.setattr(plays, "MOST_HISTORIES", 0)
     for run, mean in zip(reacted(world, settings_of(trials=3000, recorded=False)), exact, strict=True):
         values = run.value.sum(axis=1)
         assert abs(values.mean() - mean) < 4 * values.std() / np.sqrt(len(values))  # one in 16 000 is beyond
@@ -167,7 +168,7 @@ def test_more_trials_than_memory_holds_are_refused_unless_all_histories_are_play
     world = per_leg(tmp_path)
     monkeypatch.setattr(reacting, "MOST_TRIALS_HELD", 60)
     assert all(run.enumerated for run in reacted(world, settings_of()))
-    monkeypatch.setattr(reacting, "MOST_HISTORIES", 0)
+    monkeypatch.setattr(plays, "MOST_HISTORIES", 0)
     with pytest.raises(BadInput, match=r"at most 10 trials can be sampled \(--trials\)"):
         reacted(world, settings_of(trials=11))
     reacted(world, settings_of(trials=10))
