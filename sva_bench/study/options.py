@@ -49,7 +49,7 @@ class Options:
     precision: Precision | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything that changes results; what isn't asked for is left out, so that names of runs stay theirs."""
+        """Everything that changes results, as asked for; what isn't asked for is left out."""
         asked: dict[str, Any] = {} if self.precision is None else {
             "precision_pct": self.precision.pct, "max_trials": self.precision.max_trials}
         asked |= {key: list(words) for key, words in (("policies", self.policies), ("news", self.news)) if words}
@@ -75,6 +75,17 @@ class Options:
 def reactions_of(world: World, options: Options) -> tuple[Reaction, ...]:
     """Policy and news of each reaction to be measured beside none; empty if there is none."""
     return pairs_of(world, options.policies, options.news)
+
+
+def identity_of(world: World, options: Options) -> dict[str, Any]:
+    """What results in a world depend on, however it is asked for, by which runs are named.
+
+    ``none`` is measured anyway, and naming the usual news or what the world says changes nothing. Reactions are left
+    out where they are the world's own, so that names of runs stay theirs.
+    """
+    told = {key: value for key, value in options.as_dict().items() if key not in ("policies", "news")}
+    pairs = reactions_of(world, options)
+    return told if pairs == pairs_of(world, (), ()) else {**told, "reactions": [list(pair) for pair in pairs]}
 
 
 def settings_of(world: World, options: Options) -> Settings:

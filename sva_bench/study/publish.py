@@ -38,7 +38,7 @@ from sva_bench.storage.run_folder import (
     write_travel_times,
 )
 from sva_bench.storage.stored_run import Content, read_content, run_folder_at
-from sva_bench.study.options import Options, settings_of
+from sva_bench.study.options import Options, identity_of, settings_of
 from sva_bench.study.summing import by_case
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -74,7 +74,7 @@ def publish(
     foreign = identity is not None
     resolved = world_as_dict(world)
     name = run_name(world.name, options.seed,
-                    {"world": resolved, "options": options.as_dict(), **_digests(world), **(identity or {})})
+                    {"world": resolved, "options": identity_of(world, options), **_digests(world), **(identity or {})})
     stems = {key: stem_of(*key, foreign=foreign) for key in by_case(executed)}
     routes = {key: run.case.plan.routes for key, run in by_case(executed).items()}
     told: dict[Key, str] = {}

@@ -113,6 +113,22 @@ def test_a_run_keeps_what_was_asked_for_and_is_named_as_ever_where_nothing_was(f
     assert kept["anticipate"]
 
 
+def test_what_comes_to_the_same_reactions_is_the_same_run(folder: Path) -> None:
+    found = []
+    for number, words in enumerate((["--policy", "resolve"], ["--policy", "none,resolve"],
+                                    ["--policy", "resolve", "--news", "report"], ["--policy", "none"], [])):
+        assert run_command_line(["run", "w.yaml", *QUICK, *words, "--out", f"out{number}"]) == 0
+        (run,) = (folder / f"out{number}").iterdir()
+        # Figures to the byte, of other files the names: plans say how long they took, recordings are never the same.
+        figures = [run / "summary.json", *run.glob("*.parquet")]
+        found.append((run.name, {str(path.relative_to(run)): path.read_bytes() if path in figures else b""
+                                 for path in run.rglob("*")}))
+    one, two, three, none, nothing = found
+    assert one == two == three
+    assert none == nothing
+    assert one[0] != none[0]
+
+
 def test_a_batch_takes_them_and_its_folder_keeps_them(folder: Path) -> None:
     words = ["batch", "w.yaml", *QUICK, "--cache", "cache", "--policy", "resolve", "--news", "never,report",
              "--anticipate", "--out", "b"]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from sva_bench.choices import NEWS, POLICY_NAMES, USUAL_NEWS, News, PolicyName
 from sva_bench.errors import BadInput
-from sva_bench.study.options import Options, reactions_of
+from sva_bench.study.options import Options, identity_of, reactions_of
 from sva_bench.study.reacting import check_reactions, news_of, pairs_of, policies_of
 from sva_bench.world.load import load_world
 from sva_bench.world.model import World, WorldReaction
@@ -94,6 +94,23 @@ def test_what_the_world_says_is_the_default_and_asking_for_it_changes_nothing(ow
     world = reacting(own)
     expected = () if own.policy == "none" else ((own.policy, own.news),)
     assert pairs_of(world, (), ()) == pairs_of(world, (own.policy,), ()) == expected
+
+
+@given(st.sampled_from(REACTIONS), some_policies, some_news, some_policies, some_news)
+def test_runs_are_named_alike_exactly_if_the_same_reactions_are_measured(
+    own: WorldReaction, policies: list[PolicyName], news: list[News], others: list[PolicyName], other_news: list[News]
+) -> None:
+    one, two = (Options(policies=tuple(asked), news=tuple(heard)) for asked, heard in (
+        (policies, news), (others, other_news)))
+    world = reacting(own)
+    alike = identity_of(world, one) == identity_of(world, two)
+    assert alike == (reactions_of(world, one) == reactions_of(world, two))
+    assert identity_of(world, one) != identity_of(world, replace(one, anticipate=True))
+
+
+@pytest.mark.parametrize("own", REACTIONS)
+def test_a_run_that_asks_for_no_reaction_is_named_as_ever(own: WorldReaction) -> None:
+    assert identity_of(reacting(own), Options()) == Options().as_dict()
 
 
 # What doesn't go together
