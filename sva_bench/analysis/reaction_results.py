@@ -157,6 +157,17 @@ class ReactionResult(ReactionFigures):
     best: BestPlan
     candidates: tuple[Candidate, ...] = ()
 
+    @property
+    def best_plans(self) -> frozenset[str]:
+        """The best plan, and those of its routes."""
+        alike = {frozenset(("stochastic", "deterministic"))} if self.vss.same_plan else set()
+        if self.candidates:  # the anticipative plan is the best of them, of equals the first
+            alike.add(frozenset(("anticipative", max(self.candidates, key=lambda tried: tried.modelled).plan)))
+        found = frozenset((self.best.plan,))
+        for _ in alike:  # through one pair to the other
+            found = found.union(*(pair for pair in alike if pair & found))
+        return found & set(self.plans)
+
     @model_validator(mode="after")
     def _is_consistent(self) -> ReactionResult:
         if not {"stochastic", "deterministic"} <= set(self.plans):

@@ -47,7 +47,7 @@ def reaction_rows(summary: AnySummary) -> list[list[Cell]]:
             for scenario in summary.scenarios for reaction in scenario.reactions or ()
             for name, plan in reaction.plans.items()]
     return [[scenario.name, reaction.policy, reaction.news, name,
-             *_plan(reaction, name, plan, name == reaction.best.plan), *_reaction(reaction)]
+             *_plan(reaction, name, plan, name in reaction.best_plans), *_reaction(reaction)]
             for scenario in summary.scenarios for reaction in scenario.reactions or ()
             for name, plan in reaction.plans.items()]
 

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.reaction_results import Candidate, ReactionResult
 from sva_bench.analysis.reaction_table import REACTION_COLUMNS
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import Summary
@@ -250,6 +250,24 @@ def test_a_difference_in_per_cent_of_nothing_is_none() -> None:
     ((1.0, 3.0), "2.0 [1.0, 3.0]"), ((-1.0, 5.0), f"2.0{DOUBTED} [-1.0, 5.0]"), (None, "2.0")])
 def test_differences_whose_interval_holds_zero_are_marked(ends: tuple[float, float] | None, shown: str) -> None:
     assert doubted(Estimate(mean=2.0, ci95=ends)) == shown
+
+
+@pytest.mark.parametrize(("chosen", "best", "same_plan", "share"), [
+    ("survival^0.5", "anticipative", False, {"anticipative"}),
+    ("survival^0.5", "anticipative", True, {"anticipative"}),
+    ("deterministic", "deterministic", False, {"deterministic", "anticipative"}),
+    ("stochastic", "stochastic", True, {"stochastic", "deterministic", "anticipative"}),
+    ("stochastic", "deterministic", True, {"stochastic", "deterministic", "anticipative"}),
+])
+def test_plans_of_the_same_routes_share_being_the_best(
+    chosen: str, best: str, same_plan: bool, share: set[str]
+) -> None:
+    # Of equals the first is chosen; what is alike by way of a third plan is alike.
+    tried = tuple(Candidate(plan=name, theta=None, modelled=value) for name, value in (
+        ("survival^0.25", 1.0), (chosen, 2.0), ("survival^0.75", 2.0)))
+    one = reaction("report", PAYS, best=best, same_plan=same_plan)
+    assert replace(one, candidates=tried).best_plans == share
+    assert one.best_plans == ({best, "stochastic", "deterministic"} if same_plan and best != "anticipative" else {best})
 
 
 def test_plans_whose_orders_change_in_other_shares_of_missions_are_told_as_a_range() -> None:

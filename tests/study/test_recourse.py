@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 import sva_bench as sb
 from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.reaction_table import REACTION_COLUMNS, reaction_rows
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import News, PolicyName
 from sva_bench.errors import BadInput
@@ -191,6 +192,21 @@ def test_the_plan_for_a_reaction_is_the_best_of_all_that_were_tried(ours: sb.Res
         for row in results_of(ours.summary, scenario.name):
             best = max(candidate.modelled for candidate in row.candidates)
             assert row.plans["anticipative"].modelled == best == max(plan.modelled for plan in row.plans.values())
+
+
+def test_plans_of_the_best_ones_routes_are_the_best_too_and_no_others(ours: sb.Result[Summary]) -> None:
+    columns = [REACTION_COLUMNS.index(name) for name in ("scenario", "policy", "news", "planner")]
+    marked = {tuple(row[column] for column in columns) for row in reaction_rows(ours.summary)
+              if row[REACTION_COLUMNS.index("best")]}
+    best = {(scenario.name, row.policy, row.news): row.best.plan for scenario in ours.summary.scenarios
+            for row in results_of(ours.summary, scenario.name)}
+    plans = {(run.case.scenario.name, run.case.policy, run.case.news, run.case.planner): run.case.plan
+             for run in ours.reacted}
+    assert marked == {(scenario, policy, news, name) for (scenario, policy, news, name), plan in plans.items()
+                      if plan.drives_like(plans[scenario, policy, news, best[scenario, policy, news]])}
+    # Under "half" the deterministic plan is the best, and made for the reaction too; under "safe" all are alike.
+    assert {row[3] for row in marked if row[0] == "half"} == {"deterministic", "anticipative"}
+    assert {row[3] for row in marked if row[0] == "safe"} == {"stochastic", "deterministic", "anticipative"}
 
 
 def test_only_what_isnt_solved_yet_is_solved_for_a_reaction(
