@@ -116,6 +116,11 @@ class ReactionOverMaps(Record):
     anticipation: GainOverMaps
 
     @property
+    def label(self) -> str:
+        """Scenario and variant, as shown to users."""
+        return labelled(self.scenario, self.variant)
+
+    @property
     def name(self) -> str:
         """Policy and news, as shown to users."""
         return f"{self.policy} on {self.news} news"

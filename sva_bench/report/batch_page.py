@@ -10,7 +10,7 @@ from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, sentence, table, write_page
-from sva_bench.report.reactions_over_maps import reaction_table
+from sva_bench.report.reactions_over_maps import answers_over_maps, reaction_table
 from sva_bench.report.wording import (
     VSS_PCT,
     listed,
@@ -32,7 +32,7 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
     caution = over_few_maps(rows)
     parts = [
         f"<h1>Value of the stochastic solution over {counted(len(summary.worlds), 'map')}</h1>",
-        f"<div class=answer><p>{sentence(_over_maps(rows))}</p>{note(VSS_PCT)}</div>",
+        f"<div class=answer><p>{sentence(_answer(summary))}</p>{_answered(summary)}{note(VSS_PCT)}</div>",
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
@@ -75,6 +75,20 @@ def _pictures(summary: BatchSummary) -> list[str]:
     seeds = ", the mean over its seeds" if len(summary.seeds) > 1 else ""
     return [figure(charts.boxes_of(by_scenario, "VSS over maps", "VSS [% of the stochastic plan]"),
                    f"Each point is a map{seeds}.")] if by_scenario else []
+
+
+def _answer(summary: BatchSummary) -> str:
+    """What a batch comes to without reaction, which is said where teams react too; one map tells nothing either way."""
+    said, rows = _over_maps(summary.aggregate), summary.aggregate
+    told = summary.reactions and any(row.maps > 1 for row in rows)
+    return f"If the team keeps its plan, {said[0].lower()}{said[1:]}" if told else said
+
+
+def _answered(summary: BatchSummary) -> str:
+    """What it comes to where teams react; nothing where none does."""
+    lines = "".join(f"<li><b>{sentence(answer.condition)}</b> {sentence(' '.join(answer.sentences))}</li>"
+                    for answer in answers_over_maps(summary.reactions))
+    return f"<ul>{lines}</ul>" if lines else ""
 
 
 def _over_maps(rows: Sequence[OverMaps]) -> str:

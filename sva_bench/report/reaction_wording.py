@@ -131,22 +131,22 @@ def _worth(rows: Sequence[Reacting]) -> str:
     pays, loses, even, zero, same, unsure = _sorted_by_verdict(rows)
     said = []
     if pays:
-        said.append("planning for failures is worth " + _some(
+        said.append("planning for failures is worth " + few_of(
             [f"{_amount_of_vss(r)} in {s.name}{_without(r)}" for s, r in pays]))
     if loses:
-        said.append("the deterministic plan is worth more in " + _some(
+        said.append("the deterministic plan is worth more in " + few_of(
             [f"{s.name} (VSS {_amount_of_vss(r)}{_without(r)})" for s, r in loses]))
     if even:
-        said.append("the value of planning for failures is not distinguishable from zero in " + _some(
+        said.append("the value of planning for failures is not distinguishable from zero in " + few_of(
             [s.name + _where_uneven(r) for s, r in even]))
     if idle := [s.name for s, r in zero if _is_worthless(r)]:
-        said.append(f"every plan is worth exactly nothing in {_some(idle)}, whether the team reacts or not")
+        said.append(f"every plan is worth exactly nothing in {few_of(idle)}, whether the team reacts or not")
     if level := [s.name + _where_uneven(r) for s, r in zero if not _is_worthless(r)]:
-        said.append(f"both plans are worth exactly the same in {_some(level)}")
+        said.append(f"both plans are worth exactly the same in {few_of(level)}")
     if unsure:
-        said.append("too few noise draws give an interval in " + _some([s.name for s, _ in unsure]))
+        said.append("too few noise draws give an interval in " + few_of([s.name for s, _ in unsure]))
     if same:
-        said.append("both plans are the same in " + _some([s.name for s, _ in same]))
+        said.append("both plans are the same in " + few_of([s.name for s, _ in same]))
     return "; ".join(said) + "."
 
 
@@ -228,7 +228,7 @@ def _recourse(rows: Sequence[Reacting]) -> str:
     first = f"the deterministic plan by {gained(det)} and the stochastic one by {gained(sto)} in {name}" if falls \
         else f"{gained(det)} to the deterministic plan and {gained(sto)} to the stochastic one in {name}"
     others = [f"{gained(det)} and {gained(sto)} in {name}" for name, det, sto in more]
-    return f"Re-planning {'changes' if falls else 'adds'} {_some([first, *others], '; ')}."
+    return f"Re-planning {'changes' if falls else 'adds'} {few_of([first, *others], '; ')}."
 
 
 def gained(gain: Gain) -> str:
@@ -242,7 +242,7 @@ def _best(rows: Sequence[Reacting]) -> str:
     """Which of the plans tried is the best for the reaction, and by how much."""
     said = [f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over}{_by_as_much(r)})"
             for s, r in rows if r.best.over is not None and not _is_worthless(r)]
-    return f"The best plan for it, of those tried: {_some(said)}." if said else ""
+    return f"The best plan for it, of those tried: {few_of(said)}." if said else ""
 
 
 def lead(reaction: ReactionResult) -> str:
@@ -268,8 +268,8 @@ def _signed(pct: float) -> str:
     return f"{'+' if pct > 0 else ''}{per_cent(pct)}"
 
 
-def _some(words: Sequence[str], comma: str = ", ") -> str:
-    """As many as a sentence bears."""
+def few_of(words: Sequence[str], comma: str = ", ") -> str:
+    """As many as a sentence bears, and how many more there are."""
     kept = [*words[:_MOST_NAMED], *([f"{len(words) - _MOST_NAMED} more below"] if len(words) > _MOST_NAMED else [])]
     return listed(kept) if comma == ", " else comma.join(kept)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import html
 import json
 import shutil
 from dataclasses import replace
@@ -14,7 +15,7 @@ import pytest
 
 import sva_bench as sb
 from sva_bench.__main__ import run_command_line
-from sva_bench.analysis.over_maps import UnitSummary
+from sva_bench.analysis.over_maps import BatchSummary, GainOverMaps, Percentage, ReactionOverMaps, UnitSummary
 from sva_bench.analysis.reaction_results import Gain, ReactionResult
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import UnitScenario
@@ -23,9 +24,12 @@ from sva_bench.batch.reactions import ReactionsJob
 from sva_bench.batch.reactions_over_maps import reactions_over_maps
 from sva_bench.batch.shards import Unit, read_note
 from sva_bench.batch.strands import strand
+from sva_bench.choices import NEWS, News
 from sva_bench.errors import BadFile
 from sva_bench.files.codec import decoded, encoded
-from sva_bench.files.records import as_dict
+from sva_bench.files.records import as_dict, from_dict
+from sva_bench.report.batch_page import write_batch_report
+from sva_bench.report.reactions_over_maps import answers_over_maps
 from sva_bench.study.options import Options
 from tests.results_for_tests import unit
 from tests.worlds_for_tests import SMALL, world_of
@@ -119,8 +123,53 @@ def test_the_tables_of_reactions_have_a_row_for_each_figure(folder: Path) -> Non
         assert float(row["mean"]) == pytest.approx(np.mean(mine))
 
 
-def test_the_page_of_a_batch_shows_its_reactions(folder: Path) -> None:
-    assert "Teams that react" in (folder / "done" / "report.html").read_text()
+def test_the_page_of_a_batch_shows_its_reactions_and_begins_with_what_vss_is_under_each(folder: Path) -> None:
+    page = html.unescape((folder / "done" / "report.html").read_text()).replace("\u00a0", " ")
+    assert "Teams that react" in page
+    first = page[:page.index("<table")]
+    assert "If the team keeps its plan, over these maps" in first
+    summary = from_dict(BatchSummary, json.loads((folder / "done" / "summary.json").read_text()))
+    answers = answers_over_maps(summary.reactions)
+    assert answers
+    for answer in answers:
+        assert f"<b>{answer.condition}</b> {answer.sentences[0]}" in first
+
+
+def test_that_one_map_tells_nothing_over_maps_is_said_of_any_team(folder: Path, tmp_path: Path) -> None:
+    summary = from_dict(BatchSummary, json.loads((folder / "done" / "summary.json").read_text()))
+    one = replace(summary, aggregate=tuple(replace(row, maps=1) for row in summary.aggregate))
+    write_batch_report(tmp_path / "report.html", one)
+    page = html.unescape((tmp_path / "report.html").read_text())
+    assert "<p>One map can't tell" in page
+    assert "keeps its plan" not in page
+
+
+def over_maps(news: News, scenario: str, mean: float, ends: tuple[float, float] | None) -> ReactionOverMaps:
+    found = GainOverMaps(mean=mean, ci95=ends, pct=Percentage(mean=None, ci95=None))
+    return ReactionOverMaps(
+        variant="slow" if scenario == "varied" else "", scenario=scenario, policy="resolve", news=news, maps=3,
+        vss=found, value_of_recourse={}, vss_with_recourse=found, anticipation=found)
+
+
+def test_what_vss_is_over_maps_under_a_reaction_is_told_by_its_interval_in_a_sentence() -> None:
+    rows = [over_maps("report", "pays", 5.0, (2.0, 8.0)), over_maps("report", "varied", 6.0, (3.0, 9.0)),
+            over_maps("report", "loses", -4.0, (-6.0, -2.0)), over_maps("report", "even", 1.0, (-1.0, 3.0)),
+            over_maps("report", "zero", 0.0, (0.0, 0.0)), over_maps("report", "one", -2.0, None)]
+    (said,) = answers_over_maps(rows)
+    assert str(said) == (
+        "If the team re-plans when a robot misses a report, planning for failures is worth 5.0 [2.0, 8.0] in pays and "
+        "6.0 [3.0, 9.0] in varied (slow); the deterministic plan is worth more in loses (VSS -4.0 [-6.0, -2.0]); the "
+        "value of planning for failures is not distinguishable from zero in even; both plans are worth exactly the "
+        "same in zero; VSS, which has no interval over maps, is -2.0 in one.")
+
+
+def test_over_maps_news_that_come_to_the_same_share_a_sentence_and_no_news_has_its_own() -> None:
+    rows = [over_maps(news, "S", 5.0, (2.0, 8.0)) for news in NEWS]
+    assert [answer.condition for answer in answers_over_maps(rows)] == [
+        "If the team re-plans on news of failures but never has any,",
+        "If the team re-plans at the stations where robots hear of a failure, or when a robot misses a report, or the "
+        "moment a robot fails,"]
+    assert answers_over_maps([]) == []
 
 
 def test_how_far_a_batch_is_says_what_reacting_is_worth_so_far(
