@@ -24,7 +24,8 @@ from sva_bench.robot.model import BUILT_IN
 from sva_bench.travel.fuel import fuel_costs
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.maps.ros import read_ros_map
-from sva_bench.world.model import Noise, Site, World
+from sva_bench.world.model import Site, World
+from sva_bench.world.noise import Noise
 
 CELL_M, ROOM, DOOR = 0.05, 100, 24  # cells: rooms of 5 m with doors of 1.2 m
 SITES, RUNS = 25, 3

@@ -17,7 +17,8 @@ from sva_bench.execution.rules import settle
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.recording.rerun import record
 from sva_bench.robot.model import BUILT_IN
-from sva_bench.world.model import Noise, Robot, Scenario, Site, World
+from sva_bench.world.model import Robot, Scenario, Site, World
+from sva_bench.world.noise import Noise
 
 ROBOTS, POIS, LEG_S, MISSION_S, POSES_HZ = 4, 40, 60.0, 600.0, 20
 SPEED_M_S, SIDE_M = 0.5, 40.0

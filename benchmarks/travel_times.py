@@ -16,7 +16,8 @@ from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.travel.fuel import fuel_costs
 from sva_bench.travel.times import plan_travel_times
-from sva_bench.world.model import Noise, Site, World
+from sva_bench.world.model import Site, World
+from sva_bench.world.noise import Noise
 
 SITES, OBSTACLES, RUNS = 25, 30, 5
 

@@ -60,3 +60,8 @@ Role = Literal["stochastic", "deterministic", "anticipative", "informed", "infor
 """What a plan is executed for: ours, the third made for a reaction; what is behind the informed planner, and one of its
 plans; the least fortunate of the deterministic plans that tie; or given from elsewhere."""
 EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]
+NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payload", "capacity", "people", "passages",
+                    "floors", "contact"]
+"""What the execution meets that a plan doesn't know of, by the names under which its effects are reported."""
+NOISE_NAMES: tuple[NoiseName, ...] = get_args(NoiseName)
+NoisePreset = Literal["realistic"]

@@ -23,6 +23,15 @@ class Stream(IntEnum):
     RANDOM_WORLD = 7
     PROPOSED_MISSION = 8
     DRAWN_PLACES = 9
+    SPEED_GAIN = 10
+    TRACK_GAIN = 11
+    LOCALISATION = 12
+    DELAY = 13
+    PAYLOAD = 14
+    CAPACITY = 15
+    PASSAGE = 16
+    PEOPLE = 17
+    CHECKED_DRIVE = 18
 
 
 def seed_for(root: int, stream: Stream, *index: int) -> np.random.SeedSequence:

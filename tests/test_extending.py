@@ -14,8 +14,8 @@ from sva_bench.analysis import catalogue
 from sva_bench.analysis.catalogue import STATISTICS
 from sva_bench.execution.engines.ideal import Ideal
 from sva_bench.execution.following import follow
-from sva_bench.execution.noise import UNDISTURBED
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.robot.disturbance import UNDISTURBED
 from sva_bench.robot.follower import stretches
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.study.options import Options

@@ -102,7 +102,7 @@ def _beyond(job: Job, point: Point, grid: Grid, each: float) -> float:
         plans += _reactions_s(point.world, grid.options)
     if isinstance(job, DriveJob | ReactionsJob) or grid.options.fidelity == "physics":
         return plans
-    rollouts = 1 if point.world.noise.silent else min(grid.options.rollouts, grid.options.trials)
+    rollouts = min(grid.options.rollouts, grid.options.trials) if point.world.noisy else 1
     # A stochastic plan for each scenario and about one deterministic plan for all.
     return plans + (scenarios + 1) * len(point.world.robots) * rollouts * _mission_s(point) / each
 

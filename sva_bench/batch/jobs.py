@@ -15,12 +15,12 @@ from sva_bench.choices import PathPlanner
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import DriveTask, RouteKey, drive_tasks
 from sva_bench.execution.execute import PlannedLegs, execute, settle_trials
-from sva_bench.execution.noise import UNDISTURBED
 from sva_bench.execution.outcome import Driven
 from sva_bench.files.digest import digest
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
+from sva_bench.robot.disturbance import UNDISTURBED
 from sva_bench.robot.model import RobotModel
 from sva_bench.study.costs import instance_of
 from sva_bench.study.options import Options

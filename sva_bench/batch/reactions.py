@@ -48,7 +48,7 @@ class ReactionsJob:
         plans = [(case.scenario.name, case.planner, case.plan.routes, case.plan.value, case.plan.bound,
                   case.plan.status) for case in self.cases]
         return digest(self.kind, world.obstacles, world.sites, world.robots, world.scenarios, world.execute_failure,
-                      world.noise, self.costs, self.instances, plans, settings_of(world, options),
+                      world.noise, world.passages, self.costs, self.instances, plans, settings_of(world, options),
                       reactions_of(world, options), options.anticipate, options.limits)
 
     @property

@@ -96,7 +96,7 @@ def shard_of(
     runs = {(run.case.scenario.name, run.case.planner): run for run in executed}
     note = Note(facts=facts, variant=variant, robots=robots, first=settings.first, trials=settings.trials,
                 reactions=reactions, tallies={
-        s.name: tally_of(runs[s.name, "stochastic"], runs[s.name, "deterministic"], noisy=not world.noise.silent)
+        s.name: tally_of(runs[s.name, "stochastic"], runs[s.name, "deterministic"], noisy=world.noisy)
         for s in world.scenarios})
     stored = StoredNote(
         facts=facts, variant=variant, robots=robots, first=note.first, trials=note.trials, reactions=reactions,
@@ -124,7 +124,7 @@ def read_note(path: Path, unit: Unit) -> Note:
                       ) from None
     world = unit.point.world
     draws = {len(tally.difference.counts) for tally in note.tallies.values()}
-    most = 0 if world.noise.silent else unit.rollouts
+    most = unit.rollouts if world.noisy else 0
     for key, found, known in (
             ("world", note.facts.world, world.name), ("seed", note.facts.seed, unit.seed),
             ("variant", note.variant, unit.point.variant), ("first", note.first, unit.first),

@@ -277,9 +277,12 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
         for planner in planners:
             parts = [*variant, *([f"planner={planner}"] if len(planners) > 1 else [])]
             points.append(Point(world=world, planner=planner, variant="; ".join(parts)))
-    if options.fidelity == "kinematic" and any(key.split(".")[0] == "noise" for key in vary):
-        _log.warning("noise is varied to no effect: kinematic trials have none")
+    for key in sorted(_IN_PHYSICS_ALONE & set(vary)) if options.fidelity == "kinematic" else ():
+        _log.warning("%s is varied to no effect: kinematic trials know nothing of it", key)
     return checked(Grid(points=points, seeds=seeds, options=options, unit_trials=unit_trials))
+
+
+_IN_PHYSICS_ALONE = {"noise.payload_kg", "noise.hull_friction"}
 
 
 def _options_of(sweep: Sweep) -> Options:
@@ -326,7 +329,7 @@ def _effective(world: World, options: Options) -> tuple[int, str]:
     """
     robots = [replace(robot, availability=1.0) for robot in world.robots]
     return id(world.obstacles), digest(world.name, world.sites, robots, world.scenarios, world.plan_failure,
-                                       world.execute_failure, world.margin, world.noise,
+                                       world.execute_failure, world.margin, world.noise, world.passages,
                                        reactions_of(world, options))
 
 

@@ -22,10 +22,14 @@ from sva_bench.execution.case import Settings
 from sva_bench.execution.corridor import solids_near, strayed
 from sva_bench.execution.engines.engine import ENGINE_OF, ENGINES, Pose
 from sva_bench.execution.following import downsampled, follow
-from sva_bench.execution.noise import UNDISTURBED, Disturbance, draw_disturbance
-from sva_bench.execution.outcome import Driven
+from sva_bench.execution.noise import NoiseDraw, draw_noise
+from sva_bench.execution.outcome import Driven, Wait
+from sva_bench.execution.screening import checked, wants_physics
+from sva_bench.execution.touch import Touch, solid_at
+from sva_bench.execution.waits import HopWait, waits_on
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
+from sva_bench.robot.disturbance import UNDISTURBED, Disturbance
 from sva_bench.robot.follower import Stretch
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import drive as drive_twin
@@ -33,6 +37,7 @@ from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import Site, World
 
 TRACE_HZ = 20.0
+_BACK_M = 0.3  # from the hull to a passage that a robot waits before
 _CHUNK: Mapping[Fidelity, int] = {"kinematic": 16, "rollout": 8, "physics": 1}
 """Noise draws under which a worker drives a course at a time: a tenth of a second's work; handing it out is small."""
 
@@ -52,11 +57,13 @@ class Drives:
     """What was driven already, of the same world, seed and fidelity; it grows.
 
     Attributes:
-        hops: Hops in physics, by what they depend on.
-        routes: Routes, driven whole or composed.
+        hops: Hops, by what they depend on.
+        whole: Routes as they were driven whole.
+        routes: Routes, driven whole or composed, with what the robot's tank holds and where it has to wait.
     """
 
     hops: dict[HopKey, Driven] = field(default_factory=dict)
+    whole: dict[RouteKey, Driven] = field(default_factory=dict)
     routes: dict[RouteKey, Driven] = field(default_factory=dict)
 
 
@@ -121,58 +128,79 @@ def drive_tasks(tasks: Sequence[DriveTask]) -> tuple[Driven, ...]:
         return tuple(_drive_legs(task, _twin_driver(task), []) for task in tasks)
     course = first.course
     near = solids_near(first.obstacles, course, first.model.radius_m)
-    driven = []
-    for task in tasks:
-        poses: list[Pose] = []
-        result = _in_engine(replace(task, obstacles=near), poses)
-        driven.append(_in_engine(task, []) if strayed(poses, course) else result)
-    return tuple(driven)
+    return tuple(_screened(task, near, course) if first.fidelity == "rollout" else _in_physics(task, near, course)
+                 for task in tasks)
 
 
-HopDriver = Callable[[Hop, list[Pose]], tuple[float, bool, int]]
-"""Drives a hop and adds its poses to a list: driving time [s], whether it arrived, contacts with obstacles."""
+def _in_physics(task: DriveTask, near: Obstacles, course: FloatArray) -> Driven:
+    poses: list[Pose] = []
+    driven = _in_engine(task, near, poses)
+    return _in_engine(task, task.obstacles, []) if strayed(poses, course) else driven
+
+
+def _screened(task: DriveTask, near: Obstacles, course: FloatArray) -> Driven:
+    """Drive by the twin, and in physics where that may make a difference, or to check the twin."""
+    traced = replace(task, traced=True)
+    poses: list[Pose] = []
+    twin = _drive_legs(traced, _twin_driver(traced), poses)
+    if twin.stuck or wants_physics(near, task.model, task.disturbance, np.array(poses).reshape(-1, 3)):
+        return _in_physics(task, near, course)
+    if checked(task.model, task.disturbance, course):
+        return replace(_in_physics(task, near, course), twin_s=float(twin.leg_s.sum()))
+    return twin if task.traced else replace(twin, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
+
+
+HopDriver = Callable[[Hop, list[Pose]], tuple[float, bool]]
+"""Drives a hop and adds its poses to a list: driving time [s], and whether it arrived."""
 
 
 def _twin_driver(task: DriveTask) -> HopDriver:
-    pose = np.array(task.start)
+    pose = task.disturbance.start(task.start)
 
-    def drive(hop: Hop, poses: list[Pose]) -> tuple[float, bool, int]:
-        time_s, trace = drive_twin(task.model, hop, pose, task.disturbance.wheel_gains, traced=task.traced)
+    def drive(hop: Hop, poses: list[Pose]) -> tuple[float, bool]:
+        time_s, trace = drive_twin(task.model, hop, pose, task.disturbance, traced=task.traced)
         poses.extend((x, y, yaw) for x, y, yaw in trace.tolist())
-        return (time_s, True, 0) if np.isfinite(time_s) else (0.0, False, 0)
+        return (time_s, True) if np.isfinite(time_s) else (0.0, False)
 
     return drive
 
 
-def _in_engine(task: DriveTask, poses: list[Pose]) -> Driven:
-    with ENGINES[ENGINE_OF[task.fidelity]](task.obstacles, task.model, task.start, task.disturbance) as engine:
+def _in_engine(task: DriveTask, near: Obstacles, poses: list[Pose]) -> Driven:
+    """Drive in physics among some of the obstacles."""
+    x, y, yaw = task.disturbance.start(task.start).tolist()
+    with ENGINES[ENGINE_OF[task.fidelity]](near, task.model, (x, y, yaw), task.disturbance) as engine:
 
-        def drive(hop: Hop, kept: list[Pose]) -> tuple[float, bool, int]:
-            before = engine.contacts
-            time_s, arrived = follow(engine, task.model, hop, kept)
-            return time_s, arrived, engine.contacts - before
+        def drive(hop: Hop, kept: list[Pose]) -> tuple[float, bool]:
+            return follow(engine, task.model, hop, kept, task.disturbance)
 
-        return _drive_legs(task, drive, poses)
+        driven = _drive_legs(task, drive, poses)
+        until_s = np.cumsum(driven.leg_s)
+        # A touch is looked for at the end of a control step, so one that ends a leg is not later than the leg.
+        legs = np.minimum(np.searchsorted(until_s, [touch.since_s - 1e-9 for touch in engine.touches]),
+                          len(until_s) - 1)
+        return replace(driven, in_physics=1.0, tipped_over=engine.tipped_over, touches=tuple(
+            replace(touch, leg=leg, since_s=touch.since_s - (float(until_s[leg - 1]) if leg else 0.0),
+                    solid=solid_at(task.obstacles, touch.x_m, touch.y_m))
+            for leg, touch in zip(legs.tolist(), engine.touches, strict=True)))
 
 
 def _drive_legs(task: DriveTask, drive: HopDriver, poses: list[Pose]) -> Driven:
     """Drive leg by leg until the end or until the robot is stuck; ``poses`` receives each of them."""
-    times, contacts, at = [], [], []
+    times, at = [], []
     arrived = True
     for leg in task.legs:
-        total, touched, begun = 0.0, 0, len(poses)
+        total, begun = 0.0, len(poses)
         for hop in leg:
-            time_s, arrived, touches = drive(hop, poses)
-            total, touched = total + time_s, touched + touches
+            time_s, arrived = drive(hop, poses)
+            total += time_s
             if not arrived:
                 break
         times.append(total)
-        contacts.append(touched)
         at.append(downsampled(poses[begun:] if task.traced else [], TRACE_HZ))
         if not arrived:
             break
     return Driven(
-        leg_s=np.array(times), stuck=not arrived, contacts=np.array(contacts, dtype=np.int64),
+        leg_s=np.array(times), stuck=not arrived,
         leg_of=np.concatenate([np.empty(0), *(np.full(len(clock), float(leg)) for leg, (clock, _) in enumerate(at))]),
         clock_s=np.concatenate([np.empty(0), *(clock for clock, _ in at)]),
         pose=np.concatenate([np.empty((0, 3)), *(pose for _, pose in at)]))
@@ -188,6 +216,8 @@ class Courses:
         # A worker needs the boxes alone; the twin drives through everything.
         self._solids = _NOWHERE if settings.fidelity == "kinematic" else replace(world.obstacles, cells=None)
         self._hops: dict[tuple[str, str, str], Hop] = {}
+        self._may_wait = bool(world.passages) or world.noise.people is not None
+        self._waited: dict[tuple[str, int, str, str], tuple[HopWait, ...]] = {}
 
     def chunks(self, wanted: Mapping[RouteKey, bool], known: Drives) -> list[Chunk]:
         """What has to be driven for some routes.
@@ -205,10 +235,10 @@ class Courses:
                 groups.setdefault((model, origin, destination, rollout // size), []).append((hop, task))
         else:
             for key, traced in wanted.items():
-                if key not in known.routes:
+                if key not in known.routes and key not in known.whole:
                     robot, route, rollout, trial = key
                     model = self._model(robot)
-                    task = self._task(model, route[0], self._legs(model, route), self._disturbance(key), traced)
+                    task = self._task(model, route[0], self._legs(model, route), self._drawn(key).disturbance, traced)
                     groups.setdefault((robot, route, rollout // size, trial), []).append((key, task))
         return [Chunk(keys=tuple(key for key, _ in group), tasks=tuple(task for _, task in group),
                       what=_what(group[0][0])) for group in groups.values()]
@@ -217,9 +247,11 @@ class Courses:
         """Put routes together from their hops, where they were not driven whole; ``drives`` receives them."""
         for key in wanted:
             if key not in drives.routes:
-                disturbance, model = self._disturbance(key), self._model(key[0])
-                drives.routes[key] = composed([[drives.hops[model, disturbance, a, b] for a, b in leg]
-                                               for leg in self._hops_of(model, key[1])])
+                drawn, model = self._drawn(key), self._model(key[0])
+                driven = drives.whole[key] if key in drives.whole else composed(
+                    [[drives.hops[model, drawn.disturbance, a, b] for a, b in leg]
+                     for leg in self._hops_of(model, key[1])])
+                drives.routes[key] = replace(driven, capacity=drawn.capacity, waits=self._waits(key))
 
     def _lacking(self, wanted: Mapping[RouteKey, bool], known: Drives) -> dict[HopKey, tuple[int, bool]]:
         """Hops that are not driven yet, or not traced: the first rollout that wants each, and whether it is traced."""
@@ -227,7 +259,7 @@ class Courses:
         for key, traced in wanted.items():
             if key in known.routes:
                 continue
-            disturbance, model = self._disturbance(key), self._model(key[0])
+            disturbance, model = self._drawn(key).disturbance, self._model(key[0])
             for leg in self._hops_of(model, key[1]):
                 for origin, destination in leg:
                     hop = model, disturbance, origin, destination
@@ -245,8 +277,23 @@ class Courses:
     def _model(self, robot: str) -> str:
         return self._world.robots[self._numbers[robot]].model.name
 
-    def _disturbance(self, key: RouteKey) -> Disturbance:
-        return draw_disturbance(self._world.noise, self._settings.seed, key[2], self._numbers[key[0]])
+    def _drawn(self, key: RouteKey) -> NoiseDraw:
+        return draw_noise(self._world.noise, self._settings.seed, key[2], self._numbers[key[0]])
+
+    def _waits(self, key: RouteKey) -> tuple[Wait, ...]:
+        """The waits on each leg of a route."""
+        robot, route, rollout, _ = key
+        return tuple(Wait(leg=leg, lasts_s=wait.lasts_s, x_m=wait.x_m, y_m=wait.y_m, cause=wait.cause)
+                     for leg, hops in enumerate(self._hops_of(self._model(robot), route)) for a, b in hops
+                     for wait in self._hop_waits(robot, rollout, a, b)) if self._may_wait else ()
+
+    def _hop_waits(self, robot: str, rollout: int, origin: str, destination: str) -> tuple[HopWait, ...]:
+        key, model = (robot, rollout, origin, destination), self._model(robot)
+        if key not in self._waited:
+            self._waited[key] = waits_on(
+                self._hop(model, origin, destination), (origin, destination), self._world.noise, self._world.passages,
+                self._settings.seed, rollout, self._numbers[robot], self._costs[model].times.model.radius_m + _BACK_M)
+        return self._waited[key]
 
     def _hops_of(self, model: str, route: Route) -> list[list[tuple[str, str]]]:
         """Ends of each hop of each leg."""
@@ -281,23 +328,27 @@ def composed(legs: Sequence[Sequence[Driven]]) -> Driven:
 
     Poses jump at stops by what a robot ends off its site: a centimetre and a hundredth of a radian.
     """
-    times, contacts = [], []
+    times: list[float] = []
+    touches: list[Touch] = []
     leg_of, clock, poses = [np.empty(0)], [np.empty(0)], [np.empty((0, 3))]
-    stuck = False
+    physics_s, tipped_over, stuck = 0.0, False, False
     for number, hops in enumerate(legs):
-        total, touched = 0.0, 0
+        total = 0.0
         for hop in hops:
             leg_of.append(np.full(len(hop.clock_s), float(number)))
             clock.append(total + hop.clock_s)
             poses.append(hop.pose)
-            total, touched, stuck = total + float(hop.leg_s[0]), touched + int(hop.contacts[0]), hop.stuck
+            touches += [replace(touch, leg=number, since_s=total + touch.since_s) for touch in hop.touches]
+            hop_s = float(hop.leg_s[0])
+            total, physics_s, stuck = total + hop_s, physics_s + hop.in_physics * hop_s, hop.stuck
             if stuck:
+                tipped_over = hop.tipped_over
                 break
         times.append(total)
-        contacts.append(touched)
         if stuck:
             break
-    return Driven(leg_s=np.array(times), stuck=stuck, contacts=np.array(contacts, dtype=np.int64),
+    return Driven(leg_s=np.array(times), stuck=stuck, touches=tuple(touches), tipped_over=tipped_over,
+                  in_physics=physics_s / sum(times) if physics_s else 0.0,
                   leg_of=np.concatenate(leg_of), clock_s=np.concatenate(clock), pose=np.concatenate(poses))
 
 
@@ -307,7 +358,7 @@ def receive(drives: Drives, chunk: Chunk, driven: Sequence[Driven]) -> None:
         if isinstance(key[1], Disturbance):
             drives.hops[key] = result
         else:
-            drives.routes[key] = result
+            drives.whole[key] = result
 
 
 def drive_all(

@@ -62,6 +62,7 @@ class Executed:
         pois_reached, stops_reached: How far it got.
         end: Index into ``ENDS``.
         end_time_s, fuel_used_s: When it ended, and on how much.
+        waited_s: How long it waited beside its stops [s].
         contacts: How many times its hull came to touch an obstacle.
         planned_incentive: What each robot's route holds, shape (robots,).
         drawn_value: What its value had been under the failures drawn alone, with each leg driven as planned.
@@ -84,6 +85,7 @@ class Executed:
     end: IntArray
     end_time_s: FloatArray
     fuel_used_s: FloatArray
+    waited_s: FloatArray
     contacts: IntArray
     planned_incentive: FloatArray
     drawn_value: FloatArray
@@ -92,11 +94,6 @@ class Executed:
     margins: tuple[Margins, ...]
     legs: tuple[LegTime, ...]
     traces: tuple[Trace, ...]
-
-    @property
-    def waited_s(self) -> FloatArray:
-        """How long each robot waited beside its stops [s]: nobody does."""
-        return np.zeros(self.incentive.shape)
 
 
 def execute(
@@ -283,7 +280,7 @@ def _settle_all(
         margins=margins_of_team(orders, drives),
         available=figures["available"].astype(np.bool_), lost=figures["lost"].astype(np.bool_),
         incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],
-        fuel_used_s=figures["fuel_used_s"],
+        fuel_used_s=figures["fuel_used_s"], waited_s=figures["waited_s"],
         **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
         legs=tuple(_leg_times(world, costs, mine)) if settings.recorded else (), traces=tuple(traces))
 
@@ -311,10 +308,11 @@ def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[Rou
     rows = []
     for (robot, route, rollout, _), (trial, driven) in drives.items():
         fuel = costs[models[robot]]
-        for leg, (driven_s, (origin, destination)) in enumerate(
-                zip(driven.leg_s.tolist(), pairwise(route), strict=False)):  # a stuck robot drives fewer
+        for leg, (driven_s, waited_s, (origin, destination)) in enumerate(
+                zip(driven.leg_s.tolist(), driven.waited_s.tolist(), pairwise(route), strict=False)):
+            # a stuck robot drives fewer
             planned_ms = fuel.repaired_ms[fuel.times.sites.index(origin), fuel.times.sites.index(destination)]
             rows.append(LegTime(
                 trial=trial, rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
-                planned_s=int(planned_ms) / 1000, driven_s=driven_s))
+                planned_s=int(planned_ms) / 1000, driven_s=driven_s, waited_s=waited_s))
     return rows

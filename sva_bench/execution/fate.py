@@ -9,7 +9,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.execution.case import Settings
-from sva_bench.execution.noise import Disturbance, draw_disturbance
+from sva_bench.execution.noise import NoiseDraw, draw_noise
 from sva_bench.execution.outcome import RobotFate
 from sva_bench.mission.failures import NEVER, FailureDraw, Failures, process_of
 from sva_bench.world.model import Scenario, World
@@ -24,13 +24,13 @@ class Fate:
             ``NEVER``: it doesn't fail so, or not within its route.
         lifetime_s: Driving time after which each robot fails [s], shape (trials, robots); ``inf`` = never.
         rollout: Noise draw of each trial, shape (trials,).
-        disturbances: How each robot differs from its model, by noise draw and the robot's position in its team.
+        noise: What differs about each robot, by noise draw and the robot's position in its team.
     """
 
     fails: IntArray
     lifetime_s: FloatArray
     rollout: IntArray
-    disturbances: Mapping[tuple[int, int], Disturbance]
+    noise: Mapping[tuple[int, int], NoiseDraw]
 
     def __post_init__(self) -> None:
         trials = len(self.rollout)
@@ -56,8 +56,8 @@ def draw_fate(world: World, scenario: Scenario, pois: Sequence[int], settings: S
     failures = _failures(world, scenario, np.array(pois, dtype=np.int64), settings)
     return Fate(
         fails=failures.before_poi, lifetime_s=failures.lifetime_s, rollout=rollout,
-        disturbances={(k, robot): draw_disturbance(world.noise, settings.seed, k, robot)
-                      for k in np.unique(rollout).tolist() for robot in range(len(world.robots))})
+        noise={(k, robot): draw_noise(world.noise, settings.seed, k, robot)
+               for k in np.unique(rollout).tolist() for robot in range(len(world.robots))})
 
 
 def _failures(world: World, scenario: Scenario, pois: IntArray, settings: Settings) -> Failures:

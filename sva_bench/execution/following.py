@@ -9,30 +9,34 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Engine, Pose
+from sva_bench.robot.disturbance import UNDISTURBED, Disturbance, error_at
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
 from sva_bench.robot.model import RobotModel
-from sva_bench.robot.twin import patience_steps
+from sva_bench.robot.twin import delayed, patience_steps
 
 _STUCK_CHECK_S = 10.0  # a robot that hardly moves or turns for so long is stuck
 _STUCK_M, _STUCK_RAD = 0.02, 0.05
 _STUCK_DRIVING = 0.5  # share of the time between two checks spent on the way from which on only progress counts
 
 
-def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: list[Pose] | None = None
-           ) -> tuple[float, bool]:
-    """Drive the stretches of one hop.
+def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: list[Pose] | None = None,
+           disturbance: Disturbance = UNDISTURBED) -> tuple[float, bool]:
+    """Drive the stretches of one hop; it begins and ends at rest, with no command on its way.
 
     Args:
         engine: The robot in its world.
         model: Its figures, which the follower goes by.
         hop: The stretches.
         poses: Receives the pose after each control step; ``None`` keeps none.
+        disturbance: Where the robot believes to be, and how late its commands are obeyed; the rest is the engine's.
 
     Returns:
         Driving time [s], and whether the robot arrived; False if it got stuck.
     """
     limits, dt, half = model.limits, 1.0 / CONTROL_HZ, 0.5 * model.track_m
     check = round(_STUCK_CHECK_S * CONTROL_HZ)
+    waves, queue = disturbance.waves, np.zeros((disturbance.delay_steps, 2))
+    lost, late = len(waves) > 0, len(queue) > 0
     where, step = engine.pose, engine.step
     total = 0
     pose = where()
@@ -41,16 +45,23 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
         state, since_yaw, since_s, driving = new_state(), pose[2], 0.0, 0
         for number in range(1, patience_steps(stretch, model) + 1):
             x, y, yaw = pose
+            if lost:
+                ex, ey, eyaw = error_at(waves, x, y)
+                x, y, yaw = x + ex, y + ey, yaw + eyaw
             speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
             phase = state[0]
             if phase == ARRIVED:
                 break
+            if late:
+                speed, rate = delayed(queue, speed, rate)
             step(speed - half * rate, speed + half * rate)
             total += 1
             driving += phase == DRIVE
             pose = where()
             if poses is not None:
                 poses.append(pose)
+            if engine.tipped_over:
+                return total * dt, False
             if number % check == 0:
                 progress_m, turned_rad = float(state[1]) - since_s, math.remainder(yaw - since_yaw, 2 * math.pi)
                 if is_stuck(progress_m, turned_rad, phase == DRIVE and driving >= _STUCK_DRIVING * check):
@@ -58,7 +69,12 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
                 since_yaw, since_s, driving = yaw, float(state[1]), 0
         else:
             return total * dt, False
-    return total * dt, True
+    for _ in range(len(queue)):  # what is still on its way
+        speed, rate = delayed(queue, 0.0, 0.0)
+        step(speed - half * rate, speed + half * rate)
+        if poses is not None:
+            poses.append(where())
+    return (total + len(queue)) * dt, True
 
 
 def is_stuck(progress_m: float, turned_rad: float, on_the_way: bool) -> bool:

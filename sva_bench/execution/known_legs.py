@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from sva_bench.execution.case import Settings
 from sva_bench.execution.drives import Drives, RouteKey
-from sva_bench.execution.rules import LegDriven
+from sva_bench.execution.rules import LegDriven, legs_of
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
@@ -80,10 +80,8 @@ class KnownLegs:
         for key in keys:
             name, stops, rollout, _ = key
             robot, driven = self._names.index(name), drives.routes[key]
-            last = len(driven.leg_s) - 1
-            for leg, (time_s, contacts) in enumerate(zip(driven.leg_s.tolist(), driven.contacts.tolist(), strict=True)):
-                self._driven[robot, rollout, stops[: leg + 2]] = LegDriven(
-                    time_s, driven.stuck and leg == last, contacts)
+            for leg, known in enumerate(legs_of(driven)):
+                self._driven[robot, rollout, stops[: leg + 2]] = known
 
 
 def longest(missing: Mapping[RouteKey, bool]) -> dict[RouteKey, bool]:

@@ -26,7 +26,8 @@ class Margins:
         planned_s: Driving time of the leg to each stop as planned [s], without margin, shape (stops,); of none where
             unknown.
         leg_s: Driving time of the leg to each stop [s], shape (draws, stops); NaN from a leg on that it got stuck on.
-        fuel_s: Fuel left on arrival [s of driving], shape (draws, stops); negative: it ran dry on the way.
+        fuel_s: Fuel left on arrival, or after the stop where standing burns fuel [s of driving], shape (draws, stops);
+            negative: it ran dry before.
         time_s: What was left of the mission limit when the stop was over [s], shape (draws, stops).
     """
 
@@ -68,15 +69,21 @@ def margins_of(robot: int, orders: Assignment, drives: Sequence[Driven]) -> Marg
     """
     stops = orders.route[1:]
     leg = np.full((len(drives), len(stops)), np.nan)
+    waited = np.zeros_like(leg)
+    capacity_s = np.array([orders.fuel_capacity_s * driven.capacity for driven in drives])
     for row, driven in enumerate(drives):
         done = len(driven.leg_s) - driven.stuck
-        leg[row, :done] = driven.leg_s[:done]
+        leg[row, :done], waited[row, :done] = driven.leg_s[:done], driven.waited_s[:done]
     fuel, time = np.empty_like(leg), np.empty_like(leg)
     burnt, clock = np.zeros(len(drives)), np.zeros(len(drives))
     for column, (_, site) in enumerate(pairwise(orders.route)):
-        burnt = burnt + leg[:, column]
-        clock = clock + leg[:, column] + orders.stop_s[site]
-        fuel[:, column] = orders.fuel_capacity_s - burnt
+        burnt = burnt + leg[:, column] + orders.idle_share * waited[:, column]
+        clock = clock + leg[:, column] + waited[:, column] + orders.stop_s[site]
+        if site in orders.stations:
+            clock = clock + burnt / orders.charge_rate.get(site, np.inf)
+        elif column < len(stops) - 1:
+            burnt = burnt + orders.idle_share * orders.stop_s[site]
+        fuel[:, column] = capacity_s - burnt
         time[:, column] = orders.mission_limit_s - clock
         if site in orders.stations:
             burnt = np.zeros(len(drives))

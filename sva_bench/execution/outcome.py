@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
+from sva_bench.arrays import FloatArray, IntArray, frozen
 from sva_bench.choices import End, EventKind
+from sva_bench.execution.touch import Touch
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wait:
+    """A wait on the way.
+
+    Attributes:
+        leg: The leg of the route.
+        lasts_s: How long [s].
+        x_m, y_m: Where the robot has to stop [m].
+        cause: Name of the passage that was shut, or ``people``.
+    """
+
+    leg: int
+    lasts_s: float
+    x_m: float
+    y_m: float
+    cause: str
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,7 +45,12 @@ class Driven:
         leg_of: Leg that each pose belongs to, shape (poses,); empty unless traced.
         clock_s: Driving time at each pose since its leg began [s], shape (poses,).
         pose: x, y [m], yaw [rad] over time, shape (poses, 3).
-        contacts: How many times the hull came to touch an obstacle on each leg, shape (legs,); none unless given.
+        touches: Each time that the hull came to touch an obstacle.
+        waits: Each time that it waits on its way; they are no part of ``leg_s``.
+        capacity: Factor on what the robot's tank holds.
+        in_physics: Share of its driving time that was driven in physics.
+        twin_s: Driving time by the twin [s], where physics drove to check it; else ``None``.
+        tipped_over: Whether it got stuck because it fell on its side.
     """
 
     leg_s: FloatArray
@@ -34,17 +58,33 @@ class Driven:
     leg_of: FloatArray
     clock_s: FloatArray
     pose: FloatArray
-    contacts: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    touches: tuple[Touch, ...] = ()
+    waits: tuple[Wait, ...] = ()
+    capacity: float = 1.0
+    in_physics: float = 0.0
+    twin_s: float | None = None
+    tipped_over: bool = False
 
     def __post_init__(self) -> None:
         n = len(self.clock_s)
-        if not len(self.contacts):
-            object.__setattr__(self, "contacts", np.zeros(len(self.leg_s), dtype=np.int64))
-        object.__setattr__(self, "contacts", frozen_int(self.contacts, (len(self.leg_s),)))
         object.__setattr__(self, "leg_s", frozen(self.leg_s, (None,)))
         object.__setattr__(self, "leg_of", frozen(self.leg_of, (n,)))
         object.__setattr__(self, "clock_s", frozen(self.clock_s, (n,)))
         object.__setattr__(self, "pose", frozen(self.pose, (n, 3)))
+
+    @property
+    def contacts(self) -> IntArray:
+        """How many times the hull came to touch an obstacle on each leg, shape (legs,)."""
+        return np.bincount(np.array([touch.leg for touch in self.touches], dtype=np.int64), minlength=len(self.leg_s))
+
+    @property
+    def waited_s(self) -> FloatArray:
+        """How long it waits on each leg [s], shape (legs,); not on legs that it doesn't begin."""
+        waited = np.zeros(len(self.leg_s))
+        for wait in self.waits:
+            if wait.leg < len(waited):
+                waited[wait.leg] += wait.lasts_s
+        return waited
 
 
 class RobotFate(NamedTuple):
@@ -73,6 +113,8 @@ class Assignment:
         mission_limit_s: Longest mission that still earns [s].
         loss_cost: Cost if it doesn't come home [incentive].
         planned_s: Driving time of each leg as planned [s], without margin, length (legs,); nothing where unknown.
+        idle_share: Share of the fuel of driving that it burns while it stands.
+        charge_rate: Seconds of driving gained per second at a station, of those where it takes its time.
     """
 
     robot: str
@@ -84,6 +126,8 @@ class Assignment:
     mission_limit_s: float
     loss_cost: float = 0.0
     planned_s: tuple[float, ...] = ()
+    idle_share: float = 0.0
+    charge_rate: Mapping[str, float] = field(default_factory=dict)
 
     def is_poi(self, site: str) -> bool:
         """Whether a site of the route is a POI."""
@@ -114,6 +158,8 @@ class Outcome:
         end: How it ended.
         end_time_s: When [s on the mission clock].
         fuel_used_s: Fuel of the whole mission [s of driving].
+        driven_s: How long it drove [s].
+        waited_s: How long it waited beside its stops [s].
         contacts: How many times its hull came to touch an obstacle; on a leg that it ran dry or failed on, all of it.
         events: What happened, in order.
     """
@@ -127,6 +173,8 @@ class Outcome:
     end: End
     end_time_s: float
     fuel_used_s: float
+    driven_s: float
+    waited_s: float
     contacts: int
     events: tuple[Event, ...]
 
@@ -174,21 +222,26 @@ def trace_of(
         start_s: When it leaves the base [s].
     """
     times, poses, fuels = [np.zeros(1)], [np.array([start])], [np.array([orders.fuel_capacity_s])]
-    clock, tank = start_s, orders.fuel_capacity_s
+    clock, tank, burnt = start_s, orders.fuel_capacity_s, 0.0
     if start_s > 0:
         times, poses, fuels = [np.array([0.0, start_s])], [np.array([start] * 2)], [np.full(2, tank)]
     for leg, leg_s in enumerate(driven.leg_s.tolist()):
-        mine = driven.leg_of == leg
-        times.append(clock + driven.clock_s[mine])
-        poses.append(driven.pose[mine])
-        fuels.append(tank - driven.clock_s[mine])
+        mine, waits = driven.leg_of == leg, [wait for wait in driven.waits if wait.leg == leg]
+        driven_s, waited_s, pose = _paused(driven.clock_s[mine], driven.pose[mine], waits)
+        times.append(clock + driven_s + waited_s)
+        poses.append(pose)
+        fuels.append(tank - (driven_s + orders.idle_share * waited_s) / driven.capacity)
+        all_waited_s = sum(wait.lasts_s for wait in waits)
         site = orders.route[leg + 1]
-        clock, tank = clock + leg_s, tank - leg_s
-        wait = orders.stop_s[site]
+        clock, burnt = clock + leg_s + all_waited_s, burnt + leg_s + orders.idle_share * all_waited_s
+        stop_s = orders.stop_s[site]
         if site in orders.stations:
-            tank = orders.fuel_capacity_s
-        if wait > 0 and len(poses[-1]):
-            clock += wait
+            stop_s, burnt = stop_s + burnt / orders.charge_rate.get(site, math.inf), 0.0
+        else:
+            burnt += orders.idle_share * stop_s
+        tank = orders.fuel_capacity_s - burnt / driven.capacity
+        if stop_s > 0 and len(poses[-1]):
+            clock += stop_s
             times.append(np.array([clock]))
             poses.append(poses[-1][-1:])
             fuels.append(np.array([tank]))
@@ -199,3 +252,18 @@ def trace_of(
         time, pose = np.append(time, outcome.end_time_s), np.append(pose, pose[-1:], axis=0)
         fuel = np.append(fuel, 0.0 if outcome.end == "out_of_fuel" else fuel[-1])
     return Trace(orders=orders, outcome=outcome, time_s=time, pose=pose, fuel_s=fuel, planned=planned)
+
+
+def _paused(clock_s: FloatArray, pose: FloatArray, waits: Sequence[Wait]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A leg over time with its waits, each where the robot comes nearest to the place of it.
+
+    Returns:
+        Time driven, time waited, and pose at each moment.
+    """
+    waited_s = np.zeros(len(clock_s))
+    for wait in waits if len(clock_s) else ():
+        at = int(np.hypot(pose[:, 0] - wait.x_m, pose[:, 1] - wait.y_m).argmin()) + 1
+        clock_s, pose = np.insert(clock_s, at, clock_s[at - 1]), np.insert(pose, at, pose[at - 1], axis=0)
+        waited_s = np.insert(waited_s, at, waited_s[at - 1])
+        waited_s[at:] += wait.lasts_s
+    return clock_s, waited_s, pose

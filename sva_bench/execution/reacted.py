@@ -26,8 +26,8 @@ class Reacted:
         rollout: Its noise draw, shape (rows,).
         history: Number of its history under that noise draw, -1 where they are sampled, shape (rows,).
         weight: Its probability; the rows' add up to 1, shape (rows,).
-        available, incentive, lost, value, pois_reached, stops_reached, end, end_time_s, fuel_used_s, contacts: As of
-            ``Executed``.
+        available, incentive, lost, value, pois_reached, stops_reached, end, end_time_s, fuel_used_s, waited_s,
+            contacts: As of ``Executed``.
         left_over: Incentive of the POIs that a robot was still to visit when it ended, and nobody else collected.
         reacted: Whether orders changed, shape (rows,).
         doubled: POIs that two robots visited, shape (rows,).
@@ -56,6 +56,7 @@ class Reacted:
     end: IntArray
     end_time_s: FloatArray
     fuel_used_s: FloatArray
+    waited_s: FloatArray
     contacts: IntArray
     left_over: FloatArray
     reacted: BoolArray
@@ -79,8 +80,3 @@ class Reacted:
             field.name: value[number:number + 1] for field in fields(self)
             if isinstance(value := getattr(self, field.name), np.ndarray) and value.ndim}
         return replace(self, **alone, played=self.played[number:number + 1], legs=(), whole=None, shown=None)
-
-    @property
-    def waited_s(self) -> FloatArray:
-        """How long each robot waited beside its stops [s]: nobody does."""
-        return np.zeros(self.incentive.shape)

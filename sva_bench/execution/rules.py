@@ -6,6 +6,7 @@ Nothing here knows an engine: what a leg takes is given.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from sva_bench.choices import End, EventKind
@@ -21,11 +22,15 @@ class LegDriven(NamedTuple):
         time_s: Driving time [s]; until it gave up, if it got stuck.
         stuck: Whether the robot got stuck on it.
         contacts: How many times the hull came to touch an obstacle.
+        waited_s: How long it waited on the way [s]: mission clock, but no driving.
+        capacity: Factor on what the robot's tank holds.
     """
 
     time_s: float
     stuck: bool = False
     contacts: int = 0
+    waited_s: float = 0.0
+    capacity: float = 1.0
 
 
 _SURE = RobotFate()
@@ -41,15 +46,16 @@ class RobotMission:
         site: Where it stands, or where it was going when it ended.
         clock_s: Mission clock [s]; at a stop, when the stop is over.
         arrived_s: When it reached its last stop [s].
+        driven_s: How long it has driven [s].
         fuel_s: Fuel burnt [s of driving].
-        tank_s: Fuel left in the tank [s of driving].
+        tank_s: Fuel left in the tank [s of driving, of a tank that holds what it should].
         end: How it ended; ``None`` as long as it goes on.
     """
 
     def __init__(self, orders: Assignment, fate: RobotFate = _SURE, *, start_s: float = 0.0) -> None:
         self.orders, self.fate = orders, fate
         self.clock_s = self.arrived_s = start_s
-        self.fuel_s = self.incentive = 0.0
+        self.driven_s = self.fuel_s = self.waited_s = self.incentive = self._filled_at_s = 0.0
         self.tank_s = orders.fuel_capacity_s
         self.pois = self.stops = self.contacts = 0
         self.end: End | None = None
@@ -87,40 +93,75 @@ class RobotMission:
             return None
         return self.ahead[0]
 
-    def drive(self, leg: LegDriven) -> None:
-        """Drive the leg to the next stop and serve the stop; fuel burns while driving, and only then.
+    def lasts(self, leg: LegDriven) -> float:
+        """How long it can drive on a leg before it runs dry [s], at most the leg's driving time.
 
-        A robot whose lifetime ends before it would arrive, run dry or get stuck fails there and then.
+        What it waits on a leg it waits first: where that is decides only about what a leg cut short had of it.
+        """
+        left_s = max(self.tank_s * leg.capacity - self.orders.idle_share * leg.waited_s, 0.0)
+        return min(leg.time_s, left_s) if leg.time_s > left_s + TOLERANCE_S else leg.time_s
+
+    def drive(self, leg: LegDriven) -> None:
+        """Drive the leg to the next stop and serve the stop.
+
+        Fuel burns while driving, and at the idle share of that while waiting. A robot whose lifetime ends before it
+        would arrive, run dry or get stuck fails there and then.
         """
         to = self.ahead[0]
-        runs_dry = leg.time_s > self.tank_s + TOLERANCE_S
-        burnt = min(leg.time_s, max(self.tank_s, 0.0)) if runs_dry else leg.time_s
+        driven_s = self.lasts(leg)
         self.contacts += leg.contacts
-        if self.fuel_s + burnt > self.fate.lifetime_s:
-            left = self.fate.lifetime_s - self.fuel_s
-            self.clock_s, self.fuel_s, self.tank_s = self.clock_s + left, self.fate.lifetime_s, self.tank_s - left
+        if not self._idles(leg.waited_s, leg.capacity):
+            self._ends("out_of_fuel", to, lost=True)
+            return
+        self.waited_s += leg.waited_s
+        if self.driven_s + driven_s > self.fate.lifetime_s:
+            self._rolls(self.fate.lifetime_s - self.driven_s, leg.capacity)
+            self.driven_s = self.fate.lifetime_s
             self._ends("failed", to, lost=True)
             return
-        self.clock_s, self.fuel_s, self.tank_s = self.clock_s + burnt, self.fuel_s + burnt, self.tank_s - burnt
-        if burnt < leg.time_s:
+        self._rolls(driven_s, leg.capacity)
+        if driven_s < leg.time_s:
             self._ends("out_of_fuel", to, lost=True)
         elif leg.stuck:
             self._ends("stuck", to, lost=True)
         else:
-            self._arrive(to)
+            self._arrive(to, leg.capacity)
 
-    def _arrive(self, site: str) -> None:
+    def _rolls(self, time_s: float, capacity: float) -> None:
+        """Drive for so long."""
+        self.clock_s, self.driven_s = self.clock_s + time_s, self.driven_s + time_s
+        self.fuel_s, self.tank_s = self.fuel_s + time_s, self.tank_s - time_s / capacity
+
+    def _idles(self, time_s: float, capacity: float) -> bool:
+        """Stand for so long; whether the fuel lasts, else until it is burnt."""
+        burnt_s = self.orders.idle_share * time_s
+        left_s = max(self.tank_s, 0.0) * capacity
+        if lasts := burnt_s <= left_s + TOLERANCE_S:
+            self.tank_s -= burnt_s / capacity
+        else:
+            time_s, burnt_s, self.tank_s = left_s / self.orders.idle_share, left_s, 0.0
+        self.clock_s, self.fuel_s = self.clock_s + time_s, self.fuel_s + burnt_s
+        return lasts
+
+    def _arrive(self, site: str, capacity: float) -> None:
         """Reach a stop, spend its time, and then refuel, collect, or be home."""
         self.site, self.ahead = site, self.ahead[1:]
         self.stops, self.arrived_s = self.stops + 1, self.clock_s
         self._tell("arrived", site)
-        self.clock_s += self.orders.stop_s[site]
+        if site in self.orders.stations:
+            rate = self.orders.charge_rate.get(site, math.inf)
+            self.clock_s += self.orders.stop_s[site] + (self.fuel_s - self._filled_at_s) / rate
+        elif not self.ahead:
+            self.clock_s += self.orders.stop_s[site]
+        elif not self._idles(self.orders.stop_s[site], capacity):
+            self._ends("out_of_fuel", site, lost=True)
+            return
         # Only what is over within the mission limit counts; a late robot drives on and earns nothing more.
         if self.clock_s > self.orders.mission_limit_s + TOLERANCE_S and not self._late:
             self._late = True
             self._tell("late", site)
         if site in self.orders.stations:
-            self.tank_s = self.orders.fuel_capacity_s
+            self.tank_s, self._filled_at_s = self.orders.fuel_capacity_s, self.fuel_s
             self._tell("refuelled", site)
         elif self.orders.is_poi(site):
             self._collect(site)
@@ -153,7 +194,16 @@ class RobotMission:
             available=self.fate.before_poi == NEVER and self.end != "failed", incentive=self.incentive,
             lost=self._lost, value=self.incentive - self.orders.loss_cost if self._lost else self.incentive,
             pois_reached=self.pois, stops_reached=self.stops, end=self.end, end_time_s=self.clock_s,
-            fuel_used_s=self.fuel_s, contacts=self.contacts, events=tuple(self._events))
+            fuel_used_s=self.fuel_s, driven_s=self.driven_s,
+            waited_s=self.waited_s, contacts=self.contacts, events=tuple(self._events))
+
+
+def legs_of(driven: Driven) -> list[LegDriven]:
+    """The legs of a drive, one after the other."""
+    last = len(driven.leg_s) - 1
+    return [LegDriven(time_s, driven.stuck and leg == last, contacts, waited_s, driven.capacity)
+            for leg, (time_s, contacts, waited_s) in enumerate(zip(
+                driven.leg_s.tolist(), driven.contacts.tolist(), driven.waited_s.tolist(), strict=True))]
 
 
 def settle(orders: Assignment, driven: Driven, fate: RobotFate = _SURE) -> Outcome:
@@ -165,9 +215,7 @@ def settle(orders: Assignment, driven: Driven, fate: RobotFate = _SURE) -> Outco
         fate: When it fails.
     """
     mission = RobotMission(orders, fate)
-    times, contacts, last = driven.leg_s.tolist(), driven.contacts.tolist(), len(driven.leg_s) - 1
-    leg = 0
+    legs = iter(legs_of(driven))
     while mission.depart() is not None:
-        mission.drive(LegDriven(times[leg], driven.stuck and leg == last, contacts[leg]))
-        leg += 1
+        mission.drive(next(legs))
     return mission.outcome()

@@ -13,7 +13,7 @@ from sva_bench.execution.rules import settle
 from sva_bench.mission.failures import NEVER
 
 FIGURES = ("available", "incentive", "lost", "value", "pois_reached", "stops_reached", "end_time_s", "fuel_used_s",
-           "contacts")
+           "driven_s", "waited_s", "contacts")
 
 
 def settle_alike(orders: Assignment, driven: Driven, before_poi: int, lifetime_s: FloatArray) -> dict[str, FloatArray]:
@@ -33,17 +33,18 @@ def settle_alike(orders: Assignment, driven: Driven, before_poi: int, lifetime_s
     """
     whole = settle(orders, driven, RobotFate(before_poi))
     # Driven time on arrival at each stop, and where the mission ends if no lifetime does before.
-    until_s = np.append(np.cumsum(driven.leg_s[: whole.stops_reached]), whole.fuel_used_s)
+    until_s = np.append(np.cumsum(driven.leg_s[: whole.stops_reached]), whole.driven_s)
     fails_on = np.searchsorted(until_s, lifetime_s, side="right")
-    legs, kind = np.unique(np.where(lifetime_s >= whole.fuel_used_s, len(until_s), fails_on), return_inverse=True)
+    legs, kind = np.unique(np.where(lifetime_s >= whole.driven_s, len(until_s), fails_on), return_inverse=True)
     # A robot whose lifetime is over on arrival fails as it sets off again.
     kinds = [whole if leg == len(until_s) else settle(orders, driven, RobotFate(
         before_poi, float(until_s[leg - 1]) if leg else 0.0)) for leg in legs.tolist()]
     figures = {name: values[kind] for name, values in figures_of(kinds).items()}
-    on_the_way = lifetime_s < whole.fuel_used_s
-    driven_s = np.where(on_the_way, lifetime_s, figures["fuel_used_s"])
-    figures["end_time_s"] = figures["end_time_s"] + (driven_s - figures["fuel_used_s"])
-    return {**figures, "fuel_used_s": driven_s}
+    driven_s = np.where(lifetime_s < whole.driven_s, lifetime_s, figures["driven_s"])
+    further_s = driven_s - figures["driven_s"]  # than its like, on the same leg
+    figures["end_time_s"] = figures["end_time_s"] + further_s
+    figures["fuel_used_s"] = figures["fuel_used_s"] + further_s
+    return {**figures, "driven_s": driven_s}
 
 
 def figures_of(outcomes: Sequence[Outcome]) -> dict[str, FloatArray]:

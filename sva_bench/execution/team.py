@@ -49,7 +49,7 @@ class _Leg:
 
     Attributes:
         to: Its end.
-        departed_s: When it left [s].
+        departed_s: When it left and began to drive, its waits on the way being over [s].
         due_s: When it is expected there [s].
         ready_s, burnt_s: When it is expected to leave again, and what it will have burnt by then, by schedule [s].
         arrived_s: When it gets there [s]; ``inf`` if it never does.
@@ -155,8 +155,12 @@ class _Play:
         """A leg as it is expected to be."""
         scheduled_s = self._team.scheduled_s(robot.number, robot.stops[-1], to)
         orders, due_s = self._team.orders[robot.number], robot.ready_s + scheduled_s
-        return _Leg(to=to, departed_s=now, due_s=due_s, ready_s=due_s + orders.stop_s[to],
-                    burnt_s=0.0 if to in orders.stations else robot.burnt_s + scheduled_s)
+        burnt_s, stop_s = robot.burnt_s + scheduled_s, orders.stop_s[to]
+        if to in orders.stations:
+            return _Leg(to=to, departed_s=now, due_s=due_s, burnt_s=0.0,
+                        ready_s=due_s + stop_s + burnt_s / orders.charge_rate.get(to, math.inf))
+        return _Leg(to=to, departed_s=now, due_s=due_s, ready_s=due_s + stop_s,
+                    burnt_s=burnt_s + orders.idle_share * stop_s)
 
     def _leave(self, now: float, robot: _Robot) -> None:
         """A robot's stop is over: it may learn of failures there, and goes on."""
@@ -179,8 +183,8 @@ class _Play:
             return
         robot.stops.append(to)
         driven = self._legs(robot.number, tuple(robot.stops))
-        driving_s = min(driven.time_s, mission.tank_s)
-        window = self._chance.drives(robot.number, mission.fuel_s, mission.fuel_s + driving_s)
+        leg.departed_s = now + driven.waited_s
+        window = self._chance.drives(robot.number, mission.driven_s, mission.driven_s + mission.lasts(driven))
         if window is None:
             self._drive(robot, driven)
         elif window.since_s == window.until_s:
@@ -247,7 +251,7 @@ class _Play:
             if robot is leaving or leg is None or leg.window is None or robot.mission is None:
                 continue
             if news == "instant" or (now >= leg.due_s and (news == "report" or at_station)):
-                by_now = robot.mission.fuel_s + now - leg.departed_s
+                by_now = robot.mission.driven_s + max(now - leg.departed_s, 0.0)
                 found = self._chance.failed_by(robot.number, leg.window, by_now)
                 if found is None:
                     leg.window = Window(max(leg.window.since_s, by_now), leg.window.until_s)

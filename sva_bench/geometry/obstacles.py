@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,17 +20,21 @@ class Obstacles:
         boxes: Centre x, y, half length, half width [m], yaw [rad]; shape (k, 5). Walls are boxes too.
         cylinders: Centre x, y, radius [m]; shape (c, 3).
         cells: The occupancy grid that ``boxes`` cover exactly; ``None`` for obstacles given as shapes.
+        floors: Patches of floor that are no obstacles but grip less: as ``boxes``, then the friction; shape (f, 6).
+            Where they overlap the last counts.
     """
 
     bounds_m: FloatArray
     boxes: FloatArray
     cylinders: FloatArray
     cells: Cells | None = None
+    floors: FloatArray = field(default_factory=lambda: np.empty((0, 6)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bounds_m", frozen(self.bounds_m, (4,)))
         object.__setattr__(self, "boxes", frozen(self.boxes, (None, 5)))
         object.__setattr__(self, "cylinders", frozen(self.cylinders, (None, 3)))
+        object.__setattr__(self, "floors", frozen(self.floors, (None, 6)))
 
     def key(self) -> tuple[int, ...]:
         """Key of random streams for these obstacles; other obstacles have other streams."""

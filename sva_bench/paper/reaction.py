@@ -49,7 +49,7 @@ def reaction(
     rows = []
     for world in map(_with_availabilities, worlds):
         costs = plan_costs(world, "prmstar", progress)
-        own = replace(settings, rollouts=1 if world.noise.silent else settings.rollouts, recorded=False)
+        own = replace(settings, rollouts=settings.rollouts if world.noisy else 1, recorded=False)
         options = Options(policies=("resolve",), anticipate=True,
                           news=tuple(news for news in NEWS if world.stations or news != "station"))
         drives = Drives()

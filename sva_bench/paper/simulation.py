@@ -66,7 +66,7 @@ def simulation(
         costs = plan_costs(world, "prmstar", progress)
         planned = plan_scenarios(replace(world, plan_failure="mission", execute_failure="mission"), costs, Options(),
                                  progress)
-        own = replace(settings, rollouts=1 if world.noise.silent else settings.rollouts)
+        own = replace(settings, rollouts=settings.rollouts if world.noisy else 1)
         cases = [case for scenario in world.scenarios for case in two_cases(scenario, planned[scenario.name])]
         drives = Drives()
         found: dict[str, dict[FailureProcess, Simulated]] = {s.name: {} for s in world.scenarios}
@@ -74,7 +74,7 @@ def simulation(
             runs = iter(execute(replace(world, execute_failure=process), costs, cases, own, executor,
                                 lambda done, of: progress("driving routes", done, of), drives))
             for scenario in world.scenarios:
-                found[scenario.name][process] = _simulated(next(runs), next(runs), noisy=not world.noise.silent)
+                found[scenario.name][process] = _simulated(next(runs), next(runs), noisy=world.noisy)
         rows += [SimulatedScenario(world=world.name, scenario=name, under=under) for name, under in found.items()]
     return rows
 

@@ -1,4 +1,4 @@
-"""Kinematic twin: the path follower driving an ideal unicycle. Predicts the time of a leg without physics."""
+"""Kinematic twin: the path follower driving a unicycle, ideal or disturbed. The time of a leg without physics."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray
+from sva_bench.robot.disturbance import NO_WAVES, UNDISTURBED, Disturbance, error_at
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, Stretch, control, horizon_m, new_state
 from sva_bench.robot.model import RobotModel
 
@@ -45,55 +46,106 @@ def advance(pose: FloatArray, left: float, right: float, track: float, dt: float
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _drive(
     path: FloatArray, arc: FloatArray, heading: float, limits: FloatArray, state: FloatArray, pose: FloatArray,
-    gain_left: float, gain_right: float, track: float, dt: float, first: int, steps: int, until: float,
-    trace: FloatArray,
+    gain_left: float, gain_right: float, track: float, track_gain: float, waves: FloatArray, queue: FloatArray,
+    dt: float, first: int, steps: int, until: float, trace: FloatArray,
 ) -> int:
     """Drive one stretch from step ``first`` to arrival, step ``steps`` or beyond arc length ``until``; the last step.
 
-    Changes ``state`` and ``pose`` in place and fills ``trace`` with the pose after each step.
+    Changes ``state``, ``pose`` and ``queue``, the commands on their way, in place, and fills ``trace`` with the pose
+    after each step.
     """
     for step in range(first, steps):
         if state[1] > until:
             return step
-        speed, rate = control(path, arc, heading, limits, state, pose[0], pose[1], pose[2], dt)
+        x, y, yaw = pose[0], pose[1], pose[2]
+        if len(waves) > 0:
+            ex, ey, eyaw = error_at(waves, x, y)
+            x, y, yaw = x + ex, y + ey, yaw + eyaw
+        speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
         if state[0] == ARRIVED:
             return step
+        speed, rate = delayed(queue, speed, rate)
         left = (speed - 0.5 * track * rate) * gain_left
         right = (speed + 0.5 * track * rate) * gain_right
-        advance(pose, left, right, track, dt)
+        advance(pose, left, right, track * track_gain, dt)
         if step < len(trace):
             trace[step, 0], trace[step, 1], trace[step, 2] = pose[0], pose[1], pose[2]
     return steps
 
 
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def delayed(queue: FloatArray, speed: float, rate: float) -> tuple[float, float]:
+    """Put a command behind those on their way, and take the first of them.
+
+    Args:
+        queue: Speed [m/s] and turn rate [rad/s] of the commands on their way, the first first, shape (delay, 2);
+            changed in place.
+        speed, rate: The command.
+    """
+    if len(queue) == 0:
+        return speed, rate
+    first_speed, first_rate = queue[0, 0], queue[0, 1]
+    for k in range(len(queue) - 1):
+        queue[k, 0], queue[k, 1] = queue[k + 1, 0], queue[k + 1, 1]
+    queue[-1, 0], queue[-1, 1] = speed, rate
+    return first_speed, first_rate
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _drain(
+    pose: FloatArray, gain_left: float, gain_right: float, track: float, track_gain: float, queue: FloatArray,
+    dt: float, trace: FloatArray,
+) -> None:
+    """Obey the commands that are still on their way, standing from then on."""
+    for step in range(len(queue)):
+        speed, rate = delayed(queue, 0.0, 0.0)
+        left = (speed - 0.5 * track * rate) * gain_left
+        right = (speed + 0.5 * track * rate) * gain_right
+        advance(pose, left, right, track * track_gain, dt)
+        if step < len(trace):
+            trace[step, 0], trace[step, 1], trace[step, 2] = pose[0], pose[1], pose[2]
+
+
 def drive(
-    model: RobotModel, course: Sequence[Stretch], pose: FloatArray, wheel_gains: tuple[float, float] = (1.0, 1.0),
+    model: RobotModel, course: Sequence[Stretch], pose: FloatArray, disturbance: Disturbance = UNDISTURBED,
     *, traced: bool = False,
 ) -> tuple[float, FloatArray]:
-    """Time that a course takes the ideal robot.
+    """Time that a course takes the robot by its equations of motion alone.
+
+    It begins and ends at rest, with no command on its way.
 
     Args:
         model: The robot.
         course: The stretches of the course.
-        pose: x, y [m], yaw [rad] at the start, shape (3,); changed in place to the end.
-        wheel_gains: Factor on the speed of the left and the right wheel.
+        pose: x, y [m], yaw [rad] at the start, shape (3,); changed in place to the end. Where the robot is, not where
+            it believes to be.
+        disturbance: How it differs from its model; payload and friction make no difference here.
         traced: Whether to return the poses.
 
     Returns:
         The time [s], ``inf`` if it never arrives; the pose after each control step, shape (steps, 3), if traced.
     """
-    dt, limits = 1.0 / CONTROL_HZ, model.limits
+    dt, limits, delay = 1.0 / CONTROL_HZ, model.limits, disturbance.delay_steps
+    motion = (*disturbance.wheel_gains, model.track_m, disturbance.track_gain)
+    waves, queue = disturbance.waves, np.zeros((delay, 2))
     total, traces = 0, []
     for stretch in course:
         steps, state = patience_steps(stretch, model), new_state()
         trace = np.empty((steps if traced else 0, 3))
-        taken = _drive(stretch.path, stretch.arc, stretch.heading_rad, limits, state, pose, *wheel_gains,
-                       model.track_m, dt, 0, steps, math.inf, trace)
+        taken = _drive(stretch.path, stretch.arc, stretch.heading_rad, limits, state, pose, *motion, waves, queue, dt,
+                       0, steps, math.inf, trace)
         traces.append(trace[:taken])
         if state[0] != ARRIVED:
             return math.inf, np.concatenate(traces)
         total += taken
-    return total * dt, np.concatenate(traces) if traces else np.empty((0, 3))
+    if delay:
+        trace = np.empty((delay if traced else 0, 3))
+        _drain(pose, *motion, queue, dt, trace)
+        traces.append(trace)
+    return (total + delay) * dt, np.concatenate(traces) if traces else np.empty((0, 3))
+
+
+_NO_QUEUE = np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -172,7 +224,7 @@ def _drive_on(model: RobotModel, course: Sequence[Stretch], reached: _DriveState
         if shared is not None and last > shared - 2:
             until = float(stretch.arc[shared - 1 - before]) - horizon_m(limits, dt)
         taken = _drive(stretch.path, stretch.arc, stretch.heading_rad, limits, state, pose, 1.0, 1.0, model.track_m,
-                       dt, taken, patience_steps(stretch, model), until, no_trace)
+                       1.0, NO_WAVES, _NO_QUEUE, dt, taken, patience_steps(stretch, model), until, no_trace)
         if state[0] != ARRIVED:
             break
         number, done, taken, state, before = number + 1, done + taken, 0, new_state(), last

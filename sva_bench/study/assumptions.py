@@ -58,7 +58,7 @@ def cross_table(
             mine = plans[scenario.name]
             runs = [(made, next(executed)) for made in _all_of(mine)]
             right = next(run for made, run in runs if made.process == process)
-            rows[scenario.name] += [_row(process, mine, made, run, right, noisy=not world.noise.silent)
+            rows[scenario.name] += [_row(process, mine, made, run, right, noisy=world.noisy)
                                     for made, run in runs]
     return rows
 

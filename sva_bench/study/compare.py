@@ -77,7 +77,7 @@ def measure_plans(
         **vars(head_of(world, settings, costs, reproducible=True)), reach=reach_of(world, costs),
         scenarios=tuple(comparison_summary(
             [_judged(world, instances[s.name], plan, runs[s.name, name]) for name, plan in plans.items()], robots,
-            noisy=not world.noise.silent) for s in world.scenarios))
+            noisy=world.noisy) for s in world.scenarios))
     with clock.phase("reactions"):
         reactions = react_in_scenarios(Stage(
             world=world, costs=costs, instances=instances, executed=executed, settings=settings, executor=executor,

@@ -91,4 +91,4 @@ def identity_of(world: World, options: Options) -> dict[str, Any]:
 def settings_of(world: World, options: Options) -> Settings:
     """How plans are executed in a world."""
     return Settings(seed=options.seed, trials=options.trials, fidelity=options.fidelity,
-                    rollouts=1 if world.noise.silent else options.rollouts)
+                    rollouts=options.rollouts if world.noisy else 1)

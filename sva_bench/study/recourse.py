@@ -161,7 +161,7 @@ def _react(
             promise=scene.promise_of(case.plan), reacted=run, kept=idle[id(case)], executed=without[id(case)],
             trials=stage.settings.trials)
             for (whose, case), run in zip(cases, everything, strict=False) if whose == pair}
-        results.append(summed(plans, made[pair][1] if pair in made else (), noisy=not stage.world.noise.silent))
+        results.append(summed(plans, made[pair][1] if pair in made else (), noisy=stage.world.noisy))
     return ScenarioReactions(results=tuple(results), reacted=tuple(everything[:len(reacting)]))
 
 

@@ -32,7 +32,7 @@ def summarise(
             worst=runs.get((scenario.name, "worst_tie")), informed=None if plans.informed is None else Judged(
                 expected=plans.informed.expected,
                 executed=plans.informed.promised(runs[scenario.name, "informed"])))
-        scenarios.append(scenario_summary(facts_of(world, scenario, plans), trials, noisy=not world.noise.silent))
+        scenarios.append(scenario_summary(facts_of(world, scenario, plans), trials, noisy=world.noisy))
     return Summary(**vars(head), scenarios=tuple(scenarios), reach=reach,
                    precision=None if options.precision is None else options.precision.reached(scenarios))
 

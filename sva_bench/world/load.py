@@ -20,7 +20,8 @@ from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, availability_by, marginals, undefined_under, without_joint
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
-from sva_bench.world.model import MapSource, Noise, Robot, Scenario, Site, World, WorldReaction, nominal_of
+from sva_bench.world.model import MapSource, Robot, Scenario, Site, World, WorldReaction, nominal_of
+from sva_bench.world.noise_schema import noise_as_dict
 from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
 from sva_bench.world.schema import (
     KIND,
@@ -81,8 +82,9 @@ def world_of(
     return World(
         name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=scenarios,
         plan_failure=plan, execute_failure=execute, margin=file.margin,
-        noise=Noise(wheel_gain_sd=file.noise.wheel_gain_sd), map_source=source,
+        noise=file.noise.noise(), map_source=source,
         reaction=_reaction(document, file.reaction, stations=any(site.kind == "station" for site in sites)),
+        passages=tuple(entry.passage(name) for name, entry in file.passages.items()),
     )
 
 
@@ -120,7 +122,9 @@ def obstacles_of(shapes: Shapes) -> Obstacles:
             boxes.append([(ax + bx) / 2, (ay + by) / 2, math.hypot(bx - ax, by - ay) / 2, shape.thickness_m / 2,
                           _radians(math.degrees(math.atan2(by - ay, bx - ax)))])
     return Obstacles(bounds_m=np.array(shapes.bounds_m), boxes=np.array(boxes).reshape(-1, 5),
-                     cylinders=np.array(cylinders).reshape(-1, 3))
+                     cylinders=np.array(cylinders).reshape(-1, 3), floors=np.array([
+                         [*f.box, f.size_m[0] / 2, f.size_m[1] / 2, _radians(f.yaw_deg), f.friction]
+                         for f in shapes.floors]).reshape(-1, 6))
 
 
 def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: float) -> tuple[Site, ...]:
@@ -308,7 +312,10 @@ def world_as_dict(world: World) -> dict[str, Any]:
     def map_section() -> dict[str, Any]:
         if world.map_source is not None:
             return {kind: dict(entry) for kind, entry in world.map_source.section.items()}
-        return {"shapes": {"bounds_m": o.bounds_m.tolist(), "obstacles": shapes}}
+        floors = [{"box": [f[0], f[1]], "size_m": [2 * f[2], 2 * f[3]], "yaw_deg": _degrees(f[4]), "friction": f[5]}
+                  for f in o.floors.tolist()]
+        return {"shapes": {"bounds_m": o.bounds_m.tolist(), "obstacles": shapes,
+                           **({"floors": floors} if floors else {})}}
 
     o = world.obstacles
     shapes: list[dict[str, Any]] = [
@@ -334,5 +341,7 @@ def world_as_dict(world: World) -> dict[str, Any]:
             for s in world.scenarios},
         "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
         **({"reaction": asdict(world.reaction)} if reacts else {}),  # else absent: names of runs depend on it
-        "margin": world.margin, "noise": {"wheel_gain_sd": world.noise.wheel_gain_sd},
+        "margin": world.margin, "noise": noise_as_dict(world.noise),
+        **({"passages": {p.name: {"at_m": [list(p.ends_m[:2]), list(p.ends_m[2:])], "blocked": p.blocked,
+                                  "wait_s": p.wait_s} for p in world.passages}} if world.passages else {}),
     }

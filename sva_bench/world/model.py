@@ -13,6 +13,7 @@ from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, Reliability
 from sva_bench.robot.model import RobotModel
 from sva_bench.world.maps.files import MapFile
+from sva_bench.world.noise import Noise, Passage
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,22 +94,6 @@ def nominal_of(robots: Sequence[Robot]) -> Scenario:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Noise:
-    """What varies between rollouts.
-
-    Attributes:
-        wheel_gain_sd: Standard deviation of each wheel's speed gain about 1, drawn per rollout and robot.
-    """
-
-    wheel_gain_sd: float = 0.0
-
-    @property
-    def silent(self) -> bool:
-        """Whether all rollouts are equal."""
-        return self.wheel_gain_sd == 0
-
-
-@dataclass(frozen=True, kw_only=True)
 class WorldReaction:
     """What a team does about failures.
 
@@ -154,6 +139,7 @@ class World:
         noise: Noise of the execution.
         map_source: Origin of the occupancy grid; ``None`` if the obstacles are shapes.
         reaction: What the team does about failures, unless a run asks for something else.
+        passages: Doors and gates that may be shut.
     """
 
     name: str
@@ -167,10 +153,16 @@ class World:
     noise: Noise
     map_source: MapSource | None = None
     reaction: WorldReaction = WorldReaction()
+    passages: tuple[Passage, ...] = ()
 
     def __repr__(self) -> str:
         counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))
         return f"World({self.name}: {', '.join(counted(len(c), what) for c, what in counts)})"
+
+    @property
+    def noisy(self) -> bool:
+        """Whether rollouts differ."""
+        return not self.noise.silent or any(p.wait_s > 0 and 0 < p.blocked < 1 for p in self.passages)
 
     @property
     def stations(self) -> tuple[Site, ...]:

@@ -12,6 +12,7 @@ from sva_bench.files.fields import Bounded, MeanTime, Name, NonNegativeInt, Numb
 from sva_bench.seeds import MOST_SEED
 from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
+from sva_bench.world.noise_schema import FloorEntry, NoiseEntry, NoiseSection, PassageEntry
 from sva_bench.world.places import APART_M
 
 KIND = "sva-bench/world@1"
@@ -48,6 +49,7 @@ class Wall(Section):
 class Shapes(Section):
     bounds_m: Annotated[list[Number], Field(min_length=4, max_length=4)]
     obstacles: list[Box | Cylinder | Wall] = Field(default_factory=list)
+    floors: Annotated[list[FloorEntry], Field(max_length=1000)] = Field(default_factory=list)
 
     @field_validator("bounds_m")
     @classmethod
@@ -197,10 +199,6 @@ class ReactionEntry(Section):
     news: News | None = None
 
 
-class NoiseEntry(Section):
-    wheel_gain_sd: Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)] = 0.0
-
-
 class WorldFile(Section):
     """A world file."""
 
@@ -214,7 +212,8 @@ class WorldFile(Section):
     reaction: Annotated[ReactionEntry, _EMPTY_IS_NONE] = Field(default_factory=ReactionEntry)
     interaction: Literal["independent"] = "independent"
     margin: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] = 0.01
-    noise: Annotated[NoiseEntry, _EMPTY_IS_NONE] = Field(default_factory=NoiseEntry)
+    noise: NoiseSection = Field(default_factory=NoiseEntry)
+    passages: Annotated[dict[Name, PassageEntry], Field(max_length=1000), _EMPTY_IS_NONE] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod

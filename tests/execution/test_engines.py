@@ -20,8 +20,9 @@ from sva_bench.execution.drives import DriveTask, drive_route, drive_tasks
 from sva_bench.execution.engines import bullet
 from sva_bench.execution.engines.engine import ENGINE_OF, ENGINES, Engine, Pose
 from sva_bench.execution.following import follow, is_stuck
-from sva_bench.execution.noise import UNDISTURBED, Disturbance
+from sva_bench.execution.touch import Touch
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.robot.disturbance import UNDISTURBED, Disturbance
 from sva_bench.robot.follower import CONTROL_HZ, stretches
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.robot.twin import drive as drive_twin
@@ -64,7 +65,8 @@ def test_an_engine_begins_in_the_pose_it_was_given_and_stands_there_until_told_o
         for _ in range(60):
             engine.step(0.0, 0.0)
         assert engine.pose() == pytest.approx(START, abs=1e-3)
-        assert engine.contacts == 0
+        assert not engine.touches
+        assert not engine.tipped_over
 
 
 @engines
@@ -127,7 +129,7 @@ def test_following_in_the_ideal_engine_is_the_twin_to_the_bit(
         places: list[tuple[float, float]], heading: float, gains: tuple[float, float]) -> None:
     hop = stretches(np.array([START[:2], *places]), heading)
     pose = np.array(START)
-    time_s, trace = drive_twin(MODEL, hop, pose, gains, traced=True)
+    time_s, trace = drive_twin(MODEL, hop, pose, Disturbance(wheel_gains=gains), traced=True)
     poses: list[Pose] = []
     with opened("ideal", Disturbance(wheel_gains=gains)) as engine:
         found, arrived = follow(engine, MODEL, hop, poses)
@@ -138,7 +140,8 @@ def test_following_in_the_ideal_engine_is_the_twin_to_the_bit(
 class Blocked:
     """An engine that never moves."""
 
-    contacts = 0
+    touches: tuple[Touch, ...] = ()
+    tipped_over = False
 
     def pose(self) -> Pose:
         return 0.0, 0.0, 0.0
@@ -203,7 +206,7 @@ def test_a_robot_strays_when_it_is_more_than_80_cm_off_its_course() -> None:
 def test_a_robot_that_strays_is_driven_again_among_all_obstacles(monkeypatch: pytest.MonkeyPatch) -> None:
     wall = replace(ROOM, boxes=np.array([[3.0, 0.0, 0.1, 4.0, 0.0]]))
     hop = stretches(np.array([[0.0, 0.0], [6.0, 0.0]]), 0.0)
-    task = DriveTask(obstacles=wall, model=MODEL, start=(0.0, 0.0, 0.0), legs=((hop,),), fidelity="rollout",
+    task = DriveTask(obstacles=wall, model=MODEL, start=(0.0, 0.0, 0.0), legs=((hop,),), fidelity="physics",
                      traced=True)
     stopped = drive_route(task)
     assert stopped.stuck

@@ -17,12 +17,14 @@ from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import ENDS, FailureProcess, Fidelity
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.execute import Executed, execute
-from sva_bench.execution.noise import UNDISTURBED, draw_disturbance
+from sva_bench.execution.noise import draw_noise
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import JointState, route_value
 from sva_bench.mission.plan import Plan
+from sva_bench.robot.disturbance import UNDISTURBED
 from sva_bench.study.costs import instance_of
-from sva_bench.world.model import Noise, Scenario, World
+from sva_bench.world.model import Scenario, World
+from sva_bench.world.noise import Noise
 from tests.execution.conftest import Planned
 
 ARRAYS = ("rollout", "available", "incentive", "pois_reached", "stops_reached", "end", "end_time_s", "fuel_used_s")
@@ -122,12 +124,13 @@ def test_a_rollout_is_one_draw_of_noise(small: Planned) -> None:
 
 def test_gains_are_keyed_by_rollout_and_robot_alone() -> None:
     noise = Noise(wheel_gain_sd=0.01)
-    drawn = [draw_disturbance(noise, 0, rollout, robot).wheel_gains for rollout in range(200) for robot in range(2)]
+    drawn = [draw_noise(noise, 0, rollout, robot).disturbance.wheel_gains
+             for rollout in range(200) for robot in range(2)]
     assert len(set(drawn)) == 400
     # Four standard deviations of an average of 800 gains: 4 x 0.01 / sqrt(800) = 0.0015.
     assert np.mean(drawn) == pytest.approx(1.0, abs=0.0015)
     assert np.std(drawn) == pytest.approx(0.01, rel=0.1)  # 4 / sqrt(1600)
-    assert draw_disturbance(Noise(), 0, 3, 1) == UNDISTURBED
+    assert draw_noise(Noise(), 0, 3, 1).disturbance == UNDISTURBED
 
 
 def test_twin_and_physics_agree_within_one_per_cent(small: Planned) -> None:

@@ -15,9 +15,9 @@ from sva_bench.arrays import FloatArray
 from sva_bench.choices import Fidelity
 from sva_bench.execution.drives import DriveTask, Leg, drive_route
 from sva_bench.execution.following import downsampled
-from sva_bench.execution.noise import Disturbance
 from sva_bench.execution.outcome import Driven
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.robot.disturbance import Disturbance
 from sva_bench.robot.follower import CONTROL_HZ, stretches
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.travel.roadmap import plan_paths

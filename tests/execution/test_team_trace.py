@@ -80,7 +80,7 @@ def test_new_orders_go_on_from_where_the_robot_stands_or_is_going(world: World, 
 
 def mission(course: str, weight: float, trial: int, *, reacts: bool = True) -> Played:
     outcome = Outcome(available=True, incentive=0, lost=False, value=0, pois_reached=0, stops_reached=1, end="home",
-                      end_time_s=1, fuel_used_s=1, contacts=0, events=())
+                      end_time_s=1, fuel_used_s=1, driven_s=1, waited_s=0, contacts=0, events=())
     reaction = Reaction(time_s=0, failed=("uv2",), learned=("uv1",), before={"uv1": ()} if reacts else {},
                         after={"uv1": ("base",)} if reacts else {}, lived=("uv1",) if reacts else ())
     return Played(case=Case(scenario=None, planner="p", plan=Plan(routes={})),  # type: ignore[arg-type]

@@ -15,7 +15,8 @@ from sva_bench.execution.team_trace import NewsHeard, Rerouted
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import NEVER
 from sva_bench.robot.model import BUILT_IN
-from sva_bench.world.model import Noise, Robot, Scenario, Site, World
+from sva_bench.world.model import Robot, Scenario, Site, World
+from sva_bench.world.noise import Noise
 
 BASE = (1.0, 1.0, 0.0)
 WORLD = World(

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import FloatArray
 from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
+from sva_bench.robot.disturbance import Disturbance
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, arc_lengths, control, new_state, stretches, wrap
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.robot.twin import drive
@@ -32,7 +33,7 @@ def course_time(model: RobotModel, path: Sequence[Sequence[float]], heading: flo
                 gains: tuple[float, float] = (1.0, 1.0)) -> tuple[float, FloatArray]:
     """Time of a path from a heading to a heading, and the pose at its end."""
     pose = np.array([*path[0], start])
-    time_s, _ = drive(model, stretches(np.array(path), heading), pose, gains)
+    time_s, _ = drive(model, stretches(np.array(path), heading), pose, Disturbance(wheel_gains=gains))
     return time_s, pose
 
 

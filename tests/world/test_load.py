@@ -53,7 +53,7 @@ def test_a_world_file_gives_its_world(tmp_path: Path) -> None:
     assert [(s.name, dict(s.availability)) for s in world.scenarios] == [
         ("half", {"uv1": 1.0, "uv2": 0.5}), ("safe", {"uv1": 1.0, "uv2": 1.0})]
     assert (world.plan_failure, world.execute_failure, world.margin) == ("mission", "mission", 0.01)
-    assert not world.noise.silent
+    assert world.noisy
     assert [site.name for site in world.stations] == ["r1"]
     assert [site.name for site in world.pois] == ["p1", "p2", "p3", "p4"]
     assert world.scenario("safe") is world.scenarios[1]

@@ -9,12 +9,14 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
-from sva_bench.execution.noise import Disturbance
+from sva_bench.execution.touch import Touch
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c
+from sva_bench.robot.disturbance import Disturbance
 from sva_bench.robot.follower import CONTROL_HZ
 from sva_bench.robot.model import CASTERS_AT, RobotModel
 
@@ -49,7 +51,9 @@ _RESIDUAL = 1e-4  # ends the iterations early
 _WHEEL_RAD_S, _WHEEL_RAD_S2 = 5.0, 7.0  # slower or more slowly accelerated wheels don't bear that residual [rad2/s2]
 _FAST_RAD_S = 30.0  # wheels that turn faster don't bear 60 Hz: up to 1.5 % of a leg's time
 _CONTACT_STEPS = 3  # control steps from one look at contacts to the next: 50 ms
-_DISTANCE = 8  # where a contact point of PyBullet has its distance
+_PLACE, _DISTANCE = 5, 8  # where a contact point of PyBullet has its place on the robot, and its distance
+_UPRIGHT = 0.7  # cosine of the tilt at which a robot has tipped over
+_CASTER_FRICTION = 0.01  # of the hull in PyBullet, with the casters, which slide; obstacles make up for it
 _WALL_M = 0.2  # thickness of the walls about the bounds; nothing is seen of it
 _HEIGHT_M = 0.5  # of all obstacles; taller than any robot's hull
 _CASTER_GAP_M = 0.001  # casters touch the floor only when the hull tilts, so the weight rests on the driven wheels
@@ -72,7 +76,12 @@ class Bullet:
         self._model = model
         self._left = disturbance.wheel_gains[0] / model.wheel_radius_m
         self._right = disturbance.wheel_gains[1] / model.wheel_radius_m
-        self._steps, self._touches, self.contacts = 0, False, 0
+        self._steps, self._touched = 0, False
+        self.touches: list[Touch] = []
+        self.tipped_over = False
+        self._disturbance, self._floors = disturbance, obstacles.floors.tolist()
+        self._grips = [1.0, 1.0]
+        self._last = pose
         torque = motor_torque(model)
         self._forces = (torque, torque)
         self._client = _free.pop() if _free else pybullet.connect(pybullet.DIRECT)
@@ -102,23 +111,48 @@ class Bullet:
     def pose(self) -> tuple[float, float, float]:
         """x, y [m], yaw [rad]."""
         (x, y, _), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
-        return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+        if not 1 - 2 * (qx * qx + qy * qy) > _UPRIGHT:  # it tells no number either
+            self.tipped_over = True
+            return self._last
+        self._last = x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+        return self._last
 
     def step(self, left_m_s: float, right_m_s: float) -> None:
         """Advance by one control step."""
         pybullet.setJointMotorControlArray(
             self._body, (0, 1), pybullet.VELOCITY_CONTROL, forces=self._forces, physicsClientId=self._client,
             targetVelocities=(left_m_s * self._left, right_m_s * self._right))
+        if self._floors:
+            self._grip_floor()
         pybullet.stepSimulation(physicsClientId=self._client)
         self._steps += 1
         if self._steps % _CONTACT_STEPS == 0:
-            self._count_contacts()
+            self._look_for_contacts()
 
-    def _count_contacts(self) -> None:
+    def _look_for_contacts(self) -> None:
         near = pybullet.getContactPoints(self._body, self._solids, physicsClientId=self._client)
-        touches = any(point[_DISTANCE] <= 0 for point in near)
-        self.contacts += touches and not self._touches
-        self._touches = touches
+        places = [point[_PLACE] for point in near if point[_DISTANCE] <= 0]
+        period = _CONTACT_STEPS / CONTROL_HZ
+        if places and self._touched:
+            self.touches[-1] = replace(self.touches[-1], lasted_s=self.touches[-1].lasted_s + period)
+        elif places:
+            self.touches.append(Touch(since_s=self._steps / CONTROL_HZ, lasted_s=period, x_m=places[0][0],
+                                      y_m=places[0][1]))
+        self._touched = bool(places)
+
+    def _grip_floor(self) -> None:
+        """Give each wheel the friction of the floor that it stands on."""
+        x, y, yaw = self.pose()
+        half = self._model.track_m * self._disturbance.track_gain / 2
+        for wheel, side in enumerate((half, -half)):
+            px, py, grip = x - side * math.sin(yaw), y + side * math.cos(yaw), _WHEEL_FRICTION
+            for fx, fy, hx, hy, turned, friction in self._floors:
+                c, s = math.cos(turned), math.sin(turned)
+                if abs(c * (px - fx) + s * (py - fy)) <= hx and abs(-s * (px - fx) + c * (py - fy)) <= hy:
+                    grip = friction
+            if grip != self._grips[wheel]:
+                self._grips[wheel] = grip
+                pybullet.changeDynamics(self._body, wheel, lateralFriction=grip, physicsClientId=self._client)
 
     def _build_world(self, obstacles: Obstacles) -> int:
         floor = pybullet.createMultiBody(
@@ -140,6 +174,7 @@ class Bullet:
         wheel, hull = model.wheel_radius_m, 1.5 * model.wheel_radius_m
         caster = wheel / 2
         reach = CASTERS_AT * model.radius_m
+        track = model.track_m * self._disturbance.track_gain
         base = pybullet.createCollisionShapeArray(
             shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_SPHERE, pybullet.GEOM_SPHERE],
             radii=[model.radius_m, caster, caster], lengths=[2 * hull, 0, 0], halfExtents=[[0, 0, 0]] * 3,
@@ -149,15 +184,21 @@ class Bullet:
         # Spheres roll on one point: the speed is right to 0.1 %, where cylinder wheels are 2.4 % off and drift.
         tyre = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel, physicsClientId=client)
         body: int = pybullet.createMultiBody(
-            baseMass=0.9 * model.mass_kg, baseCollisionShapeIndex=base, basePosition=[pose[0], pose[1], wheel],
+            baseMass=0.9 * model.mass_kg + self._disturbance.payload_kg, baseCollisionShapeIndex=base,
+            basePosition=[pose[0], pose[1], wheel],
             baseOrientation=_upright(pose[2]), linkMasses=[0.05 * model.mass_kg] * 2,
             linkCollisionShapeIndices=[tyre, tyre], linkVisualShapeIndices=[-1, -1],
-            linkPositions=[[0, model.track_m / 2, 0], [0, -model.track_m / 2, 0]],
+            linkPositions=[[0, track / 2, 0], [0, -track / 2, 0]],
             linkOrientations=[[0, 0, 0, 1]] * 2, linkInertialFramePositions=[[0, 0, 0]] * 2,
             linkInertialFrameOrientations=[[0, 0, 0, 1]] * 2, linkParentIndices=[0, 0],
             linkJointTypes=[pybullet.JOINT_REVOLUTE] * 2, linkJointAxis=[[0, 1, 0]] * 2, physicsClientId=client)
         smooth = {"linearDamping": 0.0, "angularDamping": 0.0, "physicsClientId": client}
-        pybullet.changeDynamics(body, -1, lateralFriction=0.0, **smooth)  # casters and hull slide
+        rough = self._disturbance.hull_friction > 0
+        # PyBullet multiplies the frictions of two bodies.
+        pybullet.changeDynamics(body, -1, lateralFriction=_CASTER_FRICTION if rough else 0.0, **smooth)
+        if rough:
+            pybullet.changeDynamics(self._solids, -1, physicsClientId=client,
+                                    lateralFriction=self._disturbance.hull_friction / _CASTER_FRICTION)
         for link in (0, 1):
             pybullet.changeDynamics(body, link, lateralFriction=_WHEEL_FRICTION, jointDamping=0.0, **smooth)
             fastest = fastest_wheel_rad_s(model)

@@ -6,15 +6,16 @@ is a class and a line in ``ENGINES``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
 from sva_bench.choices import EngineName, Fidelity
 from sva_bench.execution.engines.bullet import Bullet
 from sva_bench.execution.engines.ideal import Ideal
-from sva_bench.execution.noise import Disturbance
+from sva_bench.execution.touch import Touch
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.robot.disturbance import Disturbance
 from sva_bench.robot.model import RobotModel
 
 Pose = tuple[float, float, float]
@@ -25,8 +26,13 @@ class Engine(Protocol):
     """One robot in a world. A context manager; each drive wants a fresh one, which repeats bit for bit."""
 
     @property
-    def contacts(self) -> int:
-        """How many times the hull has come to touch an obstacle."""
+    def touches(self) -> Sequence[Touch]:
+        """Each time that the hull came to touch an obstacle, so far."""
+        ...
+
+    @property
+    def tipped_over(self) -> bool:
+        """Whether it lies on its side, or nobody knows where: it drives no more."""
         ...
 
     def pose(self) -> Pose:

@@ -1,4 +1,4 @@
-"""An ideal unicycle: wheels that do what they are told, but for their gains, in a world that nothing stands in."""
+"""A unicycle: wheels that do what they are told, but for their gains and track, in a world that nothing stands in."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Self
 
 import numpy as np
 
-from sva_bench.execution.noise import Disturbance
+from sva_bench.execution.touch import Touch
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.robot.disturbance import Disturbance
 from sva_bench.robot.follower import CONTROL_HZ
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import advance
@@ -17,13 +18,14 @@ from sva_bench.robot.twin import advance
 class Ideal:
     """The kinematic twin, step by step: the same arithmetic to the bit, so the follower takes the same time."""
 
-    contacts = 0
+    touches: tuple[Touch, ...] = ()
+    tipped_over = False
 
     def __init__(self, obstacles: Obstacles, model: RobotModel, pose: tuple[float, float, float],
                  disturbance: Disturbance) -> None:
         del obstacles  # it drives through all of them
         self._pose = np.array(pose, dtype=np.float64)
-        self._track = model.track_m
+        self._track = model.track_m * disturbance.track_gain
         self._gains = disturbance.wheel_gains
 
     def pose(self) -> tuple[float, float, float]:
