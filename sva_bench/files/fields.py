@@ -16,6 +16,8 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Bounded = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1e9)]
 """Times [s] and incentives: beyond 1e9 the feasibility tolerance is below the rounding of sums."""
+Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-6, le=1e9)]
+"""Seconds of driving gained per second at a station; a time to charge is thus at most 1e6 times the driving."""
 MeanTime = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 """A mean time to failure [s]; of robots that hardly ever fail it may be any number."""
 Probability = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=1)]

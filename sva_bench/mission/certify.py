@@ -27,8 +27,9 @@ class Certificate:
         expected: Expected value, which is incentive less the cost of lost vehicles, under the instance's failure
             process; ``None`` if infeasible.
         nominal: Incentive if every vehicle is available; ``None`` if infeasible.
-        fuel_s: Fuel that each vehicle burns [s of driving]; ``inf`` if a leg does not exist.
-        duration_s: Driving and stops of each vehicle [s].
+        fuel_s: Fuel that each vehicle burns, driving and in stops at POIs [s of driving]; ``inf`` if a leg does not
+            exist.
+        duration_s: Mission clock of each vehicle at its end: driving, stops and charging [s].
         reasons: Why it is infeasible; of a feasible plan, which of its claims are wrong.
     """
 
@@ -114,7 +115,8 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
         reasons.append(f"{name}: the route must start and end at the base, {instance.sites[instance.base]!r}")
     if instance.base in sites[1:-1]:
         reasons.append(f"{name}: the base is an intermediate stop of the route; it is left and entered once")
-    since_refuel = fuel = duration = 0.0
+    since_refuel = to_charge = fuel = duration = 0.0
+    clock_s = vehicle.fuel_s if vehicle.time_s is None else vehicle.time_s
     for i, j in itertools.pairwise(sites):
         leg = float(vehicle.fuel_s[i, j])
         where = f"{instance.sites[i]!r} -> {instance.sites[j]!r}"
@@ -124,21 +126,29 @@ def _drive(instance: Instance, vehicle: Vehicle, route: Route, reasons: list[str
         elif leg == INFINITE:
             reasons.append(f"{name}: there is no leg {where}")
         since_refuel += leg
+        to_charge += leg
         fuel += leg
-        duration += leg + float(instance.stop_s[j])
+        duration += float(clock_s[i, j]) + float(instance.stop_s[j])
         if INFINITE > since_refuel > vehicle.fuel_capacity_s + TOLERANCE_S:
             reasons.append(f"{name}: {since_refuel:.3f} s of fuel burnt on arrival over {where}; "
                            f"the capacity is {vehicle.fuel_capacity_s:.3f} s")
             since_refuel = 0.0  # one message for each refuel interval
         if j in instance.stations:
-            since_refuel = 0.0
+            if instance.charge_rate is not None and instance.charge_rate[j] < INFINITE:
+                duration += to_charge / float(instance.charge_rate[j])
+            since_refuel = to_charge = 0.0
+        elif j != instance.base:
+            idle = vehicle.idle_share * float(instance.stop_s[j])
+            since_refuel += idle
+            to_charge += idle
+            fuel += idle
     if duration > vehicle.mission_limit_s + TOLERANCE_S:
         reasons.append(f"{name}: the mission takes {duration:.3f} s; the limit is {vehicle.mission_limit_s:.3f} s")
     return fuel, duration
 
 
 def _driving_times(instance: Instance, vehicle: Vehicle, route: Route) -> list[float]:
-    """Driving time until each stop of a route [s], without the time of stops."""
+    """Driving time until each stop of a route [s]: that of ``fuel_s``, without stops."""
     sites = [instance.sites.index(name) for name in route]
     legs = (float(vehicle.fuel_s[i, j]) for i, j in itertools.pairwise(sites))
     return list(itertools.accumulate(legs, initial=0.0)) if route else []

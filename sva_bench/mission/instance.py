@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
 
+import numpy as np
+
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput, UnknownName, nearest
@@ -30,6 +32,9 @@ class Vehicle:
         fuel_s: Fuel of the leg from site i to site j [s of driving], shape (n, n), zero diagonal; ``inf`` = no leg.
         mtbf_s: Mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and mission limit.
         loss_cost: Cost if it leaves the base and doesn't come home [incentive].
+        idle_share: Share of a second of driving that a second of a stop at a POI burns, 0 to 1.
+        time_s: Time of the leg from site i to site j on the mission clock [s], shape (n, n), ``inf`` where there is no
+            leg; ``None`` = that of ``fuel_s``. Lifetimes under ``hazard`` are in seconds of ``fuel_s`` in any case.
     """
 
     name: str
@@ -40,6 +45,8 @@ class Vehicle:
     fuel_s: FloatArray
     mtbf_s: float | None = None
     loss_cost: float = 0.0
+    idle_share: float = 0.0
+    time_s: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.incentives)
@@ -47,6 +54,17 @@ class Vehicle:
             raise ValueError(f"availability of {self.name}: expected 0 to 1, found {self.availability}")
         object.__setattr__(self, "incentives", frozen(self.incentives, (n,)))
         object.__setattr__(self, "fuel_s", frozen(self.fuel_s, (n, n)))
+        if not 0 <= self.idle_share <= 1:
+            raise ValueError(f"idle_share of {self.name}: expected 0 to 1, found {self.idle_share}")
+        if self.time_s is not None:
+            object.__setattr__(self, "time_s", frozen(self.time_s, (n, n)))
+            if not np.array_equal(np.isinf(self.time_s), np.isinf(self.fuel_s)):
+                raise ValueError(f"time_s of {self.name}: expected inf where fuel_s is, and nowhere else")
+
+    @property
+    def leg_time_s(self) -> FloatArray:
+        """Time of a leg on the mission clock, without stops [s], shape (n, n)."""
+        return self.fuel_s if self.time_s is None else self.time_s
 
     @property
     def reliability(self) -> Reliability:
@@ -64,10 +82,13 @@ class Instance:
         sites: Names of all sites, length n; an index into it is a site's identity.
         base: Index of the base.
         stations: Indices of the refuelling stations, without the base.
-        stop_s: Duration of a stop [s], shape (n,); counts towards the mission limit, burns no fuel.
+        stop_s: Duration of a stop [s], shape (n,); counts towards the mission limit, and burns fuel at POIs alone, by
+            ``Vehicle.idle_share``.
         vehicles: The vehicles.
         failure: The failure process that plans are made for.
         joint: Joint distribution of the availabilities; ``None`` = independent.
+        charge_rate: Seconds of driving that a second at a station fills into the tank, on top of ``stop_s``, shape
+            (n,); ``inf`` at all other sites, and at stations where a stop takes ``stop_s`` alone; ``None`` = at all.
     """
 
     name: str
@@ -78,9 +99,16 @@ class Instance:
     vehicles: tuple[Vehicle, ...]
     failure: FailureProcess = "mission"
     joint: tuple[JointState, ...] | None = None
+    charge_rate: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stop_s", frozen(self.stop_s, (len(self.sites),)))
+        n = len(self.sites)
+        object.__setattr__(self, "stop_s", frozen(self.stop_s, (n,)))
+        if self.charge_rate is not None:
+            object.__setattr__(self, "charge_rate", frozen(self.charge_rate, (n,)))
+            charged = np.flatnonzero(np.isfinite(self.charge_rate)).tolist()
+            if not (self.charge_rate > 0).all() or not set(charged) <= set(self.stations):
+                raise ValueError("charge_rate: expected rates above 0 at stations, inf at all other sites")
 
     def __repr__(self) -> str:
         counts = ((self.vehicles, "vehicle"), (self.pois, "POI"), (self.stations, "station"))
@@ -90,6 +118,17 @@ class Instance:
     def pois(self) -> tuple[int, ...]:
         """Indices of the POIs: every site that is neither base nor station."""
         return tuple(i for i in range(len(self.sites)) if i != self.base and i not in self.stations)
+
+    @property
+    def charging(self) -> FloatArray:
+        """Time that a stop takes for each second of driving burnt since the last refuel, shape (n,)."""
+        return np.zeros(len(self.sites)) if self.charge_rate is None else 1.0 / self.charge_rate
+
+    def idle_fuel_s(self, vehicle: Vehicle) -> FloatArray:
+        """Fuel that a vehicle burns in a stop [s of driving], shape (n,); 0 at base and stations."""
+        idle: FloatArray = vehicle.idle_share * self.stop_s
+        idle[[self.base, *self.stations]] = 0.0
+        return idle
 
     def vehicle(self, name: str) -> Vehicle:
         """The vehicle of that name.

@@ -20,7 +20,7 @@ class Afield:
         name: Its name.
         site: Where it sets off next.
         ready_s: When [s on the mission clock].
-        burnt_s: Fuel burnt since it was filled last [s of driving].
+        burnt_s: Fuel burnt since it was filled last, in stops too [s of driving].
         availability: Probability that it is alive, where failures are drawn for a whole mission; else its availability.
         orders: Sites that it was to go to from there, the base last; a plan to start from.
     """
@@ -51,8 +51,9 @@ class Rest:
 def instance_of_rest(rest: Rest) -> Instance:
     """The rest as an instance: each vehicle's own costs begin where it is.
 
-    A vehicle's row of the base is the row of its site, plus the fuel that it has burnt already; its limit is shortened
-    by the time that has passed, less that fuel. So the triangle inequality doesn't hold for legs from the base.
+    A vehicle's row of the base is the row of its site, plus the fuel that it has burnt already, which a station where
+    charging takes time fills up too; its limit is shortened by the time that has passed, less that fuel where the
+    mission clock runs by fuel. So the triangle inequality doesn't hold for legs from the base.
     Incentives and cost of a loss are worth more by what it has survived already, so that discounts count from now.
     """
     whole = rest.instance
@@ -64,7 +65,8 @@ def instance_of_rest(rest: Rest) -> Instance:
     vehicles = tuple(_vehicle(whole, afield, kept, float(w)) for afield, w in zip(rest.vehicles, worth, strict=True))
     return replace(whole, name=f"{whole.name}, the rest", sites=tuple(whole.sites[k] for k in kept),
                    base=number[whole.base], stations=tuple(number[k] for k in whole.stations),
-                   stop_s=whole.stop_s[kept], vehicles=vehicles, joint=None)
+                   stop_s=whole.stop_s[kept], vehicles=vehicles, joint=None,
+                   charge_rate=None if whole.charge_rate is None else whole.charge_rate[kept])
 
 
 def failure_rates(rest: Rest) -> list[float]:
@@ -77,14 +79,21 @@ def failure_rates(rest: Rest) -> list[float]:
 def _vehicle(whole: Instance, afield: Afield, kept: list[int], worth: float) -> Vehicle:
     vehicle = whole.vehicle(afield.name)
     site, base = whole.sites.index(afield.site), kept.index(whole.base)
-    fuel: FloatArray = vehicle.fuel_s[np.ix_(kept, kept)].copy()
-    fuel[base] = vehicle.fuel_s[site, kept] + afield.burnt_s
-    if site != whole.base and site in kept:
-        fuel[base, kept.index(site)] = math.inf  # it stands there
-    fuel[base, base] = 0.0
+
+    def from_here(legs: FloatArray, already_s: float) -> FloatArray:
+        own: FloatArray = legs[np.ix_(kept, kept)].copy()
+        own[base] = legs[site, kept] + already_s
+        if site != whole.base and site in kept:
+            own[base, kept.index(site)] = math.inf  # it stands there
+        own[base, base] = 0.0
+        return own
+
+    time_s, left_s = None, vehicle.mission_limit_s - afield.ready_s + afield.burnt_s
+    if vehicle.time_s is not None:
+        time_s, left_s = from_here(vehicle.time_s, 0.0), vehicle.mission_limit_s - afield.ready_s
     # By an availability alone, lifetimes would be those of the limit that is left.
     rate = process_of(whole.failure).terms([vehicle.reliability]).rate
     mtbf_s = vehicle.mtbf_s if rate is None else 1.0 / float(rate[0]) if rate[0] > 0 else math.inf
-    return replace(vehicle, fuel_s=fuel, mtbf_s=mtbf_s, incentives=vehicle.incentives[kept] * worth,
-                   loss_cost=vehicle.loss_cost * worth, availability=afield.availability,
-                   mission_limit_s=max(vehicle.mission_limit_s - afield.ready_s + afield.burnt_s, 0.0))
+    return replace(vehicle, fuel_s=from_here(vehicle.fuel_s, afield.burnt_s), time_s=time_s, mtbf_s=mtbf_s,
+                   incentives=vehicle.incentives[kept] * worth, loss_cost=vehicle.loss_cost * worth,
+                   availability=afield.availability, mission_limit_s=max(left_s, 0.0))

@@ -11,6 +11,7 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver.knowledge import Knowledge, Routes, Solution
+from sva_bench.solver.preprocess import burnt_by_legs
 from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.refuelling import quickest_route
 from sva_bench.solver.ties import ROUNDING
@@ -40,7 +41,8 @@ def finished(
     named, fuel = {}, {}
     for vehicle, route in zip(instance.vehicles, routes, strict=True):
         named[vehicle.name] = tuple(instance.sites[i] for i in route)
-        fuel[vehicle.name] = float(sum(vehicle.fuel_s[i, j] for i, j in itertools.pairwise(route)))
+        burnt = burnt_by_legs(instance, vehicle)
+        fuel[vehicle.name] = float(sum(burnt[i, j] for i, j in itertools.pairwise(route)))
     counted = {"nodes": sum(s.nodes for s in solutions), "cuts": max((s.cuts for s in solutions), default=0),
                "rounds": sum(s.rounds for s in solutions)}
     if any(s.optimality_cuts for s in solutions):

@@ -146,12 +146,20 @@ def maximise(
         _check(solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1], rows.column,
                               rows.value), "addRows")
     _set_integer(solver, np.flatnonzero(model.integer))
-    if start is not None:
-        solution = highspy.HighsSolution()
-        solution.col_value = start.tolist()
-        _check(solver.setSolution(solution), "setSolution")
-    return _branch_and_bound(solver, gap=gap, absolute_gap=absolute_gap, time_limit_s=time_limit_s,
-                             most_nodes=most_nodes, heuristics=heuristics, has_integers=bool(model.integer.any()))
+    for presolve in ("choose", "off"):
+        _option(solver, "presolve", presolve)
+        if start is not None:
+            solution = highspy.HighsSolution()
+            solution.col_value = start.tolist()
+            _check(solver.setSolution(solution), "setSolution")
+        outcome = _branch_and_bound(solver, gap=gap, absolute_gap=absolute_gap, time_limit_s=time_limit_s,
+                                    most_nodes=most_nodes, heuristics=heuristics,
+                                    has_integers=bool(model.integer.any()))
+        # At tolerances as tight as ours, HiGHS's presolve now and then finds a feasible program infeasible; with a
+        # point to begin with it then reports that one as optimal, without a bound.
+        if outcome.status != "infeasible" and not (outcome.status == "optimal" and math.isinf(outcome.bound)):
+            break
+    return outcome
 
 
 def _set_integer(solver: Any, columns: IntArray) -> None:

@@ -143,10 +143,13 @@ class Knowledge:
         """
         first = self.instance
         same = (first.sites, first.base, first.stations) == (instance.sites, instance.base, instance.stations) \
-            and np.array_equal(first.stop_s, instance.stop_s) and len(first.vehicles) == len(instance.vehicles) \
+            and np.array_equal(first.stop_s, instance.stop_s) and np.array_equal(first.charging, instance.charging) \
+            and len(first.vehicles) == len(instance.vehicles) \
             and all(
-                (a.name, a.fuel_capacity_s, a.mission_limit_s) == (b.name, b.fuel_capacity_s, b.mission_limit_s)
-                and np.array_equal(a.fuel_s, b.fuel_s) and np.array_equal(a.incentives, b.incentives)
+                (a.name, a.fuel_capacity_s, a.mission_limit_s, a.idle_share)
+                == (b.name, b.fuel_capacity_s, b.mission_limit_s, b.idle_share)
+                and np.array_equal(a.fuel_s, b.fuel_s) and np.array_equal(a.leg_time_s, b.leg_time_s)
+                and np.array_equal(a.incentives, b.incentives)
                 for a, b in zip(first.vehicles, instance.vehicles, strict=True))
         if not same:
             raise ValueError(f"what is known of instance {first.name!r} doesn't hold for {instance.name!r}: "

@@ -124,7 +124,7 @@ def choice(problem: Problem) -> Method:
     if not all(math.isfinite(v.mission_limit_s) for v in instance.vehicles):
         return "expected"
     # Of all legs of the instance: with a short limit, the legs of the scopes are short too.
-    longest = max((float(v.fuel_s[np.isfinite(v.fuel_s)].max()) for v in instance.vehicles), default=0.0)
+    longest = max((float(v.leg_time_s[np.isfinite(v.leg_time_s)].max()) for v in instance.vehicles), default=0.0)
     shortest_limit = min((v.mission_limit_s for v in instance.vehicles), default=0.0)
     if len(scopes) in LONG and shortest_limit >= LONG[len(scopes)] * longest and serves(instance, scopes):
         return "undirected"

@@ -115,7 +115,7 @@ def _arrival(instance: Instance, goal: Goal, scopes: Sequence[Scope]) -> FloatAr
     """Greatest probability of vehicle m to get to site j, shape (M, n)."""
     pois = np.isin(np.arange(len(instance.sites)), instance.pois)
     return np.array([
-        greatest_survival(leg_survival(np.where(scope.legs, scope.fuel_s, np.inf), pois, goal.discount(m)),
+        greatest_survival(leg_survival(np.where(scope.legs, scope.driven_s, np.inf), pois, goal.discount(m)),
                           instance.base)
         for m, scope in enumerate(scopes)]).reshape(goal.weights.shape)
 

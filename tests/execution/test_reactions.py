@@ -386,12 +386,12 @@ def test_news_make_no_difference_to_who_keeps_the_plan_nor_policies_to_who_hears
         assert len({told(outcome) for outcome in outcomes}) == 1
 
 
-def two_robots(process: FailureProcess, **given: float) -> tuple[Instance, Ground]:
+def two_robots(process: FailureProcess, mtbf_s: float | None = None) -> tuple[Instance, Ground]:
     """Robot a is 2 s from p; b is 3 s from q; p and q are 4 s apart, and each is as far from home as it was away."""
     cost = np.array([[0, 2, 3], [2, 0, 4], [3, 4, 0]], dtype=float)
     instance = Instance(name="two", sites=("base", "p", "q"), base=0, stations=(), stop_s=np.zeros(3), failure=process,
                         vehicles=tuple(Vehicle(name=name, fuel_capacity_s=20, mission_limit_s=20, fuel_s=cost,
-                                               incentives=np.array([0.0, 10, 20]), availability=s, **given)
+                                               incentives=np.array([0.0, 10, 20]), availability=s, mtbf_s=mtbf_s)
                                        for name, s in (("a", 1.0), ("b", 0.5))))
     return instance, Ground(instance)
 

@@ -56,6 +56,10 @@ class Ground:
         self.robots = range(len(instance.vehicles))
         self.stop = [float(x) for x in instance.stop_s]
         self.cost = [[[float(x) for x in row] for row in v.fuel_s] for v in instance.vehicles]
+        self.clock = [[[float(x) for x in row] for row in (v.fuel_s if v.time_s is None else v.time_s)]
+                      for v in instance.vehicles]
+        self.idle = [v.idle_share for v in instance.vehicles]
+        self.rates = [math.inf] * len(self.stop) if instance.charge_rate is None else list(instance.charge_rate)
         self.reward = [[float(x) for x in v.incentives] for v in instance.vehicles]
         self.tank = [v.fuel_capacity_s for v in instance.vehicles]
         self.limit = [v.mission_limit_s for v in instance.vehicles]
@@ -82,11 +86,15 @@ class Ground:
 
     def arrival(self, robot: int, here: int, there: int, ready: float, burnt: float) -> tuple[float, float] | None:
         """When a robot can leave the end of a leg, and its fuel burnt then; ``None`` if the leg breaks a rule."""
-        leg = self.cost[robot][here][there]
-        burnt, ready = burnt + leg, ready + leg + self.stop[there]
+        burnt = burnt + self.cost[robot][here][there]
+        ready = ready + self.clock[robot][here][there] + self.stop[there]
+        if there in self.stations and math.isfinite(burnt):
+            ready += burnt / self.rates[there]
         if here == there or not burnt <= self.tank[robot] + TOLERANCE or not ready <= self.limit[robot] + TOLERANCE \
                 or math.isinf(ready):
             return None
+        if there in self.bit:
+            burnt += self.idle[robot] * self.stop[there]
         return ready, 0.0 if there in self.stations else burnt
 
     def best(self, robot: int, here: int, ready: float, burnt: float, mask: int, passed: int = 0) -> Best:

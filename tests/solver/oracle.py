@@ -18,12 +18,17 @@ TOLERANCE = 1e-6
 def moves(
     instance: Instance, vehicle: Vehicle, site: int, visited: frozenset[int], fuel: float, time: float,
 ) -> Iterator[tuple[int, float, float]]:
-    """Where a vehicle can go next: the site, fuel burnt since the last refuel, and time on arrival."""
+    """Where a vehicle can go next: the site, fuel burnt since the last refuel, and time, as it sets off from there."""
+    clock = vehicle.fuel_s if vehicle.time_s is None else vehicle.time_s
     for j in range(len(instance.sites)):
         burnt = fuel + float(vehicle.fuel_s[site, j])
-        later = time + float(vehicle.fuel_s[site, j]) + float(instance.stop_s[j])
+        later = time + float(clock[site, j]) + float(instance.stop_s[j])
+        if j in instance.stations and instance.charge_rate is not None:
+            later += burnt / float(instance.charge_rate[j])
         if j != site and j not in visited and burnt <= vehicle.fuel_capacity_s + TOLERANCE \
                 and later <= vehicle.mission_limit_s + TOLERANCE and np.isfinite(later):
+            if j != instance.base and j not in instance.stations:
+                burnt += vehicle.idle_share * float(instance.stop_s[j])
             yield j, burnt, later
 
 

@@ -298,10 +298,14 @@ class ColumnGeneration:
         key = (vehicle_class, route)
         if key not in self.pool:
             own, graph = self.classes[vehicle_class], self.graphs[vehicle_class]
-            visits, value, chance = np.zeros(self._n), 0.0, 1.0
+            visits, value, chance, burnt = np.zeros(self._n), 0.0, 1.0, 0.0
             floors = np.zeros(len(self._floors))
             for i, j in itertools.pairwise(route):
                 value -= self.goal.driving * graph.time_s[i, j]
+                burnt += graph.fuel_s[i, j]
+                if graph.bit[j] < 0:
+                    value -= self.goal.driving * graph.charging[j] * burnt
+                    burnt = 0.0
                 chance *= graph.survival[i, j]
                 if graph.bit[j] >= 0:
                     value += chance * own.weights[j]
@@ -379,4 +383,5 @@ def _identical(one: VehicleClass, other: VehicleClass, graph: Graph, other_graph
         and (graph.capacity_s, graph.limit_s, graph.discount) == \
         (other_graph.capacity_s, other_graph.limit_s, other_graph.discount) \
         and np.array_equal(graph.legs, other_graph.legs) and np.array_equal(graph.time_s, other_graph.time_s) \
-        and np.array_equal(graph.fuel_s, other_graph.fuel_s)
+        and np.array_equal(graph.fuel_s, other_graph.fuel_s) \
+        and np.array_equal(graph.survival[graph.legs], other_graph.survival[graph.legs])

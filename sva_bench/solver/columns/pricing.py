@@ -110,13 +110,17 @@ def price(
 class PricingGraph:
     """The induced subgraph of the sites that a pricing run can use, renumbered.
 
+    Where charging takes time, it is proportional to the fuel burnt since the last refuel, and so to that of each leg.
+    Then there is a copy of a POI for each charging time of a second's fuel at the next refuel, and legs lead from copy
+    to copy of the same; their time includes their share of charging. So labels from either end know it.
+
     Attributes:
         sites: Number of each site in the whole graph, shape (k,).
         base: The base.
         bit: Number of each POI, -1 for base and stations, shape (k,).
         words: 64-bit words of a set of POIs.
         legs: Whether a leg is of use, shape (k, k).
-        time_s: Time of a leg [s], shape (k, k).
+        time_s: Time of a leg, with its share of charging [s], shape (k, k).
         fuel_s: Fuel of a leg [s], shape (k, k).
         survival: Probability to survive a leg, shape (k, k).
         arrival: Greatest probability to get to a site, shape (k,).
@@ -152,12 +156,30 @@ def pricing_graph(
         usable &= (graph.bit < 0) | (graph.arrival * np.where(usable, reward, 0.0) > dual - loss)
     sites = np.flatnonzero(usable)
     across = np.ix_(sites, sites)
+    legs, time = graph.legs[across], graph.time_s[across]
+    if graph.charging[sites].any():
+        sites, charging = _copies(graph, sites)
+        across = np.ix_(sites, sites)
+        refuels = graph.bit[sites] < 0
+        legs = graph.legs[across] & (refuels[:, None] | (charging[:, None] == charging[None, :]))
+        time = np.where(legs, graph.time_s[across] + graph.fuel_s[across] * charging[None, :], 0.0)
     return PricingGraph(
-        sites=sites, base=int(np.searchsorted(sites, graph.base)), bit=graph.bit[sites],
-        words=max(1, -(-int(graph.bit.max(initial=0) + 1) // 64)), legs=graph.legs[across],
-        time_s=graph.time_s[across], fuel_s=graph.fuel_s[across], survival=graph.survival[across],
+        sites=sites, base=int(np.flatnonzero(sites == graph.base)[0]), bit=graph.bit[sites],
+        words=max(1, -(-int(graph.bit.max(initial=0) + 1) // 64)), legs=legs,
+        time_s=time, fuel_s=graph.fuel_s[across], survival=graph.survival[across],
         arrival=graph.arrival[sites], reward=reward[sites], dual=dual[sites],
         in_cut=cut_duals.in_cut[sites], in_memory=cut_duals.in_memory[sites])
+
+
+def _copies(graph: Graph, sites: IntArray) -> tuple[IntArray, FloatArray]:
+    """A copy of each POI for each charging time of a second's fuel, and the refuels: their sites, and charging times.
+
+    Arrays have shape (k,).
+    """
+    refuels, pois = sites[graph.bit[sites] < 0], sites[graph.bit[sites] >= 0]
+    each = np.unique(graph.charging[refuels])
+    return (np.concatenate([refuels, np.tile(pois, len(each))]),
+            np.concatenate([graph.charging[refuels], np.repeat(each, len(pois))]))
 
 
 def bounds_of(graph: Graph, subgraph: PricingGraph, charge: float) -> tuple[float, FloatArray, FloatArray]:

@@ -150,14 +150,17 @@ def _integers(flow: FlowModel, problem: Problem, outcome: MipResult) -> list[Cut
     instance, goal, known = problem.instance, problem.goal, problem.known
     pois = frozenset(instance.pois)
     violated: list[Cut] = []
-    orders = []
+    orders, driven = [], []
     for m, own_legs in enumerate(known.legs_by_vehicle):
         violated += violated_by_integers(flow.visits(outcome.values, m), m, instance.base, pois)
         order = flow.order(outcome.values, m)
         if quickest_route(own_legs, order) is None:
             raise RuntimeError(f"the solver's route of {instance.vehicles[m].name} exceeds its fuel or limit")
         orders.append(without_idle_stops(own_legs, order, goal.rewarded()[m]))
+        driven.append(order)
     adopt(problem.progress, goal, known, tuple(orders))
+    if goal.driving:  # without the triangle inequality a stop without reward may be a shortcut
+        adopt(problem.progress, goal, known, tuple(driven))
     return violated
 
 

@@ -4,9 +4,10 @@ Columns ``y[m,i,j]`` for every leg of use, binary but between two stations, wher
 The paper's fuel ``x[i,j]`` on arrival over a leg out of POI i is written ``(s_i + f_ij) y_ij + w_ij`` with
 ``0 <= w_ij <= (F - t_j - s_i - f_ij) y_ij``: Proposition 2 with one row a leg. Out of a refuel ``x = f y``, (11),
 so such legs need no fuel column. The mission limit gets the same treatment, as time is a fuel that is never refilled:
-(14a) alone lets half a vehicle drive twice as far. The paper's ``z_r`` doesn't appear: the cuts
-``y(out of S) >= y(into i)`` for POIs i (``cuts.py``) imply (3) with (4). They also cut cycles of POIs alone, so legs
-that cost nothing do no harm.
+(14a) alone lets half a vehicle drive twice as far. A POI's idle burn counts with the leg to it, and where charging
+takes time, ``x[i,r]`` over the charge rate counts in (14a) and in the flow of time. The paper's ``z_r`` doesn't appear:
+the cuts ``y(out of S) >= y(into i)`` for POIs i (``cuts.py``) imply (3) with (4). They also cut cycles of POIs alone,
+so legs that cost nothing do no harm.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class Resource:
 
     Attributes:
         through: Sites at which it isn't renewed, shape (n,).
-        used_s: Use of a leg [s], shape (n, n).
+        used_s: Least use of a leg [s], shape (n, n); of time, charging adds to it.
         least_s: Least use on leaving a site [s], shape (n,).
         onward_s: Least use from a site to the end of the count [s], shape (n,).
         capacity_s: Most use [s].
@@ -79,9 +80,14 @@ def resources(instance: Instance, scope: Scope) -> tuple[Resource, Resource]:
     between_refuels[list(instance.pois)] = True
     away = np.ones(len(instance.sites), dtype=np.bool_)
     away[instance.base] = False
+    time = scope.time_s
+    if scope.charging.any():
+        i, j = np.nonzero(scope.legs & (scope.charging > 0)[None, :])
+        time = time.copy()
+        time[i, j] += scope.charging[j] * (scope.since_refuel_s[i] + scope.fuel_s[i, j])
     return (Resource(through=between_refuels, used_s=scope.fuel_s, least_s=scope.since_refuel_s,
                      onward_s=scope.to_refuel_s, capacity_s=scope.capacity_s),
-            Resource(through=away, used_s=scope.time_s, least_s=scope.since_start_s, onward_s=scope.to_end_s,
+            Resource(through=away, used_s=time, least_s=scope.since_start_s, onward_s=scope.to_end_s,
                      capacity_s=scope.limit_s))
 
 
@@ -112,12 +118,15 @@ def formulate(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> tuple[
     objective[:len(legs.vehicle)] = goal.weights[legs.vehicle, legs.destination]
     for m, scope in enumerate(scopes):
         mine = np.flatnonzero(legs.vehicle == m)
-        if goal.driving:
-            objective[mine] -= goal.driving * scope.time_s[legs.origin[mine], legs.destination[mine]]
-        _route_rows(build, instance, legs, mine, scope)
         flows = resources(instance, scope)
-        _flow_rows(build, legs, mine, legs.fuel_column, flows[0])
-        _flow_rows(build, legs, mine, legs.time_column, flows[1])
+        charges = _charges(legs, mine, scope)
+        if goal.driving:
+            objective[mine] -= goal.driving * flows[1].used_s[legs.origin[mine], legs.destination[mine]]
+            for column, each_s in charges.values():
+                objective[column] -= goal.driving * each_s
+        _route_rows(build, instance, legs, mine, flows[1], charges)
+        _flow_rows(build, legs, mine, legs.fuel_column, flows[0], {})
+        _flow_rows(build, legs, mine, legs.time_column, flows[1], charges)
     for poi in instance.pois:  # (5)
         entering = np.flatnonzero(legs.destination == poi)
         if len(entering):
@@ -147,7 +156,20 @@ def _legs(instance: Instance, scopes: Sequence[Scope]) -> Legs:
                 time_column=carried[1], number=number, columns=columns)
 
 
-def _route_rows(build: RowBuilder, instance: Instance, legs: Legs, mine: IntArray, scope: Scope) -> None:
+Charges = dict[int, tuple[int, float]]
+"""Column ``w`` for fuel, and charging time for each unit of it [s], of the legs to where charging takes time."""
+
+
+def _charges(legs: Legs, mine: IntArray, scope: Scope) -> Charges:
+    """The charging times of one vehicle, beside those of the least fuel of a leg."""
+    size = max(scope.capacity_s, 1.0)
+    return {int(k): (int(legs.fuel_column[k]), float(scope.charging[legs.destination[k]]) * size) for k in mine
+            if legs.fuel_column[k] >= 0 and scope.charging[legs.destination[k]] > 0}
+
+
+def _route_rows(
+    build: RowBuilder, instance: Instance, legs: Legs, mine: IntArray, clock: Resource, charges: Charges,
+) -> None:
     """(1), (2) and (14a) of one vehicle; a POI is visited only if the base is left."""
     origin, destination = legs.origin[mine], legs.destination[mine]
     out_of_base = mine[origin == instance.base]
@@ -164,12 +186,16 @@ def _route_rows(build: RowBuilder, instance: Instance, legs: Legs, mine: IntArra
             into = entering[legs.origin[entering] != instance.base]
             build.add(np.concatenate([others, into]), np.concatenate([np.ones(len(others)), -np.ones(len(into))]),
                       0.0, np.inf)
-    if np.isfinite(scope.limit_s) and len(mine):
-        size = max(scope.limit_s, 1.0)
-        build.add(mine, scope.time_s[origin, destination] / size, -np.inf, (scope.limit_s + SLACK_S) / size)
+    if np.isfinite(clock.capacity_s) and len(mine):
+        size = max(clock.capacity_s, 1.0)
+        build.add([*mine, *(column for column, _ in charges.values())],
+                  [*(clock.used_s[origin, destination] / size), *(each_s / size for _, each_s in charges.values())],
+                  -np.inf, (clock.capacity_s + SLACK_S) / size)
 
 
-def _flow_rows(build: RowBuilder, legs: Legs, mine: IntArray, column: IntArray, resource: Resource) -> None:
+def _flow_rows(
+    build: RowBuilder, legs: Legs, mine: IntArray, column: IntArray, resource: Resource, charges: Charges,
+) -> None:
     """What is used up on the way, in units of the capacity: conserved at a site, between its bounds on a leg."""
     if not np.isfinite(resource.capacity_s):
         return
@@ -193,6 +219,9 @@ def _flow_rows(build: RowBuilder, legs: Legs, mine: IntArray, column: IntArray, 
             if w >= 0:
                 columns.append(w)
                 values.append(-1.0)
+            if int(k) in charges:
+                columns.append(charges[int(k)][0])
+                values.append(-charges[int(k)][1] / size)
         build.add(columns, values, 0.0, 0.0)
 
 
@@ -209,7 +238,7 @@ def columns_of(instance: Instance, legs: Legs, scopes: Sequence[Scope], routes: 
     point = np.zeros(legs.columns)
     for m, route in enumerate(routes):
         flows = list(zip((legs.fuel_column, legs.time_column), resources(instance, scopes[m]), strict=True))
-        used = [0.0, 0.0]
+        used, excess = [0.0, 0.0], 0.0
         for i, j in itertools.pairwise(route):
             k = legs.number.get((m, i, j))
             if k is None:
@@ -217,7 +246,9 @@ def columns_of(instance: Instance, legs: Legs, scopes: Sequence[Scope], routes: 
             point[k] += 1
             for which, (column, resource) in enumerate(flows):
                 before = used[which] if resource.through[i] else 0.0
+                charge_s = float(scopes[m].charging[j]) * excess if which else 0.0  # of fuel above its least
+                excess = max(before - resource.least_s[i], 0.0)
                 if column[k] >= 0:
-                    point[column[k]] += max(before - resource.least_s[i], 0.0) / max(resource.capacity_s, 1.0)
-                used[which] = before + float(resource.used_s[i, j])
+                    point[column[k]] += excess / max(resource.capacity_s, 1.0)
+                used[which] = before + float(resource.used_s[i, j]) + charge_s
     return point

@@ -106,13 +106,13 @@ class EquivalentModel(DirectedModel):
 def legs_out_of_pois(
     model: DirectedModel, instance: Instance, scopes: Sequence[Scope],
 ) -> list[tuple[FloatArray, IntArray]]:
-    """Fuel [s] and column numbers of the legs out of each POI, for each vehicle and POI that has any."""
+    """Driving time [s] and column numbers of the legs out of each POI, for each vehicle and POI that has any."""
     legs, found = model.legs, []
     for m, scope in enumerate(scopes):
         for i in instance.pois:
             used = np.flatnonzero((legs.vehicle == m) & (legs.origin == i))
             if len(used):
-                found.append((scope.fuel_s[i, legs.destination[used]], used))
+                found.append((scope.driven_s[i, legs.destination[used]], used))
     return found
 
 

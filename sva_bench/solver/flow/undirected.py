@@ -36,7 +36,7 @@ class UndirectedModel:
         self._visit = np.full((len(scopes), n), -1)  # column s
         self._edge = np.full((len(scopes), n, n), -1)  # column x
         for m, scope in enumerate(scopes):
-            time = scope.fuel_s + half
+            time = scope.leg_time_s + half
             ends = np.argwhere(np.triu(scope.legs))
             reachable = [j for j in pois if scope.legs[j].any()]
             first = len(objective)
@@ -124,12 +124,12 @@ class UndirectedModel:
 
 
 def serves(instance: Instance, scopes: Sequence[Scope]) -> bool:
-    """Whether costs are symmetric for all vehicles and none can refuel: what the edge model requires."""
+    """Whether times are symmetric for all vehicles and none can refuel: what the edge model requires."""
     stations = list(instance.stations)
     return all(
         np.isfinite(scope.limit_s) and not np.isfinite(scope.capacity_s) and not scope.legs[stations].any()
         and np.array_equal(scope.legs, scope.legs.T)
-        and np.array_equal(scope.fuel_s[scope.legs], scope.fuel_s.T[scope.legs]) for scope in scopes)
+        and np.array_equal(scope.leg_time_s[scope.legs], scope.leg_time_s.T[scope.legs]) for scope in scopes)
 
 
 def _positive(columns: IntArray) -> IntArray:

@@ -16,10 +16,9 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.polling import poll, stop_flag
-from sva_bench.solver.preprocess import SLACK_S, shortest_paths
-
-FRONT = 12
-"""Most pairs of a front. Typical ones have two to four; a longer one loses its slowest pairs, and the search routes."""
+from sva_bench.solver.preprocess import SLACK_S, burnt_by_legs, can_run_dry, clock_of_legs, shortest_paths
+from sva_bench.solver.routes.charged_fronts import FRONT, charged_step, charged_step_back, charged_time_with
+from sva_bench.solver.routes.refuelling import charged
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,13 +28,18 @@ class LegTables:
     Attributes:
         vehicle_class: Class of each vehicle, shape (M,).
         base: The base.
-        fuel_s: Fuel of a leg [s], shape (classes, n, n).
-        time_s: Driving time of a leg and the stop at its end [s], shape (classes, n, n).
-        quickest_s: Least time from a site to another, directly or by stations [s], shape (classes, n, n).
+        fuel_s: Fuel of a leg and the stop at its end [s], shape (classes, n, n).
+        time_s: Time of a leg on the mission clock and the stop at its end [s], shape (classes, n, n).
+        quickest_s: Least time from a site to another, directly or by stations, from a full tank [s], shape (classes, n,
+            n).
+        driven_s: Driving time of that way, or about it where charging takes time [s], shape (classes, n, n).
         first: Where the chains of stations between two sites begin in ``hops``, shape (classes, n, n).
         last: Where they end, shape (classes, n, n).
-        hops: Chains of stations: fuel to the first station, time in all, fuel from the last one [s], shape (hops, 3).
-        capacity_s: Fuel capacity, half the feasibility tolerance included [s], shape (classes,).
+        hops: Chains of stations: fuel to the first station, time in all from a full tank, fuel from the last one [s],
+            shape (hops, 3); and time longer for each second of fuel burnt before, where charging takes any, shape
+            (hops, 4).
+        capacity_s: Fuel capacity, half the feasibility tolerance included [s], shape (classes,); ``inf`` where fuel
+            can't bind.
         limit_s: Mission limit, half the feasibility tolerance included [s], shape (classes,).
     """
 
@@ -44,6 +48,7 @@ class LegTables:
     fuel_s: FloatArray
     time_s: FloatArray
     quickest_s: FloatArray
+    driven_s: FloatArray
     first: IntArray
     last: IntArray
     hops: FloatArray
@@ -57,43 +62,72 @@ def leg_tables(instance: Instance) -> LegTables:
     vehicle_class = []
     for vehicle in instance.vehicles:
         same = [k for k, other in enumerate(classes) if other.fuel_capacity_s == vehicle.fuel_capacity_s
-                and other.mission_limit_s == vehicle.mission_limit_s and np.array_equal(other.fuel_s, vehicle.fuel_s)]
+                and other.mission_limit_s == vehicle.mission_limit_s and other.idle_share == vehicle.idle_share
+                and np.array_equal(other.fuel_s, vehicle.fuel_s)
+                and np.array_equal(other.leg_time_s, vehicle.leg_time_s)]
         vehicle_class.append(same[0] if same else len(classes))
         if not same:
             classes.append(vehicle)
     n, stations = len(instance.sites), np.array(instance.stations, dtype=np.int64)
     shape = (len(classes), n, n)
-    first, last, hops, offset = np.zeros(shape, np.int64), np.zeros(shape, np.int64), [np.zeros((0, 3))], 0
-    fuel, time, quickest = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    first, last, hops, offset = np.zeros(shape, np.int64), np.zeros(shape, np.int64), [np.zeros((0, 4))], 0
+    fuel, time, quickest, driven = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
     capacity = np.array([v.fuel_capacity_s for v in classes]) + SLACK_S
+    charging = instance.charging[stations]
     for k, vehicle in enumerate(classes):
-        fuel[k] = vehicle.fuel_s
-        time[k] = fuel[k] + instance.stop_s[None, :]
+        fuel[k], time[k] = burnt_by_legs(instance, vehicle), clock_of_legs(instance, vehicle)
         quickest[k] = np.where(fuel[k] <= capacity[k], time[k], np.inf)
-        if len(stations) and vehicle.fuel_capacity_s < vehicle.mission_limit_s:
-            chain = shortest_paths(quickest[k][np.ix_(stations, stations)], -1)
+        if not can_run_dry(instance, vehicle):
+            capacity[k] = np.inf
+        elif len(stations):
+            across = np.ix_(stations, stations)
+            chain = shortest_paths(charged(quickest[k][across], fuel[k][across], charging), -1)
             with deferring_ctrl_c():
                 found, first[k], last[k] = _station_chains(
-                    fuel[k], time[k], chain, stations, float(capacity[k]), quickest[k], stop_flag())
+                    fuel[k], time[k], chain, stations, charging, float(capacity[k]), quickest[k], stop_flag())
             first[k] += offset
             last[k] += offset
             offset += len(found)
             hops.append(found)
+        driven[k] = _driving_times(vehicle, stations, fuel[k], time[k], quickest[k], charging)
     return LegTables(
         vehicle_class=np.array(vehicle_class, dtype=np.int64), base=instance.base, fuel_s=fuel, time_s=time,
-        quickest_s=quickest,
-        first=first, last=last, hops=np.concatenate(hops), capacity_s=capacity,
+        quickest_s=quickest, driven_s=driven,
+        first=first, last=last, hops=np.concatenate(hops)[:, :4 if charging.any() else 3].copy(), capacity_s=capacity,
         limit_s=np.array([v.mission_limit_s for v in classes]) + SLACK_S)
 
 
+def _driving_times(
+    vehicle: Vehicle, stations: IntArray, fuel: FloatArray, time: FloatArray, quickest: FloatArray,
+    charging: FloatArray,
+) -> FloatArray:
+    """Driving time of the quickest way from a site to another [s], shape (n, n): what a search takes for it.
+
+    Where the mission clock runs by fuel, that is the time of the way but for the stop at its end; else driving time of
+    the way by which it is least.
+    """
+    if vehicle.time_s is None and not charging.any():
+        there = np.isfinite(time)
+        stop_s = np.where(there, time, 0.0) - np.where(there, vehicle.fuel_s, 0.0)
+        return np.asarray(quickest - stop_s.max(axis=0)[None, :])
+    legs = np.where(fuel <= vehicle.fuel_capacity_s + SLACK_S, vehicle.fuel_s, np.inf)
+    if not len(stations):
+        return legs
+    chain = shortest_paths(legs[np.ix_(stations, stations)], -1)
+    to_last = (legs[:, stations][:, :, None] + chain[None, :, :]).min(axis=1)
+    by_stations = np.array([(row[:, None] + legs[stations]).min(axis=0) for row in to_last])
+    return np.where(np.isfinite(legs), legs, by_stations)
+
+
 @njit(cache=True)
-def _station_chains(fuel, time, chain, stations, capacity, quickest, stop):
-    """The chains of stations that are nondominated in fuel, time and fuel, by increasing time; lowers ``quickest``."""
+def _station_chains(fuel, time, chain, stations, charging, capacity, quickest, stop):
+    """The chains of stations that are nondominated in fuel, time, fuel and charging of what was burnt before, by
+    increasing time; lowers ``quickest``."""
     n, count = len(fuel), len(stations)
     first, last = np.zeros((n, n), np.int64), np.zeros((n, n), np.int64)
-    found = np.empty((1024, 3))
+    found = np.empty((1024, 4))
     size = 0
-    candidates = np.empty((count * count, 3))
+    candidates = np.empty((count * count, 4))
     for a in range(n):
         for b in range(n):
             if poll(stop):  # with a thousand stations each pair of sites has a million chains
@@ -108,19 +142,21 @@ def _station_chains(fuel, time, chain, stations, capacity, quickest, stop):
                     if not np.isfinite(chain[k, l]):
                         continue
                     candidates[number, 0] = fuel[a, r]
-                    candidates[number, 1] = time[a, r] + chain[k, l] + time[s, b]
+                    candidates[number, 1] = time[a, r] + charging[k] * fuel[a, r] + chain[k, l] + time[s, b]
                     candidates[number, 2] = fuel[s, b]
+                    candidates[number, 3] = charging[k]
                     number += 1
             for x in np.argsort(candidates[:number, 1]):
                 dominated = False
                 for y in range(first[a, b], size):
-                    if found[y, 0] <= candidates[x, 0] and found[y, 2] <= candidates[x, 2]:
+                    if found[y, 0] <= candidates[x, 0] and found[y, 2] <= candidates[x, 2] \
+                            and found[y, 3] <= candidates[x, 3]:
                         dominated = True
                         break
                 if dominated:
                     continue
                 if size == len(found):
-                    larger = np.empty((2 * size, 3))
+                    larger = np.empty((2 * size, 4))
                     larger[:size] = found
                     found = larger
                 found[size] = candidates[x]
@@ -199,11 +235,17 @@ def route_time(order, length, base, fuel, time, first, last, hops, capacity, lim
         return 0.0
     here, count, turn = base, 1, 0
     scratch[0, 0] = scratch[1, 0] = 0.0
+    charged = hops.shape[1] > 3
     for k in range(length + 1):
         there = base if k == length else order[k]
-        count = step(scratch[2 * turn], scratch[2 * turn + 1], count, time[here, there], fuel[here, there], hops,
-                     first[here, there], last[here, there], 0, 2, capacity, limit,
-                     scratch[2 - 2 * turn], scratch[3 - 2 * turn])
+        if charged:
+            count = charged_step(scratch[2 * turn], scratch[2 * turn + 1], count, time[here, there], fuel[here, there],
+                                 hops, first[here, there], last[here, there], capacity, limit, scratch[2 - 2 * turn],
+                                 scratch[3 - 2 * turn])
+        else:
+            count = step(scratch[2 * turn], scratch[2 * turn + 1], count, time[here, there], fuel[here, there], hops,
+                         first[here, there], last[here, there], 0, 2, capacity, limit,
+                         scratch[2 - 2 * turn], scratch[3 - 2 * turn])
         if count == 0:
             return np.inf
         turn = 1 - turn
@@ -215,9 +257,10 @@ def route_time(order, length, base, fuel, time, first, last, hops, capacity, lim
 def fronts(order, length, base, fuel, time, first, last, hops, capacity, limit, ahead, ahead_size, behind, behind_size):
     """Both fronts at every stop of a route, base first and base last; its least time, ``inf`` = infeasible.
 
-    ``ahead`` and ``behind``: shape (stops, 2, FRONT); their sizes: shape (stops,).
+    ``ahead``: shape (stops, 2, FRONT); ``behind``: shape (stops, 3, FRONT); their sizes: shape (stops,).
     """
     stops = length + 2
+    charged = hops.shape[1] > 3
     ahead[0, :, 0] = 0.0
     ahead_size[0] = 1
     for k in range(1, stops):
@@ -226,6 +269,9 @@ def fronts(order, length, base, fuel, time, first, last, hops, capacity, limit, 
         if length == 0:
             ahead[1, :, 0] = 0.0
             ahead_size[1] = 1
+        elif charged:
+            ahead_size[k] = charged_step(ahead[k - 1, 0], ahead[k - 1, 1], ahead_size[k - 1], time[a, b], fuel[a, b],
+                                         hops, first[a, b], last[a, b], capacity, limit, ahead[k, 0], ahead[k, 1])
         else:
             ahead_size[k] = step(ahead[k - 1, 0], ahead[k - 1, 1], ahead_size[k - 1], time[a, b], fuel[a, b], hops,
                                  first[a, b], last[a, b], 0, 2, capacity, limit, ahead[k, 0], ahead[k, 1])
@@ -239,6 +285,9 @@ def fronts(order, length, base, fuel, time, first, last, hops, capacity, limit, 
         if length == 0:
             behind[0, :, 0] = 0.0
             behind_size[0] = 1
+        elif charged:
+            behind_size[k] = charged_step_back(behind[k + 1], behind_size[k + 1], time[a, b], fuel[a, b], hops,
+                                               first[a, b], last[a, b], capacity, limit, behind[k])
         else:
             behind_size[k] = step(behind[k + 1, 0], behind[k + 1, 1], behind_size[k + 1], time[a, b], fuel[a, b], hops,
                                   first[a, b], last[a, b], 2, 0, capacity, limit, behind[k, 0], behind[k, 1])
@@ -252,8 +301,11 @@ def time_with(poi, a, b, fuel, time, first, last, hops, capacity, limit, ahead, 
               scratch):
     """Least time of the route with one more POI between stops a and b; ``inf`` = infeasible.
 
-    ``ahead`` is the front at a, ``behind`` the one at b, both of shape (2, FRONT).
+    ``ahead`` is the front at a, of shape (2, FRONT), ``behind`` the one at b, of shape (3, FRONT).
     """
+    if hops.shape[1] > 3:
+        return charged_time_with(poi, a, b, fuel, time, first, last, hops, capacity, limit, ahead, ahead_size, behind,
+                                 behind_size, scratch)
     count = step(ahead[0], ahead[1], ahead_size, time[a, poi], fuel[a, poi], hops, first[a, poi], last[a, poi], 0, 2,
                  capacity, limit, scratch[0], scratch[1])
     best = np.inf

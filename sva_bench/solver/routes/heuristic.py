@@ -15,7 +15,8 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.solver.discounts import Discounts
 from sva_bench.solver.polling import stop_flag
-from sva_bench.solver.routes.fronts import FRONT, LegTables
+from sva_bench.solver.routes.charged_fronts import FRONT
+from sva_bench.solver.routes.fronts import LegTables
 from sva_bench.solver.routes.local_search import improve_order
 from sva_bench.solver.routes.packing import Route, best_packing
 from sva_bench.solver.routes.ruin_recreate import rounds as run_rounds

@@ -10,7 +10,8 @@ import numpy as np
 from numba import njit
 
 from sva_bench.solver.polling import poll
-from sva_bench.solver.routes.fronts import FRONT, fronts, route_time, time_with
+from sva_bench.solver.routes.charged_fronts import FRONT
+from sva_bench.solver.routes.fronts import fronts, route_time, time_with
 from sva_bench.solver.routes.local_search import improve_order, route_value
 
 _RUIN = 0.6  # greatest share of the visits removed
@@ -55,7 +56,7 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
     allowed = np.zeros((vehicles, n), np.bool_)
     factor = np.ones((vehicles, n))
     ahead, ahead_size = np.zeros((vehicles, n + 2, 2, FRONT)), np.zeros((vehicles, n + 2), np.int64)
-    behind, behind_size = np.zeros((vehicles, n + 2, 2, FRONT)), np.zeros((vehicles, n + 2), np.int64)
+    behind, behind_size = np.zeros((vehicles, n + 2, 3, FRONT)), np.zeros((vehicles, n + 2), np.int64)
     score, place = np.zeros((vehicles, n)), np.zeros((vehicles, n), np.int64)
     least, reward, total = np.zeros((vehicles, n)), np.zeros((vehicles, n)), np.zeros(vehicles)
     scratch, spare, removed = np.zeros((4, FRONT)), np.zeros(n, np.int64), np.zeros(n, np.bool_)
@@ -209,7 +210,7 @@ def _recreate(orders, lengths, visited, allowed, power, factor, vehicle_class, b
             if stale >= 0 and m != stale:
                 continue
             k = vehicle_class[m]
-            free = capacity[k] >= limit[k]
+            free = np.isinf(capacity[k])
             if free:
                 total[m] = route_time(orders[m], lengths[m], base, fuel[k], time[k], first[k], last[k], hops,
                                       capacity[k], limit[k], scratch)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from sva_bench.solver.discounts import Discount
 from sva_bench.solver.preprocess import SLACK_S
-from sva_bench.solver.routes.refuelling import Passage, VehicleLegs, quickest_route
+from sva_bench.solver.routes.refuelling import Passage, VehicleLegs, charged_leg, quickest_route
 
 
 class ValuedRoute(NamedTuple):
@@ -82,7 +82,7 @@ def value_on(
         return math.fsum(reward[j] for j in route if j in reward)
     parts, driven_s, visits = [-discount.departure], 0.0, 0
     for i, j in itertools.pairwise(route):
-        driven_s += own_legs.fuel_s[i][j]
+        driven_s += own_legs.driven_s[i][j]
         if j in reward:
             visits += 1
             parts.append(discount.chance(visits, driven_s) * reward[j])
@@ -101,7 +101,7 @@ def way_home(own_legs: VehicleLegs, site: int, burnt_s: float, left_s: float) ->
         left_s: Time left [s].
     """
     ways = [way for way in _ways(own_legs, site, own_legs.base)
-            if burnt_s + way.fuel_s <= own_legs.capacity_s and way.time_s <= left_s + SLACK_S]
+            if burnt_s + way.fuel_s <= own_legs.capacity_s and way.time_s + way.charging * burnt_s <= left_s + SLACK_S]
     if not ways:
         return None
     best = min(ways, key=lambda way: (way.driven_s, way.time_s))
@@ -118,7 +118,7 @@ def _most_valuable(
         reached = []
         for label in front:
             for way in _ways(own_legs, here, there):
-                time_s = label.time_s + way.time_s
+                time_s = label.time_s + way.time_s + way.charging * label.burnt_s
                 if label.burnt_s + way.fuel_s <= own_legs.capacity_s and time_s <= own_legs.limit_s:
                     burnt_s = way.burnt_s if way.stations else label.burnt_s + way.burnt_s
                     survival = label.survival * kept * math.exp(-discount.rate * way.driven_s)
@@ -141,8 +141,8 @@ def _ways(own_legs: VehicleLegs, here: int, there: int) -> list[Passage]:
     """The direct leg, and the chains of stations, nondominated in time, driving time, and fuel at both ends."""
     if (here, there) in own_legs.passages:
         return own_legs.passages[here, there]
-    fuel, time = own_legs.fuel_s, own_legs.time_s
-    found = [Passage(time[here][there], fuel[here][there], fuel[here][there], fuel[here][there], ())]
+    fuel, time, driven = own_legs.fuel_s, own_legs.time_s, own_legs.driven_s
+    found = [Passage(time[here][there], driven[here][there], fuel[here][there], fuel[here][there], 0.0, ())]
     for k, first in enumerate(own_legs.stations):
         # A vehicle that sets off from a station doesn't go there first.
         if first == here or not fuel[here][first] <= own_legs.capacity_s:
@@ -150,14 +150,14 @@ def _ways(own_legs: VehicleLegs, here: int, there: int) -> list[Passage]:
         for last, chains in _station_chains(own_legs, k).items():
             if fuel[own_legs.stations[last]][there] <= own_legs.capacity_s:
                 end = own_legs.stations[last]
-                found += [Passage(time[here][first] + chain_s + time[end][there],
-                                  fuel[here][first] + driven_s + fuel[end][there], fuel[here][first],
-                                  fuel[end][there], tuple(own_legs.stations[i] for i in chain))
+                found += [Passage(charged_leg(own_legs, here, k) + chain_s + time[end][there],
+                                  driven[here][first] + driven_s + driven[end][there], fuel[here][first],
+                                  fuel[end][there], own_legs.charging[k], tuple(own_legs.stations[i] for i in chain))
                           for chain_s, driven_s, chain in chains]
     kept: list[Passage] = []
     for way in sorted(way for way in found if math.isfinite(way.time_s)):
         if not any(other.driven_s <= way.driven_s and other.fuel_s <= way.fuel_s and other.burnt_s <= way.burnt_s
-                   and (other.stations or not way.stations) for other in kept):
+                   and other.charging <= way.charging and (other.stations or not way.stations) for other in kept):
             kept.append(way)
     own_legs.passages[here, there] = kept
     return kept
@@ -177,7 +177,7 @@ def _station_chains(own_legs: VehicleLegs, first: int) -> dict[int, list[tuple[f
         known.append((time_s, driven_s, chain))
         for k, there in enumerate(own_legs.stations):
             if k not in chain and own_legs.fuel_s[here][there] <= own_legs.capacity_s:
-                heapq.heappush(waiting, (time_s + own_legs.time_s[here][there],
-                                         driven_s + own_legs.fuel_s[here][there], (*chain, k)))
+                heapq.heappush(waiting, (time_s + own_legs.hop_s[chain[-1]][k],
+                                         driven_s + own_legs.driven_s[here][there], (*chain, k)))
     own_legs.chains[first] = found
     return found

@@ -67,8 +67,6 @@ def worth_of(tables: LegTables, weights: FloatArray, discounts: Discounts | None
     for m in range(vehicles):
         k, discount = tables.vehicle_class[m], discounts.of(m)
         discounted[m] = not discount.is_plain
-        there = np.isfinite(tables.time_s[k])
-        stop_s = np.where(there, tables.time_s[k], 0.0) - np.where(there, tables.fuel_s[k], 0.0)
-        survival[m] = leg_survival(tables.quickest_s[k] - stop_s.max(axis=0)[None, :], visited, discount)
+        survival[m] = leg_survival(tables.driven_s[k], visited, discount)
     return Worth(base=tables.base, weights=weights, discounted=discounted, survival=survival,
                  departure=discounts.departure, home=discounts.home)
