@@ -193,7 +193,8 @@ def orders_of(world: World, case: Case, planned: PlannedLegs) -> list[Assignment
 
 def _orders(world: World, robot: Robot, route: Route, planned_s: tuple[float, ...]) -> Assignment:
     return Assignment(
-        loss_cost=robot.loss_cost, planned_s=planned_s,
+        loss_cost=robot.loss_cost, planned_s=planned_s, idle_share=robot.idle_share,
+        charge_rate={s.name: s.charge_rate for s in world.stations if s.charge_rate is not None},
         robot=robot.name, route=route, stations=frozenset(s.name for s in world.stations),
         incentives=robot.incentives, stop_s={s.name: s.stop_s for s in world.sites},
         fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s)

@@ -26,6 +26,8 @@ class Site:
         x_m, y_m: Its place [m].
         heading_rad: Heading in which a robot stops there [rad].
         stop_s: Duration of a stop [s].
+        charge_rate: Seconds of driving that a second at a station fills into the tank, on top of ``stop_s``; ``None`` =
+            filling takes no time of its own.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Site:
     y_m: float
     heading_rad: float
     stop_s: float = 0.0
+    charge_rate: float | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,6 +52,7 @@ class Robot:
         incentives: Incentive of its visit to each POI, by name.
         mtbf_s: Default of its mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and limit.
         loss_cost: Cost if it leaves the base and doesn't come home [incentive].
+        idle_share: Share of the fuel of driving that it burns while it stands.
     """
 
     name: str
@@ -59,6 +63,7 @@ class Robot:
     incentives: Mapping[str, float]
     mtbf_s: float | None = None
     loss_cost: float = 0.0
+    idle_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

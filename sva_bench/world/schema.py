@@ -18,6 +18,7 @@ from sva_bench.world.places import APART_M
 KIND = "sva-bench/world@1"
 Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
 Size = Annotated[Positive, Field(ge=1e-6, le=1e5)]  # smaller sizes are lost in physics
+ChargeRate = Annotated[Positive, Field(ge=1e-3, le=1e6)]
 Angle = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Seed = Annotated[NonNegativeInt, Field(le=MOST_SEED)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
@@ -105,11 +106,16 @@ class SiteEntry(Section):
     stop_s: Bounded = 0.0
 
 
+class StationEntry(SiteEntry):
+    charge_rate: ChargeRate | None = None
+
+
 class SpreadStations(Section):
     """Stations placed automatically, as far apart as possible."""
 
     spread: Annotated[NonNegativeInt, Field(ge=1, le=100)]
     stop_s: Bounded = 0.0
+    charge_rate: ChargeRate | None = None
 
 
 class RandomPois(Section):
@@ -131,7 +137,7 @@ def _how_placed(data: object) -> str:
 class Sites(Section):
     base: SiteEntry
     stations: Annotated[
-        Annotated[dict[Name, SiteEntry], Tag("[named]")] | Annotated[SpreadStations, Tag("[placed]")],
+        Annotated[dict[Name, StationEntry], Tag("[named]")] | Annotated[SpreadStations, Tag("[placed]")],
         Discriminator(_how_placed), _EMPTY_IS_NONE] = Field(default_factory=dict)
     pois: Annotated[
         Annotated[dict[Name, SiteEntry], Tag("[named]")] | Annotated[RandomPois, Tag("[placed]")],
@@ -177,6 +183,7 @@ class RobotEntry(Section):
     availability: Probability | None = None
     mtbf_s: MeanTime | None = None
     loss_cost: Bounded = 0.0
+    idle_share: Probability = 0.0
     incentives: dict[Name, Bounded] | Drawn
 
 
