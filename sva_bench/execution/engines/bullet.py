@@ -12,11 +12,12 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Self
 
+from sva_bench.execution.engines.bodies import CASTER_GAP_M, RoundBody, obstacles_urdf, round_body
 from sva_bench.execution.noise import Disturbance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.robot.follower import CONTROL_HZ
-from sva_bench.robot.model import CASTERS_AT, RobotModel
+from sva_bench.robot.model import RobotModel
 
 
 @contextlib.contextmanager
@@ -50,9 +51,6 @@ _WHEEL_RAD_S, _WHEEL_RAD_S2 = 5.0, 7.0  # slower or more slowly accelerated whee
 _FAST_RAD_S = 30.0  # wheels that turn faster don't bear 60 Hz: up to 1.5 % of a leg's time
 _CONTACT_STEPS = 3  # control steps from one look at contacts to the next: 50 ms
 _DISTANCE = 8  # where a contact point of PyBullet has its distance
-_WALL_M = 0.2  # thickness of the walls about the bounds; nothing is seen of it
-_HEIGHT_M = 0.5  # of all obstacles; taller than any robot's hull
-_CASTER_GAP_M = 0.001  # casters touch the floor only when the hull tilts, so the weight rests on the driven wheels
 _WHEEL_FRICTION = 1.0  # rubber on a hard floor
 _USUAL_RAD_S = 100.0  # to which PyBullet holds joints, unless told otherwise: small wheels of a fast robot turn faster
 _MOTOR_G = 3.0  # motor torque, in multiples of what accelerates the robot as its limits allow
@@ -125,7 +123,7 @@ class Bullet:
             0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client),
             physicsClientId=self._client)
         # Casters that hover over the floor are no contacts to solve for: they'd take a sixth of the time.
-        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=_CASTER_GAP_M / 2,
+        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=CASTER_GAP_M / 2,
                                 physicsClientId=self._client)
         # One compound body for all obstacles: its own tree finds the few that are near. Only a URDF may hold more
         # than 16 shapes: createCollisionShapeArray drops the others without a word.
@@ -137,25 +135,7 @@ class Bullet:
 
     def _build_robot(self, pose: tuple[float, float, float]) -> int:
         model, client = self._model, self._client
-        wheel, hull = model.wheel_radius_m, 1.5 * model.wheel_radius_m
-        caster = wheel / 2
-        reach = CASTERS_AT * model.radius_m
-        base = pybullet.createCollisionShapeArray(
-            shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_SPHERE, pybullet.GEOM_SPHERE],
-            radii=[model.radius_m, caster, caster], lengths=[2 * hull, 0, 0], halfExtents=[[0, 0, 0]] * 3,
-            collisionFramePositions=[[0, 0, hull - wheel / 2], [reach, 0, _CASTER_GAP_M - caster],
-                                     [-reach, 0, _CASTER_GAP_M - caster]],
-            collisionFrameOrientations=[[0, 0, 0, 1]] * 3, physicsClientId=client)
-        # Spheres roll on one point: the speed is right to 0.1 %, where cylinder wheels are 2.4 % off and drift.
-        tyre = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel, physicsClientId=client)
-        body: int = pybullet.createMultiBody(
-            baseMass=0.9 * model.mass_kg, baseCollisionShapeIndex=base, basePosition=[pose[0], pose[1], wheel],
-            baseOrientation=_upright(pose[2]), linkMasses=[0.05 * model.mass_kg] * 2,
-            linkCollisionShapeIndices=[tyre, tyre], linkVisualShapeIndices=[-1, -1],
-            linkPositions=[[0, model.track_m / 2, 0], [0, -model.track_m / 2, 0]],
-            linkOrientations=[[0, 0, 0, 1]] * 2, linkInertialFramePositions=[[0, 0, 0]] * 2,
-            linkInertialFrameOrientations=[[0, 0, 0, 1]] * 2, linkParentIndices=[0, 0],
-            linkJointTypes=[pybullet.JOINT_REVOLUTE] * 2, linkJointAxis=[[0, 1, 0]] * 2, physicsClientId=client)
+        body = _create_round(round_body(model), pose, client)
         smooth = {"linearDamping": 0.0, "angularDamping": 0.0, "physicsClientId": client}
         pybullet.changeDynamics(body, -1, lateralFriction=0.0, **smooth)  # casters and hull slide
         for link in (0, 1):
@@ -192,20 +172,22 @@ def _accuracy(model: RobotModel) -> dict[str, float]:
             "deterministicOverlappingPairs": 1}
 
 
-def obstacles_urdf(obstacles: Obstacles) -> str:
-    """All obstacles, and the walls about the bounds, as one link of a URDF."""
-    solids = [(x, y, yaw, f'<box size="{2 * a!r} {2 * b!r} {_HEIGHT_M}"/>')
-              for x, y, a, b, yaw in obstacles.walled(_WALL_M).boxes.tolist()]
-    solids += [(x, y, 0.0, f'<cylinder radius="{r!r}" length="{_HEIGHT_M}"/>')
-               for x, y, r in obstacles.cylinders.tolist()]
-    # A solid a line: the reader cuts longer ones.
-    shapes = "\n".join(
-        f'<collision><origin xyz="{x!r} {y!r} {_HEIGHT_M / 2}" rpy="0 0 {yaw!r}"/>'
-        f"<geometry>{shape}</geometry></collision>"
-        for x, y, yaw, shape in solids)
-    nothing = '<mass value="0"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>'
-    link = f'<link name="obstacles">\n<inertial>{nothing}</inertial>\n{shapes}\n</link>'
-    return f'<robot name="obstacles">\n{link}\n</robot>\n'
+def _create_round(parts: RoundBody, pose: tuple[float, float, float], client: int) -> int:
+    base = pybullet.createCollisionShapeArray(
+        shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_SPHERE, pybullet.GEOM_SPHERE],
+        radii=list(parts.radii_m), lengths=[parts.hull_m, 0, 0], halfExtents=[[0, 0, 0]] * 3,
+        collisionFramePositions=[list(at) for at in parts.at_m],
+        collisionFrameOrientations=[[0, 0, 0, 1]] * 3, physicsClientId=client)
+    tyre = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=parts.wheel_radius_m, physicsClientId=client)
+    body: int = pybullet.createMultiBody(
+        baseMass=parts.base_kg, baseCollisionShapeIndex=base, basePosition=[pose[0], pose[1], parts.wheel_radius_m],
+        baseOrientation=_upright(pose[2]), linkMasses=[parts.wheel_kg] * 2,
+        linkCollisionShapeIndices=[tyre, tyre], linkVisualShapeIndices=[-1, -1],
+        linkPositions=[[0, parts.track_m / 2, 0], [0, -parts.track_m / 2, 0]],
+        linkOrientations=[[0, 0, 0, 1]] * 2, linkInertialFramePositions=[[0, 0, 0]] * 2,
+        linkInertialFrameOrientations=[[0, 0, 0, 1]] * 2, linkParentIndices=[0, 0],
+        linkJointTypes=[pybullet.JOINT_REVOLUTE] * 2, linkJointAxis=[[0, 1, 0]] * 2, physicsClientId=client)
+    return body
 
 
 def _upright(yaw: float) -> tuple[float, float, float, float]:
