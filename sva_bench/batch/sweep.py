@@ -333,7 +333,7 @@ def _effective(world: World, options: Options) -> tuple[int, str]:
 def _sharing(world: World, from_file: dict[str, World]) -> World:
     """The world, sharing equal obstacles and map files with earlier ones, so that thousands fit in memory."""
     source = world.map_source
-    first = from_file.setdefault(digest(world.obstacles, None if source is None else source.digests()), world)
+    first = from_file.setdefault(digest(world.obstacles, world.digests()), world)
     if source is not None and first.map_source is not None:
         source = replace(source, files=first.map_source.files)
     return replace(world, obstacles=first.obstacles, map_source=source)

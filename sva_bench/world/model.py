@@ -36,6 +36,19 @@ class Site:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class UrdfSource:
+    """The origin of a robot that is described in URDF.
+
+    Attributes:
+        section: The content of its ``model`` in the world file, with defaults.
+        file: The URDF, as read.
+    """
+
+    section: Mapping[str, str | float]
+    file: MapFile
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Robot:
     """One robot of a mission.
 
@@ -48,6 +61,7 @@ class Robot:
         incentives: Incentive of its visit to each POI, by name.
         mtbf_s: Default of its mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and limit.
         loss_cost: Cost if it leaves the base and doesn't come home [incentive].
+        urdf: Origin of its model; ``None`` if that is known by its figures.
     """
 
     name: str
@@ -58,6 +72,7 @@ class Robot:
     incentives: Mapping[str, float]
     mtbf_s: float | None = None
     loss_cost: float = 0.0
+    urdf: UrdfSource | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -133,10 +148,6 @@ class MapSource:
     section: Mapping[str, Mapping[str, str | float]]
     files: tuple[MapFile, ...]
 
-    def digests(self) -> dict[str, str]:
-        """SHA-256 of each file, by name: results depend on them besides the world file."""
-        return {file.name: hashlib.sha256(file.content).hexdigest() for file in self.files}
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class World:
@@ -171,6 +182,17 @@ class World:
     def __repr__(self) -> str:
         counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))
         return f"World({self.name}: {', '.join(counted(len(c), what) for c, what in counts)})"
+
+    @property
+    def files(self) -> tuple[MapFile, ...]:
+        """The files that it names, each once: of its map, and of its robots."""
+        named = [] if self.map_source is None else list(self.map_source.files)
+        named += [robot.urdf.file for robot in self.robots if robot.urdf is not None]
+        return tuple({file.name: file for file in named}.values())
+
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of each of these files, by name: results depend on them besides the world file."""
+        return {file.name: hashlib.sha256(file.content).hexdigest() for file in self.files}
 
     @property
     def stations(self) -> tuple[Site, ...]:
