@@ -324,7 +324,7 @@ def _effective(world: World, options: Options) -> tuple[int, str]:
 
     Availabilities under ``robots:`` are those of scenarios that don't say otherwise, and of nothing else.
     """
-    robots = [replace(robot, availability=1.0) for robot in world.robots]
+    robots = [replace(robot, availability=1.0, urdf=None) for robot in world.robots]  # its model says all of a URDF
     return id(world.obstacles), digest(world.name, world.sites, robots, world.scenarios, world.plan_failure,
                                        world.execute_failure, world.margin, world.noise,
                                        reactions_of(world, options))

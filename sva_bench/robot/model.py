@@ -153,7 +153,10 @@ class RobotModel:
 
 
 BUILT_IN = {
-    # Kobuki base: hull and wheels from its data sheet; accelerations as its navigation stack limits them.
+    # Kobuki: track as its driver has it, hull of 351.5 mm (user guide), speeds just below its limits; 6.3 kg with a
+    # laptop on top and the accelerations of its velocity smoother are judgement. Its driver documents wheels of 35 mm;
+    # 38 mm were taken once, and stay: wheels are commanded by their speed on the floor, so legs take the same time to
+    # 0.3 % (measured), and every figure stored or shipped would move.
     "turtlebot2": RobotModel(
         name="turtlebot2", radius_m=0.177, wheel_radius_m=0.038, track_m=0.23, mass_kg=6.3, max_speed_m_s=0.65,
         max_turn_rad_s=1.9, acceleration_m_s2=0.8, turn_acceleration_rad_s2=3.0),
@@ -164,6 +167,22 @@ BUILT_IN = {
     "turtlebot3_waffle": RobotModel(
         name="turtlebot3_waffle", radius_m=0.22, wheel_radius_m=0.033, track_m=0.287, mass_kg=1.8, max_speed_m_s=0.26,
         max_turn_rad_s=1.82, acceleration_m_s2=0.8, turn_acceleration_rad_s2=3.0),
+    # iRobot's create3_sim: wheels, track, accelerations, turn rate and the speed with safety on of its control.yaml;
+    # mass of body and bumper of its URDF. The radius is judgement: the body's 0.164 m and the bumper about it.
+    "create3": RobotModel(
+        name="create3", radius_m=0.171, wheel_radius_m=0.03575, track_m=0.233, mass_kg=2.4, max_speed_m_s=0.306,
+        max_turn_rad_s=1.9, acceleration_m_s2=0.9, turn_acceleration_rad_s2=7.725),
+    # Clearpath's jackal_description: wheels, track, mass of chassis and wheels; turn rate of jackal_control; radius
+    # half the diagonal of 508 x 430 mm (data sheet). Speed and accelerations are judgement: it is said to reach 2 m/s,
+    # but a path is followed at no more than 1 m/s with the accelerations that two wheels have the grip for.
+    "jackal": RobotModel(
+        name="jackal", radius_m=0.333, wheel_radius_m=0.098, track_m=0.37559, mass_kg=18.431, max_speed_m_s=1.0,
+        max_turn_rad_s=4.0, acceleration_m_s2=1.0, turn_acceleration_rad_s2=4.8),
+    # Clearpath's husky_description and husky_control, likewise; radius half the diagonal of 990 x 670 mm (data sheet).
+    # Speed and accelerations are judgement, for the same reason: its data sheet says 1 m/s.
+    "husky": RobotModel(
+        name="husky", radius_m=0.598, wheel_radius_m=0.1651, track_m=0.5708, mass_kg=56.582, max_speed_m_s=0.7,
+        max_turn_rad_s=2.0, acceleration_m_s2=0.5, turn_acceleration_rad_s2=2.4),
 }
 
 USUAL_MODEL = "turtlebot2"

@@ -18,7 +18,7 @@ _ASKEW = 0.17  # greatest sine between the axle and the y axis of the root: 10 d
 _SUNK = 0.15  # of the wheel radius: how far a caster may reach below the wheels
 _TILT = math.tan(math.radians(2.0))  # how far the robot may tilt until it stands on something
 _RIM = 64  # points of a cylinder's rim to look at
-_COMPACT = 0.07, 2.0  # least and greatest radius of gyration of the hull, in distances of its farthest point
+_COMPACT = 0.07, 2.0  # least and greatest radius of gyration of the hull, in half diagonals of all solids
 
 
 Frames = dict[str, tuple[FloatArray, FloatArray]]
@@ -116,7 +116,7 @@ def derive(urdf: Urdf, left: str, right: str) -> Derived:
     if mass <= 0:
         raise about(urdf.file, root.line, f"link {root.name}", "nothing but the wheels has a mass; give the hull one")
     points = np.concatenate([solid.points() for solid in solids])
-    _refuse_odd_inertia(urdf, mass, centre, inertia, points)
+    _refuse_odd_inertia(urdf, mass, inertia, points)
     body = OwnBody(
         solids=tuple(Solid(kind=s.shape.kind, size_m=s.shape.size_m, at_m=_rounded(s.at_m),
                            rpy_rad=_rounded(rpy_of(s.turned))) for s in solids),
@@ -267,17 +267,17 @@ def _supports(solids: Sequence[FloatArray], wheel_radius_m: float) -> tuple[floa
     return float(near.max(initial=0.0)), float(-near.min(initial=0.0))
 
 
-def _refuse_odd_inertia(urdf: Urdf, mass: float, centre: FloatArray, inertia: FloatArray, points: FloatArray) -> None:
+def _refuse_odd_inertia(urdf: Urdf, mass: float, inertia: FloatArray, points: FloatArray) -> None:
     """Refuse inertia that no mass within the hull has: physics would shake, or hardly turn."""
     root = urdf.links[urdf.root]
-    farthest = float(np.linalg.norm(points - centre, axis=1).max())
+    farthest = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0))) / 2
     for moment in np.linalg.eigvalsh(inertia).tolist():
         gyration = math.sqrt(moment / mass)
         if not _COMPACT[0] * farthest <= gyration <= _COMPACT[1] * farthest:
             raise about(urdf.file, root.line, f"link {root.name}",
                         f"with all that is fixed to it, it has an inertia of {moment:.3g} kg m2 about one axis, as if "
-                        f"its {mass:.3g} kg were {gyration:.3g} m away from it; its shapes reach {farthest:.3g} m. "
-                        "Check the inertias, and their unit: kg m2")
+                        f"its {mass:.3g} kg were {gyration:.3g} m away from it; its shapes reach {farthest:.3g} m "
+                        "from their middle. Check the inertias, and their unit: kg m2")
 
 
 def _refuse_unstable(urdf: Urdf, body: OwnBody, track_m: float, wheel_radius_m: float) -> None:
