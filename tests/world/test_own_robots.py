@@ -322,7 +322,8 @@ def test_several_models_in_one_world_are_checked_drawn_and_swept(example: Path) 
     refused = sva_bench("world", "draw", "world.yaml", "-o", "trolley.urdf", cwd=example)
     assert refused.returncode == 2
     swept = sva_bench("batch", "world.yaml", "--trials", 10, "--rollouts", 2, "--out", "b",
-                      "--workers", 2, "--set", "robots.trolley.model.max_speed_m_s=0.4,0.5", cwd=example)
+                      "--workers", 2, "--set", "robots.trolley.model.max_speed_m_s=0.4,0.5",
+                      "--policy", "resolve", cwd=example)
     assert swept.returncode == 0, swept.stderr
     assert len(list((example / "b").glob("*/trolley.urdf"))) == 1
 
