@@ -14,6 +14,8 @@ FailureProcess = Literal["mission", "per_leg", "hazard"]
 MapMode = Literal["trinary", "scale", "raw"]
 Unknown = Literal["occupied", "free"]
 """What cells of a map count as that are neither occupied nor free."""
+SolidKind = Literal["box", "cylinder", "sphere"]
+"""The shapes that a robot's own body may be of."""
 WorldFamily = Literal["rooms", "field", "aisles", "maze"]
 InstanceFamily = Literal["A", "B", "C"]
 

@@ -51,9 +51,8 @@ class Point:
 
     def entry(self) -> PointEntry:
         """Its entry in the manifest."""
-        source = self.world.map_source
         return PointEntry(variant=self.variant, planner=self.planner, world=world_as_dict(self.world),
-                          files=None if source is None else source.digests())
+                          files=self.world.digests() or None)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,10 +82,9 @@ class Grid:
                              unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points})
 
     def map_files(self) -> dict[str, bytes]:
-        """The files behind worlds of maps, by their names within the batch folder; equal ones once."""
-        sources = [point.world.map_source for point in self.points if point.world.map_source is not None]
-        return {f"{_map_folder(source.digests())}/{file.name}": file.content
-                for source in sources for file in source.files}
+        """The files that worlds name, by their names within the batch folder; equal ones once."""
+        return {f"{_map_folder(point.world.digests())}/{file.name}": file.content
+                for point in self.points for file in point.world.files}
 
     def strands(self) -> Iterator[tuple[Point, int]]:
         """Every point with every seed."""

@@ -47,7 +47,8 @@ class ReactionsJob:
         world, options = self.world, self.options
         plans = [(case.scenario.name, case.planner, case.plan.routes, case.plan.value, case.plan.bound,
                   case.plan.status) for case in self.cases]
-        return digest(self.kind, world.obstacles, world.sites, world.robots, world.scenarios, world.execute_failure,
+        robots = [replace(robot, urdf=None) for robot in world.robots]  # its model says all of a URDF
+        return digest(self.kind, world.obstacles, world.sites, robots, world.scenarios, world.execute_failure,
                       world.noise, world.passages, self.costs, self.instances, plans, settings_of(world, options),
                       reactions_of(world, options), options.anticipate, options.limits)
 

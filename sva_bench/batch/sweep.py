@@ -327,7 +327,7 @@ def _effective(world: World, options: Options) -> tuple[int, str]:
 
     Availabilities under ``robots:`` are those of scenarios that don't say otherwise, and of nothing else.
     """
-    robots = [replace(robot, availability=1.0) for robot in world.robots]
+    robots = [replace(robot, availability=1.0, urdf=None) for robot in world.robots]  # its model says all of a URDF
     return id(world.obstacles), digest(world.name, world.sites, robots, world.scenarios, world.plan_failure,
                                        world.execute_failure, world.margin, world.noise, world.passages,
                                        reactions_of(world, options))
@@ -336,7 +336,7 @@ def _effective(world: World, options: Options) -> tuple[int, str]:
 def _sharing(world: World, from_file: dict[str, World]) -> World:
     """The world, sharing equal obstacles and map files with earlier ones, so that thousands fit in memory."""
     source = world.map_source
-    first = from_file.setdefault(digest(world.obstacles, None if source is None else source.digests()), world)
+    first = from_file.setdefault(digest(world.obstacles, world.digests()), world)
     if source is not None and first.map_source is not None:
         source = replace(source, files=first.map_source.files)
     return replace(world, obstacles=first.obstacles, map_source=source)

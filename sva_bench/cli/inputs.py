@@ -205,8 +205,7 @@ def draw(
     set_up_logging(verbose)
     check_output(output, world)
     loaded = load(world)
-    if loaded.map_source is not None:  # a map may be a picture of that name
-        check_output(output, *(world.parent / file.name for file in loaded.map_source.files))
+    check_output(output, *(world.parent / file.name for file in loaded.files))  # a map may be a picture of that name
     with loading():
         from sva_bench.study.given_plans import read_plans
 

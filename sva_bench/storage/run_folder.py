@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from sva_bench.files.records import Record, as_dict
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, write_table
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import MapSource
+from sva_bench.world.maps.files import MapFile
 
 _RUN_NAME = re.compile(r".+-seed\d+-[0-9a-f]{8}")
 
@@ -100,9 +100,9 @@ def write_record(path: Path, record: Record) -> None:
     path.write_bytes(pretty_json(as_dict(record)).encode("utf-8", "backslashreplace"))
 
 
-def write_map(folder: Path, source: MapSource) -> None:
-    """Write the files that the world's map was read from, as ``map/`` and the names that the world has for them."""
-    for file in source.files:
+def write_map(folder: Path, files: Iterable[MapFile]) -> None:
+    """Write the files that a world names, of its map and robots, as ``map/`` and the names that they have there."""
+    for file in files:
         path = folder / MAP / file.name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(file.content)
@@ -127,7 +127,7 @@ def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
 
 
 MAP = "map"
-"""Folder in a run folder that holds the files that the world's map was read from, under their names there."""
+"""Folder in a run folder that holds the files that the world names, of its map and robots, under their names there."""
 
 
 

@@ -81,8 +81,7 @@ def publish(
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
-        if world.map_source is not None:
-            write_map(folder, world.map_source)
+        write_map(folder, world.files)
         write_travel_times(folder / "travel_times.parquet", list(costs.values()))
         for scenario, instance in instances.items():
             write_instance(folder / f"instance-{scenario}.json", instance)
@@ -139,7 +138,7 @@ def report_again(folder: Path) -> Path:
 
 def _digests(world: World) -> dict[str, Mapping[str, str]]:
     """Digests of the files that a world names, by name; nothing if it names none."""
-    return {} if world.map_source is None else {"files": world.map_source.digests()}
+    return {"files": world.digests()} if world.files else {}
 
 
 class Stopwatch:

@@ -18,11 +18,11 @@ from sva_bench.geometry.cells import MAX_BOXES, TooManyBoxes, bounds_of, boxes_o
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.failures import JointState, availability_by, marginals, undefined_under, without_joint
-from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.seeds import Stream, rng_for
 from sva_bench.world.model import MapSource, Robot, Scenario, Site, World, WorldReaction, nominal_of
 from sva_bench.world.noise_schema import noise_as_dict
 from sva_bench.world.places import APART_M, NoRoom, field_of, find_places
+from sva_bench.world.robots import model_entry, model_of
 from sva_bench.world.schema import (
     KIND,
     Box,
@@ -67,10 +67,11 @@ def world_of(
         BadFile: As ``load_world``.
     """
     file = validate(document, WorldFile, KIND)
-    obstacles, source = ground or _map(document, file.map, folder or document.path.parent)
+    root = folder or document.path.parent
+    obstacles, source = ground or _map(document, file.map, root)
     pois = [f"p{k + 1}" for k in range(file.sites.pois.random)] if isinstance(file.sites.pois, RandomPois) else list(
         file.sites.pois)
-    robots = tuple(_robot(document, name, entry, pois) for name, entry in file.robots.items())
+    robots = tuple(_robot(document, name, entry, pois, root) for name, entry in file.robots.items())
     widest = max(robot.model.radius_m for robot in robots)
     sites = _sites(document, file, obstacles, widest)
     plan, execute = (
@@ -199,18 +200,9 @@ def _stations_and_pois(document: Document, sites: Sites, obstacles: Obstacles, w
     return stations + pois
 
 
-def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) -> Robot:
+def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str], root: Path) -> Robot:
     loc = ("robots", name)
-    if isinstance(entry.model, str):
-        if entry.model not in BUILT_IN:
-            raise document.error((*loc, "model"),
-                                 f"no built-in robot {entry.model!r}; {nearest(entry.model, list(BUILT_IN))}")
-        model = BUILT_IN[entry.model]
-    else:
-        try:
-            model = RobotModel(name=f"{name}-model", **entry.model.model_dump())
-        except ValueError as error:
-            raise document.error((*loc, "model"), str(error)) from None
+    model, urdf = model_of(document, name, entry.model, root)
     if isinstance(entry.incentives, Drawn):
         incentives = draw_incentives(entry.incentives, pois)
     else:
@@ -220,7 +212,7 @@ def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) ->
                 raise document.error((*loc, "incentives", poi), f"there is no POI {poi!r}; {nearest(poi, pois)}")
     limit_s = math.inf if entry.mission_limit_s is None else entry.mission_limit_s
     return Robot(
-        name=name, model=model, incentives=incentives, mtbf_s=entry.mtbf_s, loss_cost=entry.loss_cost,
+        name=name, model=model, urdf=urdf, incentives=incentives, mtbf_s=entry.mtbf_s, loss_cost=entry.loss_cost,
         idle_share=entry.idle_share,
         fuel_capacity_s=math.inf if entry.fuel_capacity_s is None else entry.fuel_capacity_s, mission_limit_s=limit_s,
         availability=availability_by(entry.mtbf_s, limit_s) if entry.availability is None else entry.availability,
@@ -332,8 +324,7 @@ def world_as_dict(world: World) -> dict[str, Any]:
         "sites": {"base": entry(world.sites[0]), "stations": {s.name: entry(s) for s in world.stations},
                   "pois": {s.name: entry(s) for s in world.pois}},
         "robots": {r.name: {
-            "model": r.model.name if BUILT_IN.get(r.model.name) == r.model else
-            {k: v for k, v in r.model.figures().items() if k != "name"},
+            "model": model_entry(r),
             "fuel_capacity_s": limit(r.fuel_capacity_s), "mission_limit_s": limit(r.mission_limit_s),
             "availability": r.availability, **({} if r.mtbf_s is None else {"mtbf_s": r.mtbf_s}),
             **({"loss_cost": r.loss_cost} if r.loss_cost else {}),

@@ -40,6 +40,19 @@ class Site:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class UrdfSource:
+    """The origin of a robot that is described in URDF.
+
+    Attributes:
+        section: The content of its ``model`` in the world file, with defaults.
+        file: The URDF, as read.
+    """
+
+    section: Mapping[str, str | float]
+    file: MapFile
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Robot:
     """One robot of a mission.
 
@@ -53,6 +66,7 @@ class Robot:
         mtbf_s: Default of its mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and limit.
         loss_cost: Cost if it leaves the base and doesn't come home [incentive].
         idle_share: Share of the fuel of driving that it burns while it stands.
+        urdf: Origin of its model; ``None`` if that is known by its figures.
     """
 
     name: str
@@ -64,6 +78,7 @@ class Robot:
     mtbf_s: float | None = None
     loss_cost: float = 0.0
     idle_share: float = 0.0
+    urdf: UrdfSource | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -123,10 +138,6 @@ class MapSource:
     section: Mapping[str, Mapping[str, str | float]]
     files: tuple[MapFile, ...]
 
-    def digests(self) -> dict[str, str]:
-        """SHA-256 of each file, by name: results depend on them besides the world file."""
-        return {file.name: hashlib.sha256(file.content).hexdigest() for file in self.files}
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class World:
@@ -168,6 +179,17 @@ class World:
     def noisy(self) -> bool:
         """Whether rollouts differ."""
         return not self.noise.silent or any(p.wait_s > 0 and 0 < p.blocked < 1 for p in self.passages)
+
+    @property
+    def files(self) -> tuple[MapFile, ...]:
+        """The files that it names, each once: of its map, and of its robots."""
+        named = [] if self.map_source is None else list(self.map_source.files)
+        named += [robot.urdf.file for robot in self.robots if robot.urdf is not None]
+        return tuple({file.name: file for file in named}.values())
+
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of each of these files, by name: results depend on them besides the world file."""
+        return {file.name: hashlib.sha256(file.content).hexdigest() for file in self.files}
 
     @property
     def stations(self) -> tuple[Site, ...]:

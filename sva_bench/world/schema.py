@@ -14,6 +14,7 @@ from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
 from sva_bench.world.noise_schema import FloorEntry, NoiseEntry, NoiseSection, PassageEntry
 from sva_bench.world.places import APART_M
+from sva_bench.world.robot_schema import ModelEntry
 
 KIND = "sva-bench/world@1"
 Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
@@ -144,23 +145,6 @@ class Sites(Section):
         Discriminator(_how_placed)]
 
 
-class Figures(Section):
-    """Parameters of a robot that isn't built in; ``RobotModel`` checks their combination.
-
-    Smaller hulls, wheels and tracks are below the contact tolerance of physics; with less turn acceleration a robot
-    takes a second to correct the heading errors that are allowed at a stop, more than 1 % of many legs.
-    """
-
-    radius_m: Annotated[Positive, Field(ge=0.05, le=5)]
-    wheel_radius_m: Annotated[Positive, Field(ge=0.01, le=2)]
-    track_m: Annotated[Positive, Field(ge=0.05, le=10)]
-    mass_kg: Annotated[Positive, Field(ge=0.05, le=10_000)]
-    max_speed_m_s: Annotated[Positive, Field(ge=0.02, le=20)]
-    max_turn_rad_s: Annotated[Positive, Field(ge=0.05, le=20)]
-    acceleration_m_s2: Annotated[Positive, Field(ge=0.02, le=20)]
-    turn_acceleration_rad_s2: Annotated[Positive, Field(ge=0.1, le=100)]
-
-
 class Drawn(Section):
     """Incentives drawn at random for each POI: uniform, with a share of them zero."""
 
@@ -177,7 +161,7 @@ class Drawn(Section):
 
 
 class RobotEntry(Section):
-    model: Name | Figures
+    model: ModelEntry
     fuel_capacity_s: Bounded | None = None
     mission_limit_s: Bounded | None = None
     availability: Probability | None = None

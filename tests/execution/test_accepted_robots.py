@@ -19,7 +19,7 @@ from sva_bench.robot.follower import CONTROL_HZ, stretches
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.load import world_of
-from sva_bench.world.schema import Figures
+from sva_bench.world.robot_schema import Figures
 from tests.worlds_for_tests import SMALL
 
 OPEN = Obstacles(bounds_m=np.array([-400.0, -400, 400, 400]), boxes=np.empty((0, 5)), cylinders=np.empty((0, 3)))
@@ -107,7 +107,7 @@ def test_every_accepted_robot_takes_the_twins_time_within_one_per_cent() -> None
      "max_turn_rad_s": 0.05, "acceleration_m_s2": 0.755, "turn_acceleration_rad_s2": 0.279},
 ])
 def test_robots_with_odd_wheels_take_the_twins_time_too(figures: dict[str, float]) -> None:
-    assert not strays_of(RobotModel(name="odd", **figures), np.random.default_rng(0))
+    assert not strays_of(RobotModel(name="odd", **figures), np.random.default_rng(0))  # type: ignore[arg-type]
 
 
 @pytest.mark.long

@@ -79,7 +79,7 @@ def test_physics_takes_the_twins_time_within_one_per_cent() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", sorted(BUILT_IN))
+@pytest.mark.parametrize("name", sorted(name for name in BUILT_IN if BUILT_IN[name].radius_m < CLEARANCE_M))
 def test_physics_takes_the_twins_time_within_one_per_cent_on_many_courses(name: str) -> None:
     found = errors(range(10, 22), 8, BUILT_IN[name])
     print(f"{name}: {len(found)} legs, error mean {found.mean():+.5f}, sd {found.std():.5f}, "  # noqa: T201

@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import BoolArray, FloatArray
-from sva_bench.execution.engines.bullet import obstacles_urdf
+from sva_bench.execution.engines.bodies import obstacles_urdf
 from sva_bench.geometry.buckets import clearances, keeps_clearance
 from sva_bench.geometry.cells import (
     Cells,

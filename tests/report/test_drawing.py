@@ -17,7 +17,7 @@ from numpy.testing import assert_array_equal
 from sva_bench.__main__ import run_command_line
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import WorldFamily
-from sva_bench.execution.engines.bullet import obstacles_urdf
+from sva_bench.execution.engines.bodies import obstacles_urdf
 from sva_bench.generate.terrain import random_places, random_terrain
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of

@@ -11,14 +11,23 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
+from sva_bench.execution.engines.bodies import (
+    HEIGHT_M,
+    RoundBody,
+    body_urdf,
+    height_of,
+    obstacles_urdf,
+    round_body,
+)
 from sva_bench.execution.touch import Touch
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c
+from sva_bench.robot.body import CASTER_GAP_M
 from sva_bench.robot.disturbance import Disturbance
 from sva_bench.robot.follower import CONTROL_HZ
-from sva_bench.robot.model import CASTERS_AT, RobotModel
+from sva_bench.robot.model import RobotModel
 
 
 @contextlib.contextmanager
@@ -48,18 +57,17 @@ with _quiet():  # prints a banner on import
 PHYSICS_HZ, _FINE_HZ = 60.0, 120.0  # 960 Hz and a residual of 1e-7 give leg times within 0.2 % of these
 _ITERATIONS, _FINE_ITERATIONS = 50, 200  # at most: at the usual residual, and at a finer one
 _RESIDUAL = 1e-4  # ends the iterations early
+_OWN_RESIDUAL = 1e-5  # of bodies that were not made for the solver, as round ones are
 _WHEEL_RAD_S, _WHEEL_RAD_S2 = 5.0, 7.0  # slower or more slowly accelerated wheels don't bear that residual [rad2/s2]
 _FAST_RAD_S = 30.0  # wheels that turn faster don't bear 60 Hz: up to 1.5 % of a leg's time
 _CONTACT_STEPS = 3  # control steps from one look at contacts to the next: 50 ms
 _PLACE, _DISTANCE = 5, 8  # where a contact point of PyBullet has its place on the robot, and its distance
 _UPRIGHT = 0.7  # cosine of the tilt at which a robot has tipped over
 _CASTER_FRICTION = 0.01  # of the hull in PyBullet, with the casters, which slide; obstacles make up for it
-_WALL_M = 0.2  # thickness of the walls about the bounds; nothing is seen of it
-_HEIGHT_M = 0.5  # of all obstacles; taller than any robot's hull
-_CASTER_GAP_M = 0.001  # casters touch the floor only when the hull tilts, so the weight rests on the driven wheels
 _WHEEL_FRICTION = 1.0  # rubber on a hard floor
 _USUAL_RAD_S = 100.0  # to which PyBullet holds joints, unless told otherwise: small wheels of a fast robot turn faster
 _MOTOR_G = 3.0  # motor torque, in multiples of what accelerates the robot as its limits allow
+_ROBOT, _STATIC, _FLOOR = 1, 2, 64  # groups of bodies: Bullet's own for moving and fixed ones, and one of ours
 _free: list[int] = []  # clients of this process that no engine uses
 
 
@@ -93,6 +101,7 @@ class Bullet:
             with deferring_ctrl_c(), _quiet():  # or it might come while both outputs lead nowhere
                 self._solids = self._build_world(obstacles)
             self._body = self._build_robot(pose)
+            self._axle = None if model.body is None else _axle_in_base(self._body, self._client)
         except BaseException:
             pybullet.disconnect(physicsClientId=self._client)
             raise
@@ -110,12 +119,23 @@ class Bullet:
 
     def pose(self) -> tuple[float, float, float]:
         """x, y [m], yaw [rad]."""
-        (x, y, _), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
+        place, turned = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
+        if self._axle is not None:  # else the base is its centre of mass
+            place, turned = pybullet.multiplyTransforms(place, turned, *self._axle)
+        (x, y, _), (qx, qy, qz, qw) = place, turned
         if not 1 - 2 * (qx * qx + qy * qy) > _UPRIGHT:  # it tells no number either
             self.tipped_over = True
             return self._last
         self._last = x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
         return self._last
+
+    def tilt_rad(self) -> float:
+        """Angle between the robot's upright axis and the vertical: some milliradians, unless it tips over."""
+        place, turned = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
+        if self._axle is not None:
+            place, turned = pybullet.multiplyTransforms(place, turned, *self._axle)
+        qx, qy, _, _ = turned
+        return math.acos(max(-1.0, 1 - 2 * (qx * qx + qy * qy)))
 
     def step(self, left_m_s: float, right_m_s: float) -> None:
         """Advance by one control step."""
@@ -159,39 +179,23 @@ class Bullet:
             0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client),
             physicsClientId=self._client)
         # Casters that hover over the floor are no contacts to solve for: they'd take a sixth of the time.
-        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=_CASTER_GAP_M / 2,
+        pybullet.setCollisionFilterGroupMask(floor, -1, _STATIC | _FLOOR, -1, physicsClientId=self._client)
+        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=CASTER_GAP_M / 2,
                                 physicsClientId=self._client)
         # One compound body for all obstacles: its own tree finds the few that are near. Only a URDF may hold more
         # than 16 shapes: createCollisionShapeArray drops the others without a word.
-        with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as file:
-            file.write(obstacles_urdf(obstacles))
-            file.flush()
-            solids: int = pybullet.loadURDF(file.name, useFixedBase=True, physicsClientId=self._client)
-        return solids
+        height_m = max(HEIGHT_M, height_of(self._model))
+        return _load(obstacles_urdf(obstacles, height_m), useFixedBase=True, physicsClientId=self._client)
 
     def _build_robot(self, pose: tuple[float, float, float]) -> int:
         model, client = self._model, self._client
-        wheel, hull = model.wheel_radius_m, 1.5 * model.wheel_radius_m
-        caster = wheel / 2
-        reach = CASTERS_AT * model.radius_m
-        track = model.track_m * self._disturbance.track_gain
-        base = pybullet.createCollisionShapeArray(
-            shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_SPHERE, pybullet.GEOM_SPHERE],
-            radii=[model.radius_m, caster, caster], lengths=[2 * hull, 0, 0], halfExtents=[[0, 0, 0]] * 3,
-            collisionFramePositions=[[0, 0, hull - wheel / 2], [reach, 0, _CASTER_GAP_M - caster],
-                                     [-reach, 0, _CASTER_GAP_M - caster]],
-            collisionFrameOrientations=[[0, 0, 0, 1]] * 3, physicsClientId=client)
-        # Spheres roll on one point: the speed is right to 0.1 %, where cylinder wheels are 2.4 % off and drift.
-        tyre = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=wheel, physicsClientId=client)
-        body: int = pybullet.createMultiBody(
-            baseMass=0.9 * model.mass_kg + self._disturbance.payload_kg, baseCollisionShapeIndex=base,
-            basePosition=[pose[0], pose[1], wheel],
-            baseOrientation=_upright(pose[2]), linkMasses=[0.05 * model.mass_kg] * 2,
-            linkCollisionShapeIndices=[tyre, tyre], linkVisualShapeIndices=[-1, -1],
-            linkPositions=[[0, track / 2, 0], [0, -track / 2, 0]],
-            linkOrientations=[[0, 0, 0, 1]] * 2, linkInertialFramePositions=[[0, 0, 0]] * 2,
-            linkInertialFrameOrientations=[[0, 0, 0, 1]] * 2, linkParentIndices=[0, 0],
-            linkJointTypes=[pybullet.JOINT_REVOLUTE] * 2, linkJointAxis=[[0, 1, 0]] * 2, physicsClientId=client)
+        track, payload = model.track_m * self._disturbance.track_gain, self._disturbance.payload_kg
+        if model.body is None:
+            parts = round_body(model)
+            body = _create_round(replace(parts, track_m=track, base_kg=parts.base_kg + payload), pose, client)
+        else:
+            own = replace(model.body, base_kg=model.body.base_kg + payload)
+            body = _load_own(body_urdf(own, model, track), model, pose, client)
         smooth = {"linearDamping": 0.0, "angularDamping": 0.0, "physicsClientId": client}
         rough = self._disturbance.hull_friction > 0
         # PyBullet multiplies the frictions of two bodies.
@@ -220,33 +224,62 @@ def motor_torque(model: RobotModel) -> float:
 
 
 def _accuracy(model: RobotModel) -> dict[str, float]:
-    """Steps and solver of the physics: finer for wheels that are so slow, or so fast, that it would show."""
+    """Steps and solver of the physics: finer for wheels that are so slow, or so fast, that it would show,
+    and for bodies of their own."""
     turning = model.track_m / 2
     speed = min(model.followed_speed_m_s, model.max_turn_rad_s * turning) / model.wheel_radius_m
     acceleration = min(model.acceleration_m_s2, model.turn_acceleration_rad_s2 * turning) / model.wheel_radius_m
     slowness = min(speed / _WHEEL_RAD_S, acceleration / _WHEEL_RAD_S2, 1.0)
-    fast = fastest_wheel_rad_s(model) > _FAST_RAD_S
+    own = model.body is not None
+    fast = own or fastest_wheel_rad_s(model) > _FAST_RAD_S
     return {"fixedTimeStep": 1.0 / CONTROL_HZ,
             "numSubSteps": round((_FINE_HZ if fast or slowness < 1 else PHYSICS_HZ) / CONTROL_HZ),
-            "numSolverIterations": _ITERATIONS if slowness == 1 else _FINE_ITERATIONS,
-            "solverResidualThreshold": _RESIDUAL * slowness**2, "enableConeFriction": 0,
+            "numSolverIterations": _ITERATIONS if slowness == 1 and not own else _FINE_ITERATIONS,
+            "solverResidualThreshold": (_OWN_RESIDUAL if own else _RESIDUAL) * slowness**2, "enableConeFriction": 0,
             "deterministicOverlappingPairs": 1}
 
 
-def obstacles_urdf(obstacles: Obstacles) -> str:
-    """All obstacles, and the walls about the bounds, as one link of a URDF."""
-    solids = [(x, y, yaw, f'<box size="{2 * a!r} {2 * b!r} {_HEIGHT_M}"/>')
-              for x, y, a, b, yaw in obstacles.walled(_WALL_M).boxes.tolist()]
-    solids += [(x, y, 0.0, f'<cylinder radius="{r!r}" length="{_HEIGHT_M}"/>')
-               for x, y, r in obstacles.cylinders.tolist()]
-    # A solid a line: the reader cuts longer ones.
-    shapes = "\n".join(
-        f'<collision><origin xyz="{x!r} {y!r} {_HEIGHT_M / 2}" rpy="0 0 {yaw!r}"/>'
-        f"<geometry>{shape}</geometry></collision>"
-        for x, y, yaw, shape in solids)
-    nothing = '<mass value="0"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>'
-    link = f'<link name="obstacles">\n<inertial>{nothing}</inertial>\n{shapes}\n</link>'
-    return f'<robot name="obstacles">\n{link}\n</robot>\n'
+def _load(urdf: str, **options: Any) -> int:
+    with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as file:
+        file.write(urdf)
+        file.flush()
+        body: int = pybullet.loadURDF(file.name, **options)
+    return body
+
+
+def _load_own(urdf: str, model: RobotModel, pose: tuple[float, float, float], client: int) -> int:
+    with _quiet():
+        body = _load(urdf, basePosition=[pose[0], pose[1], model.wheel_radius_m],
+                     baseOrientation=_upright(pose[2]), physicsClientId=client,
+                     flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER)
+    for link in (0, 1):  # they roll on the floor as spheres; what they touch obstacles with is among the hull's solids
+        pybullet.setCollisionFilterGroupMask(body, link, _ROBOT, _FLOOR, physicsClientId=client)
+    return body
+
+
+def _create_round(parts: RoundBody, pose: tuple[float, float, float], client: int) -> int:
+    base = pybullet.createCollisionShapeArray(
+        shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_SPHERE, pybullet.GEOM_SPHERE],
+        radii=list(parts.radii_m), lengths=[parts.hull_m, 0, 0], halfExtents=[[0, 0, 0]] * 3,
+        collisionFramePositions=[list(at) for at in parts.at_m],
+        collisionFrameOrientations=[[0, 0, 0, 1]] * 3, physicsClientId=client)
+    tyre = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=parts.wheel_radius_m, physicsClientId=client)
+    body: int = pybullet.createMultiBody(
+        baseMass=parts.base_kg, baseCollisionShapeIndex=base, basePosition=[pose[0], pose[1], parts.wheel_radius_m],
+        baseOrientation=_upright(pose[2]), linkMasses=[parts.wheel_kg] * 2,
+        linkCollisionShapeIndices=[tyre, tyre], linkVisualShapeIndices=[-1, -1],
+        linkPositions=[[0, parts.track_m / 2, 0], [0, -parts.track_m / 2, 0]],
+        linkOrientations=[[0, 0, 0, 1]] * 2, linkInertialFramePositions=[[0, 0, 0]] * 2,
+        linkInertialFrameOrientations=[[0, 0, 0, 1]] * 2, linkParentIndices=[0, 0],
+        linkJointTypes=[pybullet.JOINT_REVOLUTE] * 2, linkJointAxis=[[0, 1, 0]] * 2, physicsClientId=client)
+    return body
+
+
+def _axle_in_base(body: int, client: int) -> tuple[Any, Any]:
+    """The middle of the axle in the frame that PyBullet reports of the base: that of its principal inertia."""
+    place, turned = pybullet.getDynamicsInfo(body, -1, physicsClientId=client)[3:5]
+    axle: tuple[Any, Any] = pybullet.invertTransform(place, turned)
+    return axle
 
 
 def _upright(yaw: float) -> tuple[float, float, float, float]:
