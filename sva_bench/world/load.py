@@ -36,6 +36,7 @@ from sva_bench.world.schema import (
     SiteEntry,
     Sites,
     SpreadStations,
+    StationEntry,
     WorldFile,
 )
 
@@ -140,7 +141,8 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
                                  f"{widest_m} m doesn't fit there: move the site")
         heading = (_radians(math.degrees(longest_view_heading(obstacles, x, y, sight))) if entry.heading_deg is None
                    else _radians(entry.heading_deg))
-        sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s))
+        sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s,
+                          charge_rate=entry.charge_rate if isinstance(entry, StationEntry) else None))
     for k, site in enumerate(sites):
         for other in sites[:k]:
             if math.hypot(site.x_m - other.x_m, site.y_m - other.y_m) < 0.01:
@@ -184,7 +186,8 @@ def _stations_and_pois(document: Document, sites: Sites, obstacles: Obstacles, w
         otherwise = "a smaller min_spacing_m" if error.kind == "pois" else "a base with more free ground about it"
         raise document.error(("sites", error.kind), f"{error}; choose fewer, or {otherwise}") from None
     if spread is not None:
-        stations = [("station", f"r{k}", SiteEntry(at_m=list(at), stop_s=spread.stop_s), ("sites", "stations"))
+        stations = [("station", f"r{k}", StationEntry(
+                        at_m=list(at), stop_s=spread.stop_s, charge_rate=spread.charge_rate), ("sites", "stations"))
                     for k, at in enumerate(places.stations, start=1)]
     if drawn is not None:
         pois = [("poi", f"p{k}", SiteEntry(at_m=list(at), stop_s=drawn.stop_s), ("sites", "pois"))
@@ -214,6 +217,7 @@ def _robot(document: Document, name: str, entry: RobotEntry, pois: list[str]) ->
     limit_s = math.inf if entry.mission_limit_s is None else entry.mission_limit_s
     return Robot(
         name=name, model=model, incentives=incentives, mtbf_s=entry.mtbf_s, loss_cost=entry.loss_cost,
+        idle_share=entry.idle_share,
         fuel_capacity_s=math.inf if entry.fuel_capacity_s is None else entry.fuel_capacity_s, mission_limit_s=limit_s,
         availability=availability_by(entry.mtbf_s, limit_s) if entry.availability is None else entry.availability,
     )
@@ -300,7 +304,7 @@ def world_as_dict(world: World) -> dict[str, Any]:
     """The resolved world as the content of a world file, from which the same world is loaded."""
     def entry(site: Site) -> dict[str, Any]:
         return {"at_m": [site.x_m, site.y_m], "heading_deg": _degrees(site.heading_rad),
-                "stop_s": site.stop_s}
+                "stop_s": site.stop_s, **({} if site.charge_rate is None else {"charge_rate": site.charge_rate})}
 
     def limit(seconds: float) -> float | None:
         return seconds if math.isfinite(seconds) else None
@@ -325,7 +329,8 @@ def world_as_dict(world: World) -> dict[str, Any]:
             {k: v for k, v in r.model.figures().items() if k != "name"},
             "fuel_capacity_s": limit(r.fuel_capacity_s), "mission_limit_s": limit(r.mission_limit_s),
             "availability": r.availability, **({} if r.mtbf_s is None else {"mtbf_s": r.mtbf_s}),
-            **({"loss_cost": r.loss_cost} if r.loss_cost else {}), "incentives": dict(r.incentives)}
+            **({"loss_cost": r.loss_cost} if r.loss_cost else {}),
+            **({"idle_share": r.idle_share} if r.idle_share else {}), "incentives": dict(r.incentives)}
             for r in world.robots},
         # An availability replaces a robot's mtbf_s, so those it holds for have none here.
         "scenarios": {s.name: {r: p for r, p in s.availability.items() if r not in s.mtbf_s} if s.joint is None else {

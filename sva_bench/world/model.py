@@ -25,6 +25,8 @@ class Site:
         x_m, y_m: Its place [m].
         heading_rad: Heading in which a robot stops there [rad].
         stop_s: Duration of a stop [s].
+        charge_rate: Of a station: seconds of driving that a second there fills into the tank, on top of ``stop_s``;
+            ``None`` = a stop takes ``stop_s`` alone.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Site:
     y_m: float
     heading_rad: float
     stop_s: float = 0.0
+    charge_rate: float | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,6 +51,7 @@ class Robot:
         incentives: Incentive of its visit to each POI, by name.
         mtbf_s: Default of its mean driving time to failure under ``hazard`` [s]; ``None`` = by availability and limit.
         loss_cost: Cost if it leaves the base and doesn't come home [incentive].
+        idle_share: Share of a second of driving that a second of a stop at a POI burns, 0 to 1.
     """
 
     name: str
@@ -58,6 +62,7 @@ class Robot:
     incentives: Mapping[str, float]
     mtbf_s: float | None = None
     loss_cost: float = 0.0
+    idle_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
 from sva_bench.choices import FailureProcess, News, PolicyName
-from sva_bench.files.fields import Bounded, MeanTime, Name, NonNegativeInt, Number, Positive, Probability, Section
+from sva_bench.files.fields import (
+    Bounded,
+    MeanTime,
+    Name,
+    NonNegativeInt,
+    Number,
+    Positive,
+    Probability,
+    Rate,
+    Section,
+)
 from sva_bench.seeds import MOST_SEED
 from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
@@ -103,11 +113,16 @@ class SiteEntry(Section):
     stop_s: Bounded = 0.0
 
 
+class StationEntry(SiteEntry):
+    charge_rate: Rate | None = None
+
+
 class SpreadStations(Section):
     """Stations placed automatically, as far apart as possible."""
 
     spread: Annotated[NonNegativeInt, Field(ge=1, le=100)]
     stop_s: Bounded = 0.0
+    charge_rate: Rate | None = None
 
 
 class RandomPois(Section):
@@ -129,7 +144,7 @@ def _how_placed(data: object) -> str:
 class Sites(Section):
     base: SiteEntry
     stations: Annotated[
-        Annotated[dict[Name, SiteEntry], Tag("[named]")] | Annotated[SpreadStations, Tag("[placed]")],
+        Annotated[dict[Name, StationEntry], Tag("[named]")] | Annotated[SpreadStations, Tag("[placed]")],
         Discriminator(_how_placed), _EMPTY_IS_NONE] = Field(default_factory=dict)
     pois: Annotated[
         Annotated[dict[Name, SiteEntry], Tag("[named]")] | Annotated[RandomPois, Tag("[placed]")],
@@ -175,6 +190,7 @@ class RobotEntry(Section):
     availability: Probability | None = None
     mtbf_s: MeanTime | None = None
     loss_cost: Bounded = 0.0
+    idle_share: Probability = 0.0
     incentives: dict[Name, Bounded] | Drawn
 
 
