@@ -15,6 +15,7 @@ from sva_bench.interrupts import deferring_ctrl_c, heard_ctrl_c, pressed
 from sva_bench.solver.program import LinearModel, Rows
 
 _LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
+_AGGREGATOR = 1 << 12  # HiGHS's number of this rule of presolve
 _POLL_S = 0.1  # between two polls for Ctrl-C
 
 SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
@@ -215,6 +216,8 @@ def _open(model: LinearModel) -> Any:
     _option(solver, "parallel", "off")
     _option(solver, "random_seed", 0)
     _option(solver, "primal_feasibility_tolerance", INTEGRALITY)
+    if not model.aggregates:
+        _option(solver, "presolve_rule_off", _AGGREGATOR)
     columns, rows = len(model.objective), model.rows
     program = highspy.HighsLp()
     program.num_col_, program.num_row_ = columns, len(rows.lower)

@@ -44,12 +44,15 @@ class LinearModel:
         upper: Upper bounds, shape (columns,); lower bounds are 0.
         integer: Which columns are integer, shape (columns,).
         rows: The constraints.
+        aggregates: Whether presolve may substitute columns. Where flows of fuel and time are coupled, by charging,
+            HiGHS's substitutions may go on for ever.
     """
 
     objective: FloatArray
     upper: FloatArray
     integer: BoolArray
     rows: Rows
+    aggregates: bool = True
 
 
 class RowBuilder:

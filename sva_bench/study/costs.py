@@ -5,14 +5,12 @@ Apart from ``planning``, since a check of a world needs neither solvers nor phys
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from sva_bench.analysis.reach import reached
 from sva_bench.analysis.summaries import Reach
-from sva_bench.arrays import FloatArray
 from sva_bench.choices import FailureProcess, PathPlanner
 from sva_bench.mission.failures import Reliability, fails_by_driving, mtbf_s
 from sva_bench.mission.instance import Instance, Vehicle
@@ -51,29 +49,21 @@ def instance_of(
         processes: Failure processes beside the world's that values are computed under.
     """
     wanted = (world.plan_failure, world.execute_failure, *processes)
+    charges = any(site.charge_rate is not None for site in world.sites)
     sites = tuple(site.name for site in world.sites)
     return Instance(
         name=instance_name(world, None if scenario.name == NOMINAL else scenario.name), sites=sites, base=0,
         stations=tuple(sites.index(site.name) for site in world.stations),
-        stop_s=np.array([site.stop_s for site in world.sites]), failure=world.plan_failure, joint=scenario.joint,
-        charge_rate=charge_rates(world),
+        stop_s=np.array([site.stop_s for site in world.sites]),
+        charge_rate=np.array([np.inf if site.charge_rate is None else site.charge_rate for site in world.sites])
+        if charges else None, failure=world.plan_failure, joint=scenario.joint,
         vehicles=tuple(Vehicle(
             name=robot.name, fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s,
             availability=scenario.availability[robot.name], loss_cost=robot.loss_cost,
-            idle_share=robot.idle_share,
-            mtbf_s=_planning_mtbf_s(world, scenario.reliability(robot), wanted), fuel_s=costs[robot.model.name].cost_s,
+            idle_share=robot.idle_share, fuel_s=costs[robot.model.name].cost_s,
+            mtbf_s=_planning_mtbf_s(world, scenario.reliability(robot), wanted),
             incentives=np.array([robot.incentives.get(site, 0.0) for site in sites])) for robot in world.robots),
     )
-
-
-def charge_rates(world: World) -> FloatArray | None:
-    """What a second at each site fills into a tank, shape (sites,), ``inf`` where that takes no time of its own.
-
-    ``None`` if it does nowhere.
-    """
-    if all(site.charge_rate is None for site in world.sites):
-        return None
-    return np.array([math.inf if site.charge_rate is None else site.charge_rate for site in world.sites])
 
 
 def _planning_mtbf_s(world: World, reliability: Reliability, processes: Sequence[FailureProcess]) -> float | None:

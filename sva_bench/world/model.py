@@ -26,8 +26,8 @@ class Site:
         x_m, y_m: Its place [m].
         heading_rad: Heading in which a robot stops there [rad].
         stop_s: Duration of a stop [s].
-        charge_rate: Seconds of driving that a second at a station fills into the tank, on top of ``stop_s``; ``None`` =
-            filling takes no time of its own.
+        charge_rate: Of a station: seconds of driving that a second there fills into the tank, on top of ``stop_s``;
+            ``None`` = a stop takes ``stop_s`` alone.
     """
 
     name: str

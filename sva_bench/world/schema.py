@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
 from sva_bench.choices import FailureProcess, News, PolicyName
-from sva_bench.files.fields import Bounded, MeanTime, Name, NonNegativeInt, Number, Positive, Probability, Section
+from sva_bench.files.fields import (
+    Bounded,
+    MeanTime,
+    Name,
+    NonNegativeInt,
+    Number,
+    Positive,
+    Probability,
+    Rate,
+    Section,
+)
 from sva_bench.seeds import MOST_SEED
 from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
@@ -19,7 +29,6 @@ from sva_bench.world.robot_schema import ModelEntry
 KIND = "sva-bench/world@1"
 Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
 Size = Annotated[Positive, Field(ge=1e-6, le=1e5)]  # smaller sizes are lost in physics
-ChargeRate = Annotated[Positive, Field(ge=1e-3, le=1e6)]
 Angle = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Seed = Annotated[NonNegativeInt, Field(le=MOST_SEED)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
@@ -108,7 +117,7 @@ class SiteEntry(Section):
 
 
 class StationEntry(SiteEntry):
-    charge_rate: ChargeRate | None = None
+    charge_rate: Rate | None = None
 
 
 class SpreadStations(Section):
@@ -116,7 +125,7 @@ class SpreadStations(Section):
 
     spread: Annotated[NonNegativeInt, Field(ge=1, le=100)]
     stop_s: Bounded = 0.0
-    charge_rate: ChargeRate | None = None
+    charge_rate: Rate | None = None
 
 
 class RandomPois(Section):

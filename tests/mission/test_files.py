@@ -200,3 +200,60 @@ def test_a_wrong_plan_is_refused_with_its_line_and_key(
     assert caught.value.key == key, str(caught.value)
     assert words in caught.value.problem
     assert caught.value.line is not None
+
+
+def energetic(data: dict[str, Any]) -> None:
+    data.update(charge_rate={"r1": 4}, time_s=[[0, 6, 5, 8], [6, 0, 2, None], [5, 2, 0, 6], [9, 3, 7, 0]])
+    data["vehicles"][0].update(idle_share=0.25)
+
+
+def test_energy_comes_back_from_its_file_as_it_was(tmp_path: Path) -> None:
+    plain = read_instance(written(tmp_path, TINY))
+    assert not {"charge_rate", "time_s"} & set(instance_as_dict(plain))
+    assert "idle_share" not in instance_as_dict(plain)["vehicles"][0]
+    instance = read_instance(written(tmp_path, changed(energetic)))
+    assert instance.charge_rate is not None
+    assert_array_equal(instance.charge_rate, [math.inf, 4, math.inf, math.inf])
+    vehicle = instance.vehicles[0]
+    assert (vehicle.idle_share, vehicle.leg_time_s[3, 0], vehicle.fuel_s[3, 0]) == (0.25, 9.0, 7.0)
+    write_instance(tmp_path / "again.json", instance)
+    again = read_instance(tmp_path / "again.json")
+    assert instance_as_dict(again) == instance_as_dict(instance)
+    assert_array_equal(again.charging, instance.charging)
+
+
+def test_a_vehicle_s_own_times_replace_the_common_ones(tmp_path: Path) -> None:
+    def two(data: dict[str, Any]) -> None:
+        energetic(data)
+        own = [[0 if i == j else None if cost is None else 1 for j, cost in enumerate(row)]
+               for i, row in enumerate(data["fuel_s"])]
+        data["vehicles"].append(data["vehicles"][0] | {"name": "uv2", "time_s": own})
+    instance = read_instance(written(tmp_path, changed(two)))
+    assert [v.leg_time_s[0, 1] for v in instance.vehicles] == [6.0, 1.0]
+    write_instance(tmp_path / "again.json", instance)
+    assert [v.leg_time_s[0, 1] for v in read_instance(tmp_path / "again.json").vehicles] == [6.0, 1.0]
+
+
+@pytest.mark.parametrize(("change", "key", "words"), [
+    (lambda d: d.update(charge_rate={"r2": 4}), "charge_rate.r2", "no station"),
+    (lambda d: d.update(charge_rate={"p1": 4}), "charge_rate.p1", "no station"),
+    (lambda d: d.update(charge_rate={"r1": 0}), "charge_rate.r1", "at least 1e-06"),
+    (lambda d: d.update(charge_rate={"r1": -1}), "charge_rate.r1", "at least 1e-06"),
+    (lambda d: d["vehicles"][0].update(idle_share=1.5), "vehicles[0].idle_share", "at most 1"),
+    (lambda d: d["vehicles"][0].update(idle_share=-0.5), "vehicles[0].idle_share", "at least 0"),
+    (lambda d: d["time_s"].pop(), "time_s", "expected 4 rows"),
+    (lambda d: d["time_s"][1].pop(), "time_s[1]", "expected 4 entries"),
+    (lambda d: d["time_s"][0].__setitem__(1, -1), "time_s[0][1]", "at least 0"),
+    (lambda d: d["time_s"][0].__setitem__(0, 1), "time_s[0][0]", "the diagonal must be 0"),
+    (lambda d: d["time_s"][0].__setitem__(1, None), "time_s[0][1]", "null in one of fuel_s and time_s alone"),
+])
+def test_energy_that_makes_no_sense_is_refused(
+    tmp_path: Path, change: Callable[[dict[str, Any]], object], key: str, words: str,
+) -> None:
+    def both(data: dict[str, Any]) -> None:
+        energetic(data)
+        change(data)
+    with pytest.raises(BadFile) as refused:
+        read_instance(written(tmp_path, changed(both)))
+    assert refused.value.key == key
+    assert words in str(refused.value)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from ruamel.yaml import YAML
@@ -435,3 +437,24 @@ def test_a_resolved_world_resolves_to_itself_bit_for_bit(tmp_path: Path, path: P
     # The manifest holds the resolved world: running it again must give the same run.
     again = written(tmp_path, load_world(path), "json")
     assert_same_world(load_world(path), again, exactly=True)
+
+
+ENERGETIC = SMALL.replace("    availability: 0.75\n", "    availability: 0.75\n    idle_share: 0.25\n")
+
+
+def test_energy_of_a_world_is_that_of_its_instances(tmp_path: Path) -> None:
+    world = world_of(tmp_path, SMALL)
+    assert {site.charge_rate for site in world.sites} == {None}
+    assert not {"idle_share", "charge_rate"} & set(str(world_as_dict(world)).replace("'", "").replace(":", "").split())
+    world = world_of(tmp_path, ENERGETIC)
+    world = replace(world, sites=tuple(
+        replace(site, charge_rate=4.0) if site.kind == "station" else site for site in world.sites))
+    assert sorted(robot.idle_share for robot in world.robots) == [0.0, 0.25]
+    instance = instance_of(world, plan_costs(world, "prmstar", lambda *_: None), world.scenarios[0])
+    assert sorted(vehicle.idle_share for vehicle in instance.vehicles) == [0.0, 0.25]
+    assert world.stations
+    assert instance.charge_rate is not None
+    assert {instance.sites[k] for k in np.flatnonzero(np.isfinite(instance.charge_rate))} == {
+        site.name for site in world.stations}
+    described = world_as_dict(world)
+    assert {entry["charge_rate"] for entry in described["sites"]["stations"].values()} == {4.0}

@@ -116,10 +116,12 @@ def formulate(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> tuple[
     upper[:len(legs.vehicle)][hops] = len(instance.pois) + 1
     objective = np.zeros(legs.columns)
     objective[:len(legs.vehicle)] = goal.weights[legs.vehicle, legs.destination]
+    charging = False
     for m, scope in enumerate(scopes):
         mine = np.flatnonzero(legs.vehicle == m)
         flows = resources(instance, scope)
         charges = _charges(legs, mine, scope)
+        charging |= bool(charges)
         if goal.driving:
             objective[mine] -= goal.driving * flows[1].used_s[legs.origin[mine], legs.destination[mine]]
             for column, each_s in charges.values():
@@ -135,7 +137,8 @@ def formulate(instance: Instance, scopes: Sequence[Scope], goal: Goal) -> tuple[
         values = weights[legs.vehicle, legs.destination]
         counted = np.flatnonzero(values)
         build.add(counted, values[counted] / size, floor / size, np.inf)
-    return LinearModel(objective=objective, upper=upper, integer=integer, rows=build.rows()), legs
+    return LinearModel(objective=objective, upper=upper, integer=integer, rows=build.rows(),
+                       aggregates=not charging), legs
 
 
 def _legs(instance: Instance, scopes: Sequence[Scope]) -> Legs:

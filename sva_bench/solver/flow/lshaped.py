@@ -91,7 +91,8 @@ class _Master(DirectedModel):
         self.model = LinearModel(
             objective=np.concatenate([self._first.objective, cost]),
             upper=np.concatenate([self._first.upper, np.full(etas, np.inf)]),
-            integer=np.concatenate([self._first.integer, np.zeros(etas, dtype=np.bool_)]), rows=self._first.rows)
+            integer=np.concatenate([self._first.integer, np.zeros(etas, dtype=np.bool_)]), rows=self._first.rows,
+            aggregates=self._first.aggregates)
         legs = self.legs
         self._earned = recourse.incentives[legs.vehicle, legs.destination]
         self._lost = 1.0 - recourse.available[:, legs.vehicle]

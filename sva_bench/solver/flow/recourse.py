@@ -87,7 +87,7 @@ class EquivalentModel(DirectedModel):
             objective=np.concatenate([first.objective, second]),
             upper=np.concatenate([first.upper, np.tile(first.upper[:count], outcomes)]),
             integer=np.concatenate([first.integer, np.full(outcomes * count, not relaxed)]),
-            rows=stacked(first.rows, build.rows()))
+            rows=stacked(first.rows, build.rows()), aggregates=first.aggregates)
 
     def out_of_poi(self, instance: Instance) -> BoolArray:
         """Which legs leave a POI, shape (legs,)."""
