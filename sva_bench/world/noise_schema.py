@@ -11,7 +11,7 @@ from sva_bench.files.fields import Bounded, Probability, Section
 from sva_bench.world.noise import REALISTIC, LocalisationError, Noise, Passage, People
 
 _MOST_DELAY_S = 0.15
-_MOST_SLOPE = 0.35
+_MOST_SLOPE = 0.2  # its gradient has this standard deviation; at five of them, 1, two places would look like one
 _Share = Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)]
 _Coordinate = Annotated[float, Field(strict=True, ge=-1e5, le=1e5, allow_inf_nan=False)]
 _Point = Annotated[list[_Coordinate], Field(min_length=2, max_length=2)]
@@ -97,7 +97,7 @@ def _spelled_out(value: object) -> object:
     return {"preset": value} if isinstance(value, str) else value
 
 
-NoiseSection = Annotated[NoiseEntry, BeforeValidator(_spelled_out)]
+NoiseSection = Annotated[NoiseEntry, BeforeValidator(_spelled_out, json_schema_input_type=NoiseEntry | NoisePreset | None)]
 
 
 class PassageEntry(Section):
