@@ -36,7 +36,7 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
     limits, dt, half = model.limits, 1.0 / CONTROL_HZ, 0.5 * model.track_m
     check = round(_STUCK_CHECK_S * CONTROL_HZ)
     waves, queue = disturbance.waves, np.zeros((disturbance.delay_steps, 2))
-    lost, late = len(waves) > 0, len(queue) > 0
+    lost, late = waves.shape[1] > 0, len(queue) > 0
     where, step = engine.pose, engine.step
     total = 0
     pose = where()
@@ -72,9 +72,10 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
     for _ in range(len(queue)):  # what is still on its way
         speed, rate = delayed(queue, 0.0, 0.0)
         step(speed - half * rate, speed + half * rate)
+        pose = where()
         if poses is not None:
-            poses.append(where())
-    return (total + len(queue)) * dt, True
+            poses.append(pose)
+    return (total + len(queue)) * dt, not engine.tipped_over
 
 
 def is_stuck(progress_m: float, turned_rad: float, on_the_way: bool) -> bool:

@@ -90,14 +90,22 @@ class NoiseEntry(Section):
         return Noise(**{**base, **told})
 
 
-def _spelled_out(value: object) -> object:
-    """``noise: realistic`` is a preset alone; nothing below the heading is no noise."""
+def spelled_out(value: object) -> object:
+    """The content of ``noise:`` as a mapping: ``realistic`` is a preset alone, and nothing below the heading no noise.
+
+    What is left out of an error of localisation beside the preset is the preset's too.
+    """
     if value is None:
         return {}
-    return {"preset": value} if isinstance(value, str) else value
+    if isinstance(value, str):
+        return {"preset": value}
+    if isinstance(value, dict) and value.get("preset") == "realistic" and isinstance(value.get("localisation"), dict):
+        return {**value, "localisation": {**_content(REALISTIC.localisation), **value["localisation"]}}
+    return value
 
 
-NoiseSection = Annotated[NoiseEntry, BeforeValidator(_spelled_out, json_schema_input_type=NoiseEntry | NoisePreset | None)]
+NoiseSection = Annotated[NoiseEntry, BeforeValidator(
+    spelled_out, json_schema_input_type=NoiseEntry | NoisePreset | None)]
 
 
 class PassageEntry(Section):
@@ -131,11 +139,12 @@ class FloorEntry(Section):
 
 def noise_as_dict(noise: Noise) -> dict[str, Any]:
     """The noise as the content of ``noise:``; sources that are off are left out, but for the wheels'."""
-    def content(value: object) -> Any:
-        if isinstance(value, LocalisationError | People):
-            return {key: getattr(value, key) for key in type(value).__dataclass_fields__}
-        return list(value) if isinstance(value, tuple) else value
-
     off = Noise()
     told = {key: getattr(noise, key) for key in Noise.__dataclass_fields__}
-    return {key: content(value) for key, value in told.items() if key == "wheel_gain_sd" or value != getattr(off, key)}
+    return {key: _content(value) for key, value in told.items() if key == "wheel_gain_sd" or value != getattr(off, key)}
+
+
+def _content(value: object) -> Any:
+    if isinstance(value, LocalisationError | People):
+        return {key: getattr(value, key) for key in type(value).__dataclass_fields__}
+    return list(value) if isinstance(value, tuple) else value

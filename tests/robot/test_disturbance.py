@@ -24,8 +24,8 @@ def field(number: int) -> ErrorField:
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.integers(0, 20))
 def test_the_error_is_the_sum_of_its_waves(x: float, y: float, number: int) -> None:
     waves = field(number).waves()
-    phase = waves[:, :2] @ (x, y)
-    expected = [float(waves[:, k] @ np.cos(phase) + waves[:, k + 1] @ np.sin(phase)) for k in (2, 4, 6)]
+    phase = (x, y) @ waves[:2]
+    expected = [float(waves[k] @ np.cos(phase) + waves[k + 1] @ np.sin(phase)) for k in (2, 4, 6)]
     # The series is right to 1e-9 of an amplitude, and there are 24; turns far from the origin lose some digits.
     assert_allclose(error_at(waves, x, y), expected, atol=1e-9 + 1e-12 * FEATURES * (abs(x) + abs(y)))
 

@@ -35,6 +35,8 @@ def saying(folder: Path, noise: str) -> World:
     ("noise: {preset: realistic, delay_s: [0, 0]}", replace(REALISTIC, delay_s=(0.0, 0.0))),
     ("noise: {preset: realistic, people: {per_m: 0.05, stop_s: 4}}",
      replace(REALISTIC, people=People(per_m=0.05, stop_s=4.0))),
+    ("noise: {preset: realistic, localisation: {sd_m: 0.03}}",
+     replace(REALISTIC, localisation=LocalisationError(sd_m=0.03, sd_deg=2.0, length_m=0.5))),
     ("noise: {preset: null, capacity_sd: 0.1}", Noise(capacity_sd=0.1)),
     ("noise: {localisation: {sd_m: 0.03, length_m: 1}}",
      Noise(localisation=LocalisationError(sd_m=0.03, sd_deg=0.0, length_m=1.0))),

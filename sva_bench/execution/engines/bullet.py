@@ -111,7 +111,7 @@ class Bullet:
     def pose(self) -> tuple[float, float, float]:
         """x, y [m], yaw [rad]."""
         (x, y, _), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
-        if not 1 - 2 * (qx * qx + qy * qy) > _UPRIGHT:  # it tells no number either
+        if not (1 - 2 * (qx * qx + qy * qy) > _UPRIGHT and math.isfinite(x + y + qz + qw)):  # NaN is not greater
             self.tipped_over = True
             return self._last
         self._last = x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
