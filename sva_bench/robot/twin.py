@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray
-from sva_bench.robot.disturbance import FEATURES, NO_WAVES, UNDISTURBED, Disturbance, error_by
+from sva_bench.robot.disturbance import NO_WAVES, UNDISTURBED, Disturbance, error_at
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, Stretch, control, horizon_m, new_state
 from sva_bench.robot.model import RobotModel
 
@@ -54,13 +54,13 @@ def _drive(
     Changes ``state``, ``pose`` and ``queue``, the commands on their way, in place, and fills ``trace`` with the pose
     after each step.
     """
-    lost, terms = waves.shape[1] > 0, np.empty((3, FEATURES))
+    parts = np.empty((3, waves.shape[1]))
     for step in range(first, steps):
         if state[1] > until:
             return step
         x, y, yaw = pose[0], pose[1], pose[2]
-        if lost:
-            ex, ey, eyaw = error_by(waves, terms, x, y)
+        if waves.shape[1] > 0:
+            ex, ey, eyaw = error_at(waves, parts, x, y)
             x, y, yaw = x + ex, y + ey, yaw + eyaw
         speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
         if state[0] == ARRIVED:

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sva_bench.robot.disturbance import FEATURES, NO_WAVES, UNDISTURBED, Disturbance, ErrorField, error_at
+from sva_bench.arrays import FloatArray
+from sva_bench.robot.disturbance import FEATURES, NO_WAVES, UNDISTURBED, Disturbance, ErrorField, error_at, room_for
 from sva_bench.robot.follower import CONTROL_HZ
 from sva_bench.robot.twin import delayed
 
@@ -21,20 +22,25 @@ def field(number: int) -> ErrorField:
     return ErrorField(sd_m=0.05, sd_rad=math.radians(2.0), length_m=0.5, seed=(0, 12, number, 0))
 
 
+def error_of(waves: FloatArray, x: float, y: float) -> tuple[float, float, float]:
+    ex, ey, eyaw = error_at(waves, room_for(waves), x, y)
+    return ex, ey, eyaw
+
+
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.integers(0, 20))
 def test_the_error_is_the_sum_of_its_waves(x: float, y: float, number: int) -> None:
     waves = field(number).waves()
     phase = (x, y) @ waves[:2]
     expected = [float(waves[k] @ np.cos(phase) + waves[k + 1] @ np.sin(phase)) for k in (2, 4, 6)]
     # The series is right to 1e-9 of an amplitude, and there are 24; turns far from the origin lose some digits.
-    assert_allclose(error_at(waves, x, y), expected, atol=1e-9 + 1e-12 * FEATURES * (abs(x) + abs(y)))
+    assert_allclose(error_of(waves, x, y), expected, atol=1e-9 + 1e-12 * FEATURES * (abs(x) + abs(y)))
 
 
 def test_errors_have_the_spread_and_the_length_that_were_asked_for() -> None:
     # Over 400 fields at points 0, L and 5 L apart. The covariance of a squared exponential is exp(-1/2) at one length
     # and 4e-6 at five; the error of a correlation over 400 fields is 0.05, of a spread 3.5 %.
     waves = [field(k).waves() for k in range(400)]
-    here, there, far = (np.array([error_at(w, 3.0 + d, 7.0) for w in waves]) for d in (0.0, 0.5, 2.5))
+    here, there, far = (np.array([error_of(w, 3.0 + d, 7.0) for w in waves]) for d in (0.0, 0.5, 2.5))
     assert_allclose(here.std(axis=0), [0.05, 0.05, math.radians(2)], rtol=0.12)
     assert_allclose(here.mean(axis=0), 0.0, atol=0.05 * 0.2)
     for axis in range(3):
@@ -47,7 +53,7 @@ def test_a_robot_that_believes_to_be_somewhere_stands_where_the_error_leads_ther
     for number in range(20):
         pose = (number * 0.7, -0.3 * number, 0.1 * number)
         x, y, yaw = field(number).start(pose)
-        ex, ey, eyaw = error_at(field(number).waves(), x, y)
+        ex, ey, eyaw = error_of(field(number).waves(), x, y)
         assert_allclose((x + ex, y + ey, yaw + eyaw), pose, atol=1e-9)
 
 
@@ -57,7 +63,7 @@ def test_the_steepest_field_that_is_allowed_has_one_place_for_each_belief() -> N
     for number in range(200):
         steep = ErrorField(sd_m=0.2, sd_rad=0.0, length_m=1.0, seed=(1, number))
         x, y, _ = steep.start((2.0, 3.0, 0.0))
-        ex, ey, _ = error_at(steep.waves(), x, y)
+        ex, ey, _ = error_of(steep.waves(), x, y)
         worst = max(worst, math.hypot(x + ex - 2.0, y + ey - 3.0))
     assert worst < 1e-3
 
