@@ -170,3 +170,11 @@ def test_a_world_without_them_says_nothing_of_passages_and_floors(tmp_path: Path
 def test_rollouts_differ_where_something_is_drawn_for_them(tmp_path: Path, said: str, passages: str, noisy: bool
                                                           ) -> None:
     assert world_of(tmp_path, SMALL.replace(SAID, f"{said}\n") + passages).noisy == noisy
+
+
+def test_the_world_of_the_page_is_one_and_the_page_has_every_key(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "noise.md").read_text(encoding="utf-8")
+    world = world_of(tmp_path, page.split("```yaml\n")[1].split("```")[0])
+    assert world.noise == replace(REALISTIC, capacity_fade=(0.0, 0.2))
+    assert len(world.passages) == len(world.obstacles.floors) == 1
+    assert [key for key in NoiseEntry.model_fields if key != "preset" and f"| `noise.{key}` |" not in page] == []
