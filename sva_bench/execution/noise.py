@@ -97,7 +97,7 @@ class WheelGains:
     def disturb(self, so_far: NoiseDraw, noise: Noise, draws: Draws) -> NoiseDraw:
         """Normal gains about 1 for the left and the right wheel, in this order."""
         left, right = 1.0 + noise.wheel_gain_sd * draws.rng.standard_normal(2)
-        return _with(so_far, wheel_gains=(float(left), float(right)))
+        return _with(so_far, wheel_gains=(_gain(left), _gain(right)))
 
 
 class SpeedGain:

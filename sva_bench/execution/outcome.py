@@ -227,7 +227,9 @@ def trace_of(
         times, poses, fuels = [np.array([0.0, start_s])], [np.array([start] * 2)], [np.full(2, tank)]
     for leg, leg_s in enumerate(driven.leg_s.tolist()):
         mine, waits = driven.leg_of == leg, [wait for wait in driven.waits if wait.leg == leg]
-        driven_s, waited_s, pose = _paused(driven.clock_s[mine], driven.pose[mine], waits)
+        # Of a leg cut short, by the rules, a robot waits first what it would have waited further on.
+        cut_s = outcome.driven_s - float(driven.leg_s[:leg].sum()) if leg == outcome.stops_reached else math.inf
+        driven_s, waited_s, pose = _paused(driven.clock_s[mine], driven.pose[mine], waits, poses[-1][-1], cut_s)
         times.append(clock + driven_s + waited_s)
         poses.append(pose)
         fuels.append(tank - (driven_s + orders.idle_share * waited_s) / driven.capacity)
@@ -237,7 +239,7 @@ def trace_of(
         stop_s = orders.stop_s[site]
         if site in orders.stations:
             stop_s, burnt = stop_s + burnt / orders.charge_rate.get(site, math.inf), 0.0
-        else:
+        elif leg < len(orders.route) - 2:
             burnt += orders.idle_share * stop_s
         tank = orders.fuel_capacity_s - burnt / driven.capacity
         if stop_s > 0 and len(poses[-1]):
@@ -254,16 +256,26 @@ def trace_of(
     return Trace(orders=orders, outcome=outcome, time_s=time, pose=pose, fuel_s=fuel, planned=planned)
 
 
-def _paused(clock_s: FloatArray, pose: FloatArray, waits: Sequence[Wait]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _paused(clock_s: FloatArray, pose: FloatArray, waits: Sequence[Wait], begun: FloatArray, cut_s: float
+            ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A leg over time with its waits, each where the robot comes nearest to the place of it.
+
+    Args:
+        clock_s, pose: As of ``Driven``, of the leg.
+        waits: Its waits.
+        begun: The pose in which it begins, where waits are put that the robot doesn't get to.
+        cut_s: How long it drives on the leg [s].
 
     Returns:
         Time driven, time waited, and pose at each moment.
     """
+    clock_s, pose = np.concatenate([[0.0], clock_s]), np.concatenate([begun[None], pose])
     waited_s = np.zeros(len(clock_s))
-    for wait in waits if len(clock_s) else ():
+    for wait in waits:
         at = int(np.hypot(pose[:, 0] - wait.x_m, pose[:, 1] - wait.y_m).argmin()) + 1
+        if clock_s[at - 1] > cut_s:
+            at = 1
         clock_s, pose = np.insert(clock_s, at, clock_s[at - 1]), np.insert(pose, at, pose[at - 1], axis=0)
         waited_s = np.insert(waited_s, at, waited_s[at - 1])
         waited_s[at:] += wait.lasts_s
-    return clock_s, waited_s, pose
+    return clock_s[1:], waited_s[1:], pose[1:]

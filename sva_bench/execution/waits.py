@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -36,21 +37,27 @@ class HopWait(NamedTuple):
 def crossings_of(path: FloatArray, passage: Passage) -> list[float]:
     """How far along a path it crosses a passage, each time [m].
 
+    A path that comes to the passage and turns back has not crossed it; one that runs along it crosses where it leaves
+    it on the other side. Of two paths that meet in a passage, the one that begins there crosses it.
+
     Args:
         path: Vertices [m], shape (n, 2).
-        passage: The passage. Touching it at an end of the path counts at the beginning alone.
+        passage: The passage.
     """
     ax, ay, bx, by = passage.ends_m
-    normal = np.array([ay - by, bx - ax])
-    side = (path - (ax, ay)) @ normal
+    side = (path - (ax, ay)) @ np.array([ay - by, bx - ax])
     arc = arc_lengths(np.ascontiguousarray(path))
+    off = np.flatnonzero(side)  # vertices that are not on its line
     found = []
-    for k in np.flatnonzero((side[:-1] <= 0) != (side[1:] <= 0)).tolist():
-        share = side[k] / (side[k] - side[k + 1])
-        x, y = path[k] + share * (path[k + 1] - path[k])
+    for before, after in pairwise([-1, *off.tolist()]):
+        if after == 0 or (before >= 0 and (side[before] < 0) == (side[after] < 0)):
+            continue
+        k = after - 1  # the last vertex before it is over
+        share = side[k] / (side[k] - side[after])
+        x, y = path[k] + share * (path[after] - path[k])
         across = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2)
         if 0 <= across <= 1:
-            found.append(float(arc[k] + share * (arc[k + 1] - arc[k])))
+            found.append(float(arc[k] + share * (arc[after] - arc[k])))
     return found
 
 

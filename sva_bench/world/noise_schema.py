@@ -11,7 +11,7 @@ from sva_bench.files.fields import Bounded, Probability, Section
 from sva_bench.world.noise import REALISTIC, LocalisationError, Noise, Passage, People
 
 _MOST_DELAY_S = 0.15
-_MOST_SLOPE = 0.35
+_MOST_SLOPE = 0.2  # its gradient has this standard deviation; at five of them, 1, two places would look like one
 _Share = Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)]
 _Coordinate = Annotated[float, Field(strict=True, ge=-1e5, le=1e5, allow_inf_nan=False)]
 _Point = Annotated[list[_Coordinate], Field(min_length=2, max_length=2)]
@@ -90,14 +90,22 @@ class NoiseEntry(Section):
         return Noise(**{**base, **told})
 
 
-def _spelled_out(value: object) -> object:
-    """``noise: realistic`` is a preset alone; nothing below the heading is no noise."""
+def spelled_out(value: object) -> object:
+    """The content of ``noise:`` as a mapping: ``realistic`` is a preset alone, and nothing below the heading no noise.
+
+    What is left out of an error of localisation beside the preset is the preset's too.
+    """
     if value is None:
         return {}
-    return {"preset": value} if isinstance(value, str) else value
+    if isinstance(value, str):
+        return {"preset": value}
+    if isinstance(value, dict) and value.get("preset") == "realistic" and isinstance(value.get("localisation"), dict):
+        return {**value, "localisation": {**_content(REALISTIC.localisation), **value["localisation"]}}
+    return value
 
 
-NoiseSection = Annotated[NoiseEntry, BeforeValidator(_spelled_out)]
+NoiseSection = Annotated[NoiseEntry, BeforeValidator(
+    spelled_out, json_schema_input_type=NoiseEntry | NoisePreset | None)]
 
 
 class PassageEntry(Section):
@@ -131,11 +139,12 @@ class FloorEntry(Section):
 
 def noise_as_dict(noise: Noise) -> dict[str, Any]:
     """The noise as the content of ``noise:``; sources that are off are left out, but for the wheels'."""
-    def content(value: object) -> Any:
-        if isinstance(value, LocalisationError | People):
-            return {key: getattr(value, key) for key in type(value).__dataclass_fields__}
-        return list(value) if isinstance(value, tuple) else value
-
     off = Noise()
     told = {key: getattr(noise, key) for key in Noise.__dataclass_fields__}
-    return {key: content(value) for key, value in told.items() if key == "wheel_gain_sd" or value != getattr(off, key)}
+    return {key: _content(value) for key, value in told.items() if key == "wheel_gain_sd" or value != getattr(off, key)}
+
+
+def _content(value: object) -> Any:
+    if isinstance(value, LocalisationError | People):
+        return {key: getattr(value, key) for key in type(value).__dataclass_fields__}
+    return list(value) if isinstance(value, tuple) else value

@@ -13,12 +13,13 @@ from sva_bench.files.documents import Document, Loc
 from sva_bench.mission.failures import undefined_under, without_joint
 from sva_bench.world.load import world_of
 from sva_bench.world.model import World, nominal_of
+from sva_bench.world.noise_schema import spelled_out
 
 Blame = Callable[[str, str], SvaBenchError]
 """Makes the error for a key and the problem with its value."""
 
 _NAMED: dict[Loc, str] = {("robots",): "robot", ("sites", "stations"): "station", ("sites", "pois"): "POI",
-                          ("scenarios",): "scenario"}
+                          ("scenarios",): "scenario", ("passages",): "passage"}
 """Sections whose keys are names given in the file: values can be set below existing names only."""
 
 
@@ -35,6 +36,9 @@ def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> W
         SvaBenchError: From ``blame``, if a value is wrong.
     """
     changed = document
+    noise = document.data.get("noise", {}) if isinstance(document.data, dict) else {}
+    if not isinstance(noise, dict) and any(key.startswith("noise.") for key in values):
+        changed = document.changed("noise", spelled_out(noise))
     for key, value in values.items():
         try:
             changed = changed.changed(key, value, _NAMED)

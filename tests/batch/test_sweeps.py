@@ -288,12 +288,14 @@ def test_varied_reactions_have_an_effect_unless_an_option_says_otherwise(
         grid_of(Sweep(worlds=(path,), vary={"reaction.policy": ["resolve"], "reaction.news": ["soon"]}))
 
 
-def test_varied_noise_without_effect_gives_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    vary = {"noise.wheel_gain_sd": [0.0, 0.02]}
+@pytest.mark.parametrize("key", ["noise.payload_kg", "noise.hull_friction"])
+def test_what_acts_in_physics_alone_gives_a_warning_if_the_twin_drives(
+        tmp_path: Path, caplog: pytest.LogCaptureFixture, key: str) -> None:
+    vary = {key: [[0, 0], [1, 2]] if key.endswith("kg") else [0.0, 0.4], "noise.wheel_gain_sd": [0.0, 0.02]}
     grid_of(Sweep(worlds=(world(tmp_path),), vary=vary, fidelity="rollout"))
     assert caplog.messages == []
     grid_of(Sweep(worlds=(world(tmp_path),), vary=vary, fidelity="kinematic"))
-    assert caplog.messages == ["noise is varied to no effect: kinematic trials have none"]
+    assert caplog.messages == [f"{key} is varied to no effect: kinematic trials know nothing of it"]
 
 
 def test_an_invalid_sweep_file_is_an_error_with_line_and_key(tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ class Bullet:
         if self._axle is not None:  # else the base is its centre of mass
             place, turned = pybullet.multiplyTransforms(place, turned, *self._axle)
         (x, y, _), (qx, qy, qz, qw) = place, turned
-        if not 1 - 2 * (qx * qx + qy * qy) > _UPRIGHT:  # it tells no number either
+        if not (1 - 2 * (qx * qx + qy * qy) > _UPRIGHT and math.isfinite(x + y + qz + qw)):  # NaN is not greater
             self.tipped_over = True
             return self._last
         self._last = x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
