@@ -10,6 +10,7 @@ from urllib.parse import quote
 import numpy as np
 
 from sva_bench.analysis.catalogue import Section, statistics
+from sva_bench.analysis.driving import driving_told
 from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import Estimate, Share
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -269,4 +270,5 @@ def _again(summary: AnySummary, manifest: Manifest) -> list[str]:
             f"<pre><code>{text(shlex.join(manifest.command))}</code></pre>",
             note(f"sva-bench {manifest.version}, seed {summary.seed}, Python {manifest.machine.python}; "
                  f"{packages}. The resolved world and all options stand in manifest.json, the figures in summary.json, "
-                 "every trial in outcomes.parquet.")]
+                 "every trial in outcomes.parquet."),
+            *([] if summary.drives is None else [note(f"Driven: {driving_told(summary.drives)}.")])]
