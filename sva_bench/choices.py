@@ -63,6 +63,10 @@ EventKind = Literal["departed", "waits", "touches", "arrived", "collected", "ref
                     "late", "stuck", "home"]
 DriveUnit = Literal["hops", "routes"]
 """What is driven at a time: from site to site, or from base to base."""
+MarkKind = Literal["contact", "wait"]
+"""What a picture marks of what robots met."""
+Judgement = Literal["safe", "close", "edge"]
+"""Of a leg under noise: one with little margin is ``close``, one on which robots run dry or late is on the ``edge``."""
 NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payload", "capacity", "people", "passages",
                     "floors", "contact"]
 """What the execution meets that a plan doesn't know of, by the names under which its effects are reported."""

@@ -18,6 +18,7 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.wording import (
@@ -70,6 +71,7 @@ def write_report(path: Path, content: Content) -> None:
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
         *_measured(scenarios),
+        *meetings_section(content),
         *_legs(content.legs.without_reaction()),
         *_routes(content.routes),
         *_recordings(content),
