@@ -61,7 +61,14 @@ ENDS: tuple[End, ...] = get_args(End)
 Role = Literal["stochastic", "deterministic", "anticipative", "informed", "informed_part", "worst_tie", "given"]
 """What a plan is executed for: ours, the third made for a reaction; what is behind the informed planner, and one of its
 plans; the least fortunate of the deterministic plans that tie; or given from elsewhere."""
-EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]
+EventKind = Literal["departed", "waits", "touches", "arrived", "collected", "refuelled", "failed", "out_of_fuel",
+                    "late", "stuck", "home"]
+DriveUnit = Literal["hops", "routes"]
+"""What is driven at a time: from site to site, or from base to base."""
+MarkKind = Literal["contact", "wait"]
+"""What a picture marks of what robots met."""
+Judgement = Literal["safe", "close", "edge"]
+"""Of a leg under noise: one with little margin is ``close``, one on which robots run dry or late is on the ``edge``."""
 NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payload", "capacity", "people", "passages",
                     "floors", "contact"]
 """What the execution meets that a plan doesn't know of, by the names under which its effects are reported."""

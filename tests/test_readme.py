@@ -59,7 +59,7 @@ def as_run(command: str) -> str | None:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with what the pages name: the shipped worlds and plans, and the world and sweep in their blocks."""
-    for name in ("worlds", "plans"):
+    for name in ("worlds", "plans", "examples"):
         shutil.copytree(ROOT / name, tmp_path / name)
     for page in PAGES:
         for block in blocks(page, "yaml"):

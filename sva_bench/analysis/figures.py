@@ -64,6 +64,16 @@ def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
     return figures
 
 
+def bad_figure(run: Executed, *, noisy: bool) -> Figure:
+    """The share of trials in which some robot ended by what the execution made of the plan: dry, late or stuck."""
+    happened: FloatArray = np.isin(run.end, [ENDS.index(end) for end in EXECUTION_LOSSES]).max(axis=1).astype(
+        np.float64)
+    reached = exposure_of(run.margins, run.value.shape[1], noisy=noisy).ends
+    most = sum(float(reached[m].sum()) for m in range(len(reached)) if run.terms.most(m) > 0)
+    return figure_of(np.zeros(len(happened)), (0.0, 0.0), -happened, (-min(1.0, most), 0.0), run.rollout,
+                     noisy=noisy, certain=(0.0, 1.0))
+
+
 def mean_taken(run: Executed, margins: Sequence[Margins], *, noisy: bool) -> Bounds:
     """Bounds on the mean loss, over failures, in a noise draw that was not observed."""
     exposed = exposure_of(margins, run.value.shape[1], noisy=noisy).value

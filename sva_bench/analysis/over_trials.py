@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sva_bench.analysis.catalogue import measured
-from sva_bench.analysis.figures import difference_figure, end_figures, value_figure
+from sva_bench.analysis.figures import bad_figure, difference_figure, end_figures, value_figure
 from sva_bench.analysis.moments import Figure
 from sva_bench.analysis.results import (
     MOST_AMOUNT,
@@ -141,7 +141,8 @@ def plan_result(promise: Promise, run: Executed, *, noisy: bool) -> PlanResult:
     statistics = {key: estimate(found) for key, found in measured(run, noisy=noisy).items()}
     sums = plan_figures(promise, estimate(figure), by_robot, counts, charges(run) / len(run.end), statistics)
     return PlanResult(**vars(sums), executed_controlled=controlled(figure, promise.expected),
-                      distribution=distribution(totals(run)), end_shares=shares)
+                      distribution=distribution(totals(run)), end_shares=shares,
+                      bad=_share(bad_figure(run, noisy=noisy)))
 
 
 def promise_of(plan: Plan, expected: float) -> Promise:

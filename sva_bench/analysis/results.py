@@ -157,11 +157,13 @@ class PlanResult(PlanFigures):
         executed_controlled: Variance-reduced mean value of the team.
         distribution: Distribution over trials.
         end_shares: Share of trials with each end, by robot.
+        bad: Share of trials in which some robot ran out of fuel, was late or got stuck; ``None`` in older folders.
     """
 
     executed_controlled: Estimate = field(metadata=stands_after("executed"))
     distribution: Distribution = field(metadata=stands_after("executed_controlled"))
     end_shares: Mapping[Name, Mapping[End, Share]] = field(metadata=stands_after("distribution"))
+    bad: Share | None = field(default=None, metadata=stands_after("end_shares"))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from sva_bench.analysis.driving import DrivesMade
 from sva_bench.analysis.results import (
     MOST_ROLLOUTS,
     MOST_TRIALS,
@@ -103,10 +104,15 @@ class Facts(Head):
 
 @dataclass(frozen=True, kw_only=True)
 class OfScenarios(Head, Generic[ScenarioT]):
-    """A whole summary: one entry for each scenario, all of the same plans and robots."""
+    """A whole summary: one entry for each scenario, all of the same plans and robots.
+
+    Attributes:
+        drives: How the drives behind it were made; ``None`` in older folders.
+    """
 
     scenarios: tuple[ScenarioT, ...]
     reach: Reach
+    drives: Annotated[DrivesMade | None, BeforeValidator(not_null)] = None
 
     def scenario(self, name: str) -> ScenarioT:
         """The scenario of that name.

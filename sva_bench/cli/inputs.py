@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sva_bench.choices import InstanceFamily, Unknown, WorldFamily
+from sva_bench.choices import InstanceFamily, PathPlanner, Unknown, WorldFamily
 from sva_bench.cli.loading import loading
-from sva_bench.cli.options import Force, PlannerOption, Verbose, WorldArgument, finite
+from sva_bench.cli.options import AsJson, Force, PlannerOption, ScenarioNames, Verbose, WorldArgument, finite
 from sva_bench.cli.terminal import (
     messages,
     print_json,
@@ -25,7 +25,10 @@ from sva_bench.files.outputs import check_output, write_beside, write_result
 from sva_bench.files.printable import counted
 from sva_bench.files.seal import refuse_edited, refuse_others, sealed
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.study.bounds import MOST_SEED
+from sva_bench.study.bounds import MOST_DRAWS, MOST_SEED
+
+if TYPE_CHECKING:
+    from sva_bench.world.model import World
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make, copy and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
@@ -34,16 +37,42 @@ instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_ma
 @world_app.command("check", cls=PlainCommand)
 def check_world(
     world: WorldArgument,
+    noise: Annotated[bool, typer.Option("--noise", help="Drive the plans under noise, by the twin, and say on which "
+                                        "legs fuel and time are tight.")] = False,
+    plan: Annotated[Path | None, typer.Option(metavar="PLAN.json", help="With --noise: this plan.",
+                                              show_default="the stochastic plan of each scenario")] = None,
+    draws: Annotated[int | None, typer.Option(min=1, max=MOST_DRAWS, help="With --noise: how many noise draws.",
+                                              show_default="200")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=MOST_SEED, help="With --noise: their seed.",
+                                             show_default="0")] = None,
+    scenario: ScenarioNames = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="PICTURE.png|svg", help="With --noise: draw "
+                                                "the legs of the tightest plan, coloured by their margin.",
+                                                show_default="none")] = None,
+    as_json: AsJson = False,
     planner: PlannerOption = "prmstar",
     verbose: Verbose = False,
 ) -> None:
-    """Check a world: is the file right, does every robot reach every site, and what can't be part of any plan?"""
+    """Check a world: is the file right, does every robot reach every site, and what can't be part of any plan?
+
+    With --noise: what does noise leave of the margins of its plans?
+    """
     with loading():
         from sva_bench.study.inputs import about, load
 
     set_up_logging(verbose)
     refuse_closed_output()
-    loaded = load(world)
+    if not noise and (lone := [name for name, given in (
+            ("--plan", plan), ("--draws", draws), ("--seed", seed), ("--scenario", scenario), ("--output", output),
+            ("--json", as_json or None)) if given is not None]):
+        raise BadInput(f"{lone[0]} belongs to --noise: add that, or leave it out")
+    if output is not None:
+        _kind_of(output)
+        check_output(output, world)
+    loaded = load(world, scenario)
+    if noise:
+        _check_noise(loaded, world, planner, plan, output, draws or 200, seed or 0, as_json=as_json)
+        return
     with loading():
         from sva_bench.analysis.reach import NOTHING, beyond_reach
         from sva_bench.study.costs import plan_costs, reach_of
@@ -67,6 +96,34 @@ def check_world(
               "scenario": len(loaded.scenarios)}
     console.print(f"{loaded.name} {verdict}: "
                   + ", ".join(counted(count, what) for what, count in counts.items()), highlight=False)
+
+
+def _kind_of(picture: Path) -> str:
+    """``png`` or ``svg``.
+
+    Raises:
+        BadInput: If the name says neither.
+    """
+    kind = picture.suffix.lower()[1:]
+    if kind not in ("png", "svg"):
+        raise BadInput(f"{picture}: pictures are written as PNG or SVG; let the name end in .png or .svg")
+    return kind
+
+
+def _check_noise(loaded: World, path: Path, planner: PathPlanner, plan: Path | None, output: Path | None, draws: int,
+                 seed: int, *, as_json: bool) -> None:
+    """The check under noise."""
+    with loading():
+        from sva_bench.cli.noise_check import check_under_noise
+        from sva_bench.study.costs import plan_costs
+        from sva_bench.study.inputs import about
+        from sva_bench.study.noise_check import refuse_without_noise
+
+    refuse_without_noise(loaded)
+    with about(path):
+        with progress_bars() as progress:
+            costs = plan_costs(loaded, planner, progress)
+        check_under_noise(loaded, costs, plan, output, draws=draws, seed=seed, as_json=as_json)
 
 
 @world_app.command("random", cls=PlainCommand)
@@ -196,9 +253,7 @@ def draw(
     verbose: Verbose = False,
 ) -> None:
     """Draw a world to scale: map, sites, incentives; on request roadmap, paths and a plan's routes."""
-    kind = output.suffix.lower()[1:]
-    if kind not in ("png", "svg"):
-        raise BadInput(f"{output}: pictures are written as PNG or SVG; let the name end in .png or .svg")
+    kind = _kind_of(output)
     with loading():
         from sva_bench.study.inputs import about, load
 

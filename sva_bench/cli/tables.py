@@ -17,6 +17,7 @@ from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.compared_reactions import reaction_lines
+from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     answer,
@@ -49,7 +50,9 @@ def print_summary(summary: AnySummary) -> None:
             if scenario.comparisons:
                 console.print(f"{scenario.name}: {ranked(scenario)}", highlight=False, markup=False)
     console.print(answer(summary), highlight=False)
-    for said in remarks(summary):
+    for said in contradictions(summary):
+        console.print(f"{CONTRADICTED} {said}", highlight=False)
+    for said in (*upset_by_noise(summary), *remarks(summary)):
         console.print(said, highlight=False)
     if isinstance(summary, ComparisonSummary):
         for said in reaction_lines(summary):

@@ -251,7 +251,7 @@ class Courses:
                 driven = drives.whole[key] if key in drives.whole else composed(
                     [[drives.hops[model, drawn.disturbance, a, b] for a, b in leg]
                      for leg in self._hops_of(model, key[1])])
-                drives.routes[key] = replace(driven, capacity=drawn.capacity, waits=self._waits(key))
+                drives.routes[key] = replace(driven, capacity=drawn.capacity, waits=self._waits(key, driven.leg_s))
 
     def _lacking(self, wanted: Mapping[RouteKey, bool], known: Drives) -> dict[HopKey, tuple[int, bool]]:
         """Hops that are not driven yet, or not traced: the first rollout that wants each, and whether it is traced."""
@@ -280,12 +280,21 @@ class Courses:
     def _drawn(self, key: RouteKey) -> NoiseDraw:
         return draw_noise(self._world.noise, self._settings.seed, key[2], self._numbers[key[0]])
 
-    def _waits(self, key: RouteKey) -> tuple[Wait, ...]:
-        """The waits on each leg of a route."""
+    def _waits(self, key: RouteKey, leg_s: FloatArray) -> tuple[Wait, ...]:
+        """The waits on each leg of a route, when by the share of the leg's way that lies before them."""
+        if not self._may_wait:
+            return ()
         robot, route, rollout, _ = key
-        return tuple(Wait(leg=leg, lasts_s=wait.lasts_s, x_m=wait.x_m, y_m=wait.y_m, cause=wait.cause)
-                     for leg, hops in enumerate(self._hops_of(self._model(robot), route)) for a, b in hops
-                     for wait in self._hop_waits(robot, rollout, a, b)) if self._may_wait else ()
+        waits, model = [], self._model(robot)
+        for leg, hops in enumerate(self._hops_of(model, route)):
+            met, way_m = [], 0.0
+            for a, b in hops:
+                met += [(way_m + wait.along_m, wait) for wait in self._hop_waits(robot, rollout, a, b)]
+                way_m += sum(float(stretch.arc[-1]) for stretch in self._hop(model, a, b))
+            lasts_s = float(leg_s[leg]) if leg < len(leg_s) else 0.0
+            waits += [Wait(leg=leg, lasts_s=wait.lasts_s, x_m=wait.x_m, y_m=wait.y_m, cause=wait.cause,
+                           since_s=lasts_s * along_m / way_m) for along_m, wait in met]
+        return tuple(waits)
 
     def _hop_waits(self, robot: str, rollout: int, origin: str, destination: str) -> tuple[HopWait, ...]:
         key, model = (robot, rollout, origin, destination), self._model(robot)

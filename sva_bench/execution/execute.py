@@ -15,9 +15,11 @@ from sva_bench.execution.case import Settings as Settings
 from sva_bench.execution.drives import Chunk, Courses, Drives, RouteKey, drive_all, receive
 from sva_bench.execution.fate import Fate, draw_fate
 from sva_bench.execution.margins import Margins, margins_of_team
-from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, trace_of
-from sva_bench.execution.rules import settle
+from sva_bench.execution.noise import draw_noise
+from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, Wait, trace_of
+from sva_bench.execution.rules import legs_of, settle
 from sva_bench.execution.settling import left_by_draws, settle_alike
+from sva_bench.execution.touch import Touch
 from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.mission.plan import Route
 from sva_bench.travel.fuel import FuelCosts
@@ -34,6 +36,8 @@ class LegTime:
     Attributes:
         trial: The first trial that it belongs to.
         leg: Its place on the robot's route in that trial.
+        touches, waits: What the robot touched on it, and where it waited.
+        held_by: What it got stuck by on it, where that is known.
     """
 
     trial: int
@@ -45,6 +49,9 @@ class LegTime:
     planned_s: float
     driven_s: float
     waited_s: float = 0.0
+    touches: tuple[Touch, ...] = ()
+    waits: tuple[Wait, ...] = ()
+    held_by: str = ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -268,8 +275,9 @@ def _settle_all(
         columns.append({name: np.concatenate([part[name] for part in parts])[back] for name in parts[0]})
         if settings.recorded:
             driven = _drive_of(drives, _key(settings, order, settings.first, int(failed[0])))
+            noise = draw_noise(world.noise, settings.seed, settings.first % settings.rollouts, number)
             traces.append(_trace(world, costs[world.robots[number].model.name], order, driven,
-                                 settle(order, driven, fate.of(0, number))))
+                                 settle(order, driven, fate.of(0, number)), noise.disturbance.waves))
     figures = {name: np.column_stack([column[name] for column in columns]) for name in columns[0]}
     drawn = [left_by_draws(o, fate.fails[:, k], fate.lifetime_s[:, k]) for k, o in enumerate(orders)]
     return Executed(
@@ -295,11 +303,12 @@ def _drive_of(drives: Mapping[RouteKey, Driven], key: RouteKey | None) -> Driven
     return NOTHING if key is None else drives[key]
 
 
-def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, outcome: Outcome) -> Trace:
+def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, outcome: Outcome, waves: FloatArray
+           ) -> Trace:
     base = world.sites[0]
     planned = [costs.times.path(a, b) for leg in pairwise(order.route) for a, b in pairwise(costs.chain(*leg))]
     return trace_of(order, driven, outcome, (base.x_m, base.y_m, base.heading_rad),
-                    np.concatenate(planned) if planned else np.empty((0, 2)))
+                    np.concatenate(planned) if planned else np.empty((0, 2)), waves=waves)
 
 
 def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[RouteKey, tuple[int, Driven]]
@@ -309,11 +318,11 @@ def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[Rou
     rows = []
     for (robot, route, rollout, _), (trial, driven) in drives.items():
         fuel = costs[models[robot]]
-        for leg, (driven_s, waited_s, (origin, destination)) in enumerate(
-                zip(driven.leg_s.tolist(), driven.waited_s.tolist(), pairwise(route), strict=False)):
+        for leg, (done, (origin, destination)) in enumerate(zip(legs_of(driven), pairwise(route), strict=False)):
             # a stuck robot drives fewer
             planned_ms = fuel.repaired_ms[fuel.times.sites.index(origin), fuel.times.sites.index(destination)]
             rows.append(LegTime(
                 trial=trial, rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
-                planned_s=int(planned_ms) / 1000, driven_s=driven_s, waited_s=waited_s))
+                planned_s=int(planned_ms) / 1000, driven_s=done.time_s, waited_s=done.waited_s, touches=done.touches,
+                waits=done.waits, held_by=done.held_by))
     return rows

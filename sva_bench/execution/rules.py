@@ -7,10 +7,12 @@ Nothing here knows an engine: what a leg takes is given.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 from sva_bench.choices import End, EventKind
-from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, RobotFate
+from sva_bench.execution.outcome import Assignment, Driven, Event, Outcome, RobotFate, Wait, met_on_leg
+from sva_bench.execution.touch import Touch
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
 
@@ -24,6 +26,8 @@ class LegDriven(NamedTuple):
         contacts: How many times the hull came to touch an obstacle.
         waited_s: How long it waited on the way [s]: mission clock, but no driving.
         capacity: Factor on what the robot's tank holds.
+        touches, waits: What it touched, and where it waited.
+        held_by: What it got stuck by, where that is known.
     """
 
     time_s: float
@@ -31,6 +35,9 @@ class LegDriven(NamedTuple):
     contacts: int = 0
     waited_s: float = 0.0
     capacity: float = 1.0
+    touches: tuple[Touch, ...] = ()
+    waits: tuple[Wait, ...] = ()
+    held_by: str = ""
 
 
 _SURE = RobotFate()
@@ -107,25 +114,35 @@ class RobotMission:
         Fuel burns while driving, and at the idle share of that while waiting. A robot whose lifetime ends before it
         would arrive, run dry or get stuck fails there and then.
         """
-        to = self.ahead[0]
+        to, begun_s = self.ahead[0], self.clock_s
         driven_s = self.lasts(leg)
         self.contacts += leg.contacts
         if not self._idles(leg.waited_s, leg.capacity):
+            self._tell_met(leg, begun_s, leg.time_s)
             self._ends("out_of_fuel", to, lost=True)
             return
         self.waited_s += leg.waited_s
         if self.driven_s + driven_s > self.fate.lifetime_s:
-            self._rolls(self.fate.lifetime_s - self.driven_s, leg.capacity)
+            driven_s = self.fate.lifetime_s - self.driven_s
+            self._rolls(driven_s, leg.capacity)
+            self._tell_met(leg, begun_s, driven_s)
             self.driven_s = self.fate.lifetime_s
             self._ends("failed", to, lost=True)
             return
         self._rolls(driven_s, leg.capacity)
+        self._tell_met(leg, begun_s, driven_s)
         if driven_s < leg.time_s:
             self._ends("out_of_fuel", to, lost=True)
         elif leg.stuck:
-            self._ends("stuck", to, lost=True)
+            self._ends("stuck", to, lost=True, what=leg.held_by)
         else:
             self._arrive(to, leg.capacity)
+
+    def _tell_met(self, leg: LegDriven, begun_s: float, driven_s: float) -> None:
+        """Tell of what it met on a leg, until now at the latest."""
+        if leg.waits or leg.touches:
+            self._events += [replace(event, time_s=min(event.time_s, self.clock_s)) for event in met_on_leg(
+                self.ahead[0], begun_s, leg.waits, leg.touches, driven_s)]
 
     def _rolls(self, time_s: float, capacity: float) -> None:
         """Drive for so long."""
@@ -178,9 +195,9 @@ class RobotMission:
     def _tell(self, kind: EventKind, site: str, incentive: float = 0.0) -> None:
         self._events.append(Event(time_s=self.clock_s, kind=kind, site=site, incentive=incentive))
 
-    def _ends(self, end: End, site: str, *, lost: bool = False) -> None:
+    def _ends(self, end: End, site: str, *, lost: bool = False, what: str = "") -> None:
         self.end, self._lost = end, lost
-        self._tell(end, site)
+        self._events.append(Event(time_s=self.clock_s, kind=end, site=site, what=what))
 
     def outcome(self) -> Outcome:
         """What came of it.
@@ -200,8 +217,10 @@ class RobotMission:
 
 def legs_of(driven: Driven) -> list[LegDriven]:
     """The legs of a drive, one after the other."""
-    last = len(driven.leg_s) - 1
-    return [LegDriven(time_s, driven.stuck and leg == last, contacts, waited_s, driven.capacity)
+    last, held_by = len(driven.leg_s) - 1, driven.held_by
+    return [LegDriven(time_s, driven.stuck and leg == last, contacts, waited_s, driven.capacity,
+                      driven.touches_on(leg) if contacts else (), driven.waits_on(leg) if driven.waits else (),
+                      held_by if leg == last else "")
             for leg, (time_s, contacts, waited_s) in enumerate(zip(
                 driven.leg_s.tolist(), driven.contacts.tolist(), driven.waited_s.tolist(), strict=True))]
 

@@ -14,6 +14,7 @@ from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all
 from sva_bench.execution.execute import NOTHING, LegTime, orders_of, planned_legs
 from sva_bench.execution.known_legs import KnownLegs
+from sva_bench.execution.noise import draw_noise
 from sva_bench.execution.outcome import Outcome, Trace, trace_of
 from sva_bench.execution.team_outcome import Reaction, TeamOutcome
 from sva_bench.travel.fuel import FuelCosts
@@ -97,21 +98,22 @@ def trace_teams(
     drives, courses = Drives(hops={} if known is None else known.hops), Courses(world, costs, settings)
     drive_all(courses.chunks(wanted, drives), drives, executor, None)
     courses.compose(wanted, drives)
-    return [_trace_team(world, costs, mission, drives) for mission in missions]
+    return [_trace_team(world, costs, mission, drives, settings.seed) for mission in missions]
 
 
-def _trace_team(world: World, costs: Mapping[str, FuelCosts], mission: Played, drives: Drives) -> TeamTrace:
+def _trace_team(world: World, costs: Mapping[str, FuelCosts], mission: Played, drives: Drives, seed: int) -> TeamTrace:
     base = world.sites[0]
     traces = []
-    for robot, orders, stops, outcome in zip(
+    for number, (robot, orders, stops, outcome) in enumerate(zip(
             world.robots, orders_of(world, mission.case, planned_legs(world, costs, [mission.case])),
-            mission.outcome.stops, mission.outcome.robots, strict=True):
+            mission.outcome.stops, mission.outcome.robots, strict=True)):
         left = len(stops) > 1
         traces.append(trace_of(
             replace(orders, route=stops, planned_s=()) if left else orders,
             drives.routes[robot.name, stops, mission.rollout, 0] if left else NOTHING,
             outcome, (base.x_m, base.y_m, base.heading_rad), path_of(costs[robot.model.name], orders.route),
-            start_s=_departure_s(outcome)))
+            start_s=_departure_s(outcome),
+            waves=draw_noise(world.noise, seed, mission.rollout, number).disturbance.waves))
     news = tuple(_heard(world, costs, reaction) for reaction in mission.outcome.reactions)
     return TeamTrace(trial=mission.trial, traces=tuple(traces), news=news)
 
@@ -175,8 +177,10 @@ def legs_used(robots: Sequence[str], missions: Iterable[Played], legs: KnownLegs
                 key = robot, mission.rollout, origin, destination
                 if key not in seen:
                     seen.add(key)
+                    done = driven(robot, stops[:leg + 2])
                     rows.append(LegTime(
                         trial=mission.trial, rollout=mission.rollout, robot=robots[robot], leg=leg, origin=origin,
                         destination=destination, planned_s=legs.planned(robot, stops[:leg + 2]).time_s,
-                        driven_s=driven(robot, stops[:leg + 2]).time_s))
+                        driven_s=done.time_s, waited_s=done.waited_s, touches=done.touches, waits=done.waits,
+                        held_by=done.held_by))
     return rows

@@ -9,7 +9,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import End
-from sva_bench.execution.outcome import Trace
+from sva_bench.execution.outcome import TIPPED_OVER, Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.recording.colors import Color
 
@@ -62,8 +62,14 @@ class Lane:
 def lost_of(trace: Trace, radius_m: float) -> Lost:
     """Where a robot was lost."""
     outcome, robot = trace.outcome, trace.orders.robot
+    held = f" ({held_told(outcome.events[-1].what)})" if outcome.events and outcome.events[-1].what else ""
     return Lost(robot=robot, radius_m=radius_m, time_s=outcome.end_time_s, at_m=trace.pose[-1, :2],
-                what=f"{robot} {LOST[outcome.end]}, {outcome.end_time_s:.0f} s")
+                what=f"{robot} {LOST[outcome.end]}{held}, {outcome.end_time_s:.0f} s")
+
+
+def held_told(what: str) -> str:
+    """What a stuck robot is held by, in a few words."""
+    return "it fell on its side" if what == TIPPED_OVER else f"held by {what}"
 
 
 def changes_of(news: Sequence[NewsHeard], colors: Mapping[str, Color]) -> tuple[Change, ...]:

@@ -21,9 +21,10 @@ from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.files.atomic import by_way_of
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.recording.colors import ALARM, DISABLED, Color, pale
+from sva_bench.recording.colors import ALARM, DISABLED, GREEN, ORANGE, Color, pale
+from sva_bench.recording.meetings import Floor, Gate, Touched, Waiting
 from sva_bench.recording.reactions import Change, Lost
-from sva_bench.recording.story import Marks, RobotView, Series, Story, story_of
+from sva_bench.recording.story import Marks, RobotView, Series, Story, dashes, story_of
 from sva_bench.world.model import World
 
 TIMELINE = "sim_time"
@@ -39,6 +40,8 @@ _FLOOR_M = 0.02  # shown thickness
 _PLANNED_M, _DRIVEN_M = 0.015, 0.03  # heights of lines above the floor, and below the robots
 _ORDERS_M, _LOST_M = 0.045, 0.6  # of changed orders above those, and of what marks a lost robot above all
 _NEW_UI, _CROSS_UI, _MARK_UI = 3.5, 3.5, 6.0  # widths of new orders and crosses, and size of marks
+_PATCH_M, _GATE_M, _RING_M = 0.01, 0.1, 0.02  # thickness of floors' plates, height of gates, and of rings above hulls
+_BAR_M, _GATE_UI = 0.12, 4.0  # length of a gate's dashes and of their gaps, and width
 _NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
 _SETTLE_S, _SETTLE_TRIES = 0.5, 40  # between pictures; a third or fourth one is the last, on a slow machine a tenth
 _PLAY_S = 30.0  # a mission is played in about this time
@@ -75,6 +78,12 @@ def record(path: Path, world: World, traces: Sequence[Trace], *, title: str, new
             _write_robot(recording, robot)
         for lost in story.lost:
             _write_lost(recording, lost)
+        _write_floors(recording, story.floors)
+        for gate in story.gates:
+            _write_gate(recording, gate)
+        for touched in story.touched:
+            _write_touched(recording, touched)
+        _write_waiting(recording, story.waiting)
         for change in story.changes:
             _write_change(recording, change)
         _write_lanes(recording, story)
@@ -217,6 +226,13 @@ def _write_robot(recording: rr.RecordingStream, robot: RobotView) -> None:
     if len(robot.planned):
         _constant(recording, f"world/planned/{robot.name}", rr.LineStrips3D(
             _deep(robot.planned, _PLANNED_M), colors=[pale(robot.color)], radii=rr.Radius.ui_points(1.0)))
+    if len(robot.believed):
+        # A ring where it believes to be: centimetres beside its hull.
+        turns = np.linspace(0.0, 2 * math.pi, 25)
+        ring, entity = r * np.stack([np.cos(turns), np.sin(turns)], axis=-1), f"world/believed/{robot.name}"
+        _column(recording, entity, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.believed, 0.0)))
+        _constant(recording, f"{entity}/ring", rr.LineStrips3D(
+            [_deep(ring, height + _RING_M)], colors=[pale(robot.color)], radii=rr.Radius.ui_points(1.25)))
     if len(robot.trail):
         entity = f"world/driven/{robot.name}"
         _constant(recording, entity, rr.LineStrips3D.from_fields(
@@ -235,6 +251,53 @@ def _write_lost(recording: rr.RecordingStream, lost: Lost) -> None:
         positions=_deep(lost.at_m[None] - [0.0, r + 0.2], _LOST_M), colors=[ALARM], labels=[lost.what]))
     _constant(recording, f"{entity}/what", rr.Points3D.from_fields(
         radii=rr.Radius.ui_points(0.0), show_labels=True))
+
+
+def _write_floors(recording: rr.RecordingStream, floors: Sequence[Floor]) -> None:
+    """Patches of floor as plates, each with its friction."""
+    if floors:
+        boxes = np.array([floor.box for floor in floors])
+        _constant(recording, "world/floors", rr.Boxes3D(
+            centers=_deep(boxes[:, :2], _PATCH_M / 2), half_sizes=_deep(boxes[:, 2:4], _PATCH_M / 2),
+            quaternions=_about_z(boxes[:, 4]), colors=[floor.color for floor in floors], fill_mode="solid"))
+        _write_names(recording, "world/floors/names", [f"friction {floor.friction:g}" for floor in floors],
+                     _deep(boxes[:, :2], 0.0))
+
+
+def _write_gate(recording: rr.RecordingStream, gate: Gate) -> None:
+    """A dashed line across a passage: red while a robot waits before it, green else."""
+    entity = f"world/passages/{gate.name}"
+    pieces = dashes(gate.ends_m, _BAR_M, _BAR_M)
+    _constant(recording, entity, rr.LineStrips3D.from_fields(
+        strips=_deep(pieces, _GATE_M), radii=rr.Radius.ui_points(_GATE_UI)))
+    colors = [list(ALARM if shut else GREEN) for shut in gate.shut for _ in pieces]
+    _column(recording, entity, gate.time_s, rr.LineStrips3D.columns(
+        colors=np.array(colors, dtype=np.uint8)).partition([len(pieces)] * len(gate.shut)))
+    _write_names(recording, f"{entity}/name", [gate.name], _deep(gate.ends_m[1:], _GATE_M))
+
+
+def _write_touched(recording: rr.RecordingStream, touched: Touched) -> None:
+    """Red marks where a hull touched something, each from then on, and what it was."""
+    entity = f"world/contacts/{touched.robot}"
+    _column(recording, entity, touched.time_s, rr.Points3D.columns(positions=_deep(touched.at_m, _LOST_M)))
+    _constant(recording, entity, rr.Points3D.from_fields(colors=[ALARM], radii=rr.Radius.ui_points(_MARK_UI)))
+    named = [k for k, what in enumerate(touched.what) if what]
+    _column(recording, f"{entity}/what", touched.time_s[named], rr.Points3D.columns(
+        positions=_deep(touched.at_m[named], _LOST_M), labels=[touched.what[k] for k in named]))
+    _constant(recording, f"{entity}/what", rr.Points3D.from_fields(
+        colors=[ALARM], radii=rr.Radius.ui_points(0.0), show_labels=True))
+
+
+def _write_waiting(recording: rr.RecordingStream, waiting: Sequence[Waiting]) -> None:
+    """What a robot waits for, and how long, above it as long as it does."""
+    for robot in dict.fromkeys(wait.robot for wait in waiting):
+        mine, entity = [wait for wait in waiting if wait.robot == robot], f"world/waits/{robot}"
+        times = [time for wait in mine for time in (wait.since_s, wait.until_s)]
+        _column(recording, entity, times, rr.Points3D.columns(
+            positions=_deep(np.array([wait.at_m for wait in mine]), _LOST_M), labels=[
+                f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine],
+            colors=[ORANGE] * len(mine)).partition([1, 0] * len(mine)))
+        _constant(recording, entity, rr.Points3D.from_fields(radii=rr.Radius.ui_points(_MARK_UI), show_labels=True))
 
 
 def _write_change(recording: rr.RecordingStream, change: Change) -> None:
@@ -291,7 +354,10 @@ def _layout(story: Story) -> rrb.Blueprint:
         origin="world", name=story.title, background=rrb.Background(kind="SolidColor", color=_BACKGROUND),
         line_grid=False, eye_controls=rrb.EyeControls3D(
             kind="Orbital", position=story.eye_m, look_target=story.target_m, eye_up=(0, 0, 1)),
-        overrides={f"world/driven/{robot.name}": whole_trail for robot in story.views if len(robot.trail)})
+        overrides=dict.fromkeys([
+            *(f"world/driven/{robot.name}" for robot in story.views if len(robot.trail)),
+            *(f"world/contacts/{touched.robot}{of}" for touched in story.touched for of in ("", "/what"))],
+            whole_trail))
     axis = rrb.TimeAxis(view_range=rr.TimeRange(
         start=rr.TimeRangeBoundary.absolute(seconds=0.0),
         end=rr.TimeRangeBoundary.absolute(seconds=max(story.duration_s, 1.0))))

@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.choices import SiteKind
-from sva_bench.execution.outcome import Event, Trace
+from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.recording.colors import ALARM, ROBOT_COLORS, SITE_COLORS, Color, pale
-from sva_bench.recording.reactions import LOST, Change, Lane, Lost, changes_of, lanes_of, lost_of, sentences_of
+from sva_bench.recording.colors import ROBOT_COLORS, SITE_COLORS, Color, pale
+from sva_bench.recording.log import LogEntry, events_of, log_of
+from sva_bench.recording.meetings import (
+    Floor,
+    Gate,
+    Touched,
+    Waiting,
+    floors_of,
+    gates_of,
+    touched_of,
+    waiting_of,
+)
+from sva_bench.recording.reactions import LOST, Change, Lane, Lost, changes_of, lanes_of, lost_of
 from sva_bench.world.model import Site, World
-
-Level = Literal["DEBUG", "INFO", "WARN", "ERROR"]
 
 _DASH_M, _GAP_M = 0.25, 0.2  # of planned paths
 _TRAIL_STEP_S = 0.25  # a robot at 0.65 m/s is 0.16 m past the end of its trail then: less than its radius
@@ -83,6 +91,7 @@ class RobotView:
         trail: Pieces of the driven path, each two ends [m], shape (t, 2, 2).
         fuel: Fuel left [s of driving]; ``None`` = it has no limit.
         collected: Incentive collected, a step at each POI.
+        believed: x, y where it believes to be at each pose [m], shape (n, 2); none if it knows where it is.
     """
 
     name: str
@@ -96,21 +105,13 @@ class RobotView:
     trail: FloatArray
     fuel: Series | None
     collected: Series
+    believed: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "planned", frozen(self.planned, (None, 2, 2)))
         object.__setattr__(self, "trail_s", frozen(self.trail_s, (None,)))
         object.__setattr__(self, "trail", frozen(self.trail, (len(self.trail_s), 2, 2)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class LogEntry:
-    """An entry of the mission's log, in the colour of its robot."""
-
-    time_s: float
-    level: Level
-    text: str
-    color: Color
+        object.__setattr__(self, "believed", frozen(self.believed, (None, 2)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -127,6 +128,10 @@ class Story:
         lost: Those that didn't come home.
         changes: Those whose orders changed.
         lanes: What is known when, robot by robot; none if no news came.
+        touched: What hulls touched, robot by robot; none of robots that touched nothing.
+        waiting: Waits on the way.
+        gates: Passages that may be shut.
+        floors: Patches of floor that grip less, or more.
         total: Incentive collected by all robots together.
         log: What happened, in order of time.
         eye_m: Position of the camera, x, y, z [m].
@@ -142,6 +147,10 @@ class Story:
     lost: tuple[Lost, ...]
     changes: tuple[Change, ...]
     lanes: tuple[Lane, ...]
+    touched: tuple[Touched, ...]
+    waiting: tuple[Waiting, ...]
+    gates: tuple[Gate, ...]
+    floors: tuple[Floor, ...]
     total: Series
     log: tuple[LogEntry, ...]
     eye_m: tuple[float, float, float]
@@ -182,8 +191,10 @@ def story_of(world: World, traces: Sequence[Trace], title: str, news: Sequence[N
     return Story(
         title=title, world=world.name, duration_s=duration_s, solids=world.obstacles.walled(_WALL_M),
         marks=_marks(world.sites, traces, colors, news), views=views, lost=lost, changes=changes_of(news, colors),
-        lanes=lanes_of(traces, news, colors), total=_staircase(np.concatenate(gains), duration_s),
-        log=_log(traces, colors, news), eye_m=eye, target_m=target)
+        lanes=lanes_of(traces, news, colors), touched=touched_of(traces), waiting=waiting_of(traces),
+        gates=gates_of(world.passages, traces), floors=floors_of(world.obstacles.floors),
+        total=_staircase(np.concatenate(gains), duration_s),
+        log=log_of(traces, colors, news), eye_m=eye, target_m=target)
 
 
 def dashes(path: FloatArray, dash_m: float, gap_m: float) -> FloatArray:
@@ -232,7 +243,7 @@ def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Col
     """Sites by kind. A POI has the colour of the robot that collected it, and before a light one of who takes it over
     or, left to nobody again, its own."""
     collected = [(event.time_s, event.site, colors[trace.orders.robot], True)
-                 for event, trace in _events(traces) if event.kind == "collected"]
+                 for event, trace in events_of(traces) if event.kind == "collected"]
     orphans = [change for heard in news for robot in heard.rerouted for change in (
         *((heard.time_s, site, SITE_COLORS["poi"], False) for site in robot.dropped),
         *((heard.time_s, site, pale(colors[robot.robot]), False) for site in robot.taken))]
@@ -279,7 +290,7 @@ def _robot_view(trace: Trace, radius_m: float, color: Color, duration_s: float) 
         name=trace.orders.robot, radius_m=radius_m, color=color, time_s=time, pose=pose,
         disabled_s=outcome.end_time_s if outcome.end in LOST else None,
         planned=dashes(trace.planned, _DASH_M, _GAP_M), trail_s=time[at[1:]][moved], trail=pieces, fuel=fuel,
-        collected=_staircase(_gains(trace), duration_s))
+        collected=_staircase(_gains(trace), duration_s), believed=trace.believed)
 
 
 def _gains(trace: Trace) -> FloatArray:
@@ -295,57 +306,6 @@ def _staircase(gains: FloatArray, duration_s: float) -> Series:
     if time[-1] < duration_s:
         time, value = np.append(time, duration_s), np.append(value, value[-1])
     return Series(time_s=time, value=value)
-
-
-def _events(traces: Sequence[Trace]) -> list[tuple[Event, Trace]]:
-    return sorted(((event, trace) for trace in traces for event in trace.outcome.events), key=lambda e: e[0].time_s)
-
-
-def _log(traces: Sequence[Trace], colors: dict[str, Color], news: Sequence[NewsHeard]) -> tuple[LogEntry, ...]:
-    at_home = [
-        LogEntry(time_s=0.0, level="INFO", text=f"{trace.orders.robot} stays home", color=colors[trace.orders.robot])
-        for trace in traces if not trace.outcome.events]
-    entries = []
-    for event, trace in _events(traces):
-        level, text = _sentence(event, trace)
-        entries.append(LogEntry(time_s=event.time_s, level=level, text=text, color=colors[trace.orders.robot]))
-    told = [LogEntry(time_s=heard.time_s, level="WARN", text=text, color=ALARM if robot is None else colors[robot])
-            for heard in news for text, robot in sentences_of(heard)]
-    return (*at_home, *sorted([*entries, *told], key=lambda entry: entry.time_s))
-
-
-def _sentence(event: Event, trace: Trace) -> tuple[Level, str]:
-    robot, site = trace.orders.robot, event.site
-    earned = f"{round(trace.outcome.incentive, 2):g}"
-    match event.kind:
-        case "departed":
-            return "INFO", f"{robot} left {site}"
-        case "arrived":
-            return "DEBUG", f"{robot} reached {site}"
-        case "collected":
-            return "INFO", f"{robot} collected {site}: {round(event.incentive, 2):g}"
-        case "refuelled":
-            return "INFO", f"{robot} refuelled at {site}"
-        case "failed":
-            where = "at" if site == _stood_at(trace, event) else "on the way to"
-            return "ERROR", f"{robot} failed {where} {site}, with {earned} collected"
-        case "out_of_fuel":
-            return "ERROR", f"{robot} ran out of fuel on the way to {site}, with {earned} collected"
-        case "stuck":
-            return "ERROR", f"{robot} got stuck on the way to {site}, with {earned} collected"
-        case "late" if event is trace.outcome.events[-1]:
-            return "WARN", f"{robot} came home late, with {earned} collected"
-        case "late":
-            return "WARN", f"{robot} passed its limit of {trace.orders.mission_limit_s:g} s at {site}: earns no more"
-        case "home":
-            return "INFO", f"{robot} came home, with {earned} collected"
-
-
-def _stood_at(trace: Trace, event: Event) -> str:
-    """Site that a robot stood at, or was last, when something happened."""
-    before = [e.site for e in trace.outcome.events if e.kind in ("departed", "arrived") and e is not event]
-    # One that never departed stands where it failed: at the base, sent out or not.
-    return before[-1] if before else event.site
 
 
 def _eye(bounds_m: FloatArray) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

@@ -14,7 +14,7 @@ import math
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -24,14 +24,30 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch, Rectangle
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MultipleLocator
 
 from sva_bench.arrays import FloatArray
-from sva_bench.choices import SiteKind
-from sva_bench.geometry.cells import TooManyBoxes, bounds_of, boxes_of
+from sva_bench.choices import Judgement, MarkKind, SiteKind
+from sva_bench.files.printable import counted
+from sva_bench.recording.meetings import Floor, floors_of
+from sva_bench.report.ground import (
+    DPI,
+    GREY,
+    LIGHT_GREY,
+    MANY,
+    Frame,
+    corners,
+    every,
+    frame_of,
+    has_unknown,
+    layers,
+    shown_of,
+    tick_step,
+    within,
+)
 from sva_bench.report.labels import place_labels
 from sva_bench.world.model import World
 
@@ -41,16 +57,21 @@ OBSTACLE_RGB = (150, 150, 150)
 """Colour of obstacles and outer walls; what is free stays white."""
 UNKNOWN_RGB = (214, 214, 214)
 """Colour of what counts as occupied since nothing is known of it."""
-DPI = 200
-"""Resolution of pictures in pixels."""
-
-_GREY, _LIGHT_GREY = "#969696", "#d6d6d6"
 _MARKERS: dict[SiteKind, tuple[str, str, float]] = {  # shape, colour, size [pt]
     "base": ("s", "#000000", 10.0), "station": ("^", "#0072B2", 9.5), "poi": ("o", "#E69F00", 7.5)}
 _KINDS: dict[SiteKind, str] = {"base": "base", "station": "refuelling station", "poi": "point of interest"}
 _ROUTES: tuple[tuple[str, Any, float], ...] = (  # colour, style, width [pt]; later ones lie on top, so thinner
     ("#D55E00", "-", 2.6), ("#009E73", (0, (5, 2)), 2.0), ("#CC79A7", (0, (1.2, 1.5)), 2.0),
     ("#56B4E9", (0, (6, 1.5, 1.2, 1.5)), 1.8), ("#000000", (0, (3, 4)), 1.4))
+_PASSAGE = "#0B6E4F"
+_MARKS: dict[MarkKind, tuple[str, str, str]] = {  # shape, colour, what it is
+    "contact": ("X", "#D00000", "contact"), "wait": ("D", "#7B3294", "wait")}
+_MARK_PT, _MOST_MARK_PT = 5.0, 14.0
+_MARK_WEIGHT = 8  # points of a line that a mark counts as where labels look for room
+_JUDGED: dict[Judgement, tuple[str, Any, float]] = {  # colour, style, width [pt]
+    "safe": ("#009E73", "-", 1.6), "close": ("#E69F00", (0, (5, 1.5)), 2.2), "edge": ("#D00000", "-", 3.4)}
+_JUDGED_TOLD: dict[Judgement, str] = {"safe": "leg with margin to spare", "close": "leg with little margin",
+                                      "edge": "leg on a knife's edge"}
 _HALO = withStroke(linewidth=2.2, foreground="white")
 _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "sva-bench", "svg.fonttype": "path", "font.family": "DejaVu Sans", "font.size": 8.0,
@@ -61,7 +82,6 @@ _MOST_MINDED = 300  # paths that labels try to leave free; more leave no room an
 _LEADER = 9.0  # pixels between a marker and its label from which on a line joins them
 _OPAQUE = 4000  # edges of a roadmap that are drawn in full colour; more share their ink, so that the map is seen
 _FAINTEST = 0.15  # opacity of an edge of a roadmap at least, else single edges can't be seen
-_MANY = 2000  # boxes, or edges, from which on an SVG holds them as an image
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,6 +92,25 @@ class Leg:
     path: FloatArray
 
 
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """What robots met about a place [m]: how many times, and whether one never got away."""
+
+    kind: MarkKind
+    x_m: float
+    y_m: float
+    count: int
+    stuck: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JudgedLeg:
+    """A leg of a route by how safe it is: its path [m], shape (k, 2), and the judgement."""
+
+    path: FloatArray
+    judged: Judgement
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Overlays:
     """What is shown beside map and sites.
@@ -80,63 +119,15 @@ class Overlays:
         roadmap: Both ends of each edge [m], shape (e, 2, 2).
         paths: Paths between sites [m], each of shape (k, 2).
         routes: Legs of each robot's route.
+        marks: What robots met where.
+        judged: Legs by how safe they are, the worst to be seen last.
     """
 
     roadmap: FloatArray | None = None
     paths: Sequence[FloatArray] = ()
     routes: Mapping[str, Sequence[Leg]] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Frame:
-    """Where the map lies in the picture, all in inches but for metres.
-
-    Attributes:
-        width_in, height_in: Size of the picture.
-        left_in, bottom_in: Lower left corner of the map.
-        in_per_m: Scale.
-        x0_m, y0_m, x1_m, y1_m: What the map shows: the bounds and the wall about them, or of an occupancy grid as
-            much about what is free.
-    """
-
-    width_in: float
-    height_in: float
-    left_in: float
-    bottom_in: float
-    in_per_m: float
-    x0_m: float
-    y0_m: float
-    x1_m: float
-    y1_m: float
-
-    def pixel(self, x_m: float, y_m: float) -> tuple[int, int]:
-        """Row and column of a place in a PNG."""
-        column = (self.left_in + (x_m - self.x0_m) * self.in_per_m) * DPI
-        row = (self.height_in - self.bottom_in - (y_m - self.y0_m) * self.in_per_m) * DPI
-        return math.floor(row), math.floor(column)
-
-
-def frame_of(world: World) -> Frame:
-    """The frame of a world's picture: larger where there are many sites."""
-    x0, y0, x1, y1 = _shown(world).tolist()
-    longest = max(x1 - x0, y1 - y0)
-    wall = 0.012 * longest
-    in_per_m = min(max(1.55 * math.sqrt(len(world.sites)), 6.0), 16.0) / longest
-    width, height = ((high - low + 2 * wall) * in_per_m for low, high in ((x0, x1), (y0, y1)))
-    return Frame(width_in=round(width + 3.0, 2), height_in=round(max(height + 1.05, 4.0), 2), left_in=0.6,
-                 bottom_in=round(max(height + 1.05, 4.0), 2) - 0.45 - height, in_per_m=in_per_m, x0_m=x0 - wall,
-                 y0_m=y0 - wall, x1_m=x1 + wall, y1_m=y1 + wall)
-
-
-def _shown(world: World) -> FloatArray:
-    """x_min, y_min, x_max, y_max [m] of what there is to see: maps of ROS often have wide margins of nothing."""
-    cells = world.obstacles.cells
-    if cells is None or cells.occupied.all():
-        return world.obstacles.bounds_m
-    rows, columns = (np.flatnonzero(~cells.occupied.all(axis=axis)) for axis in (1, 0))
-    free = replace(cells, occupied=np.zeros((np.ptp(rows) + 1, np.ptp(columns) + 1), dtype=np.bool_), unknown=None)
-    corner = cells.to_world(np.array([[columns[0], rows[0]]]) * cells.cell_m)[0]
-    return bounds_of(replace(free, origin=np.array([*corner, cells.origin[2]])))
+    marks: Sequence[Mark] = ()
+    judged: Sequence[JudgedLeg] = ()
 
 
 def draw_world(world: World, kind: Kind, overlays: Overlays) -> bytes:
@@ -150,6 +141,8 @@ def draw_world(world: World, kind: Kind, overlays: Overlays) -> bytes:
         axes = _map(figure, frame, world)
         _planned(axes, overlays)
         _routes(axes, overlays)
+        _judged(axes, overlays)
+        _marks(axes, overlays)
         _sites(figure, axes, world, overlays)
         _legend(figure, frame, world, overlays)
         stream = io.BytesIO()
@@ -168,7 +161,7 @@ def _map(figure: Figure, frame: Frame, world: World) -> Axes:
     axes.set_xlim(frame.x0_m, frame.x1_m)
     axes.set_ylim(frame.y0_m, frame.y1_m)
     axes.spines[:].set_visible(False)
-    step = _tick_step(max(frame.x1_m - frame.x0_m, frame.y1_m - frame.y0_m))
+    step = tick_step(max(frame.x1_m - frame.x0_m, frame.y1_m - frame.y0_m))
     axes.xaxis.set_major_locator(MultipleLocator(step))
     axes.yaxis.set_major_locator(MultipleLocator(step))
     axes.set_xlabel("x [m]")
@@ -177,55 +170,36 @@ def _map(figure: Figure, frame: Frame, world: World) -> Axes:
                 va="top")
     x0, y0, x1, y1 = world.obstacles.bounds_m.tolist()
     axes.add_patch(Rectangle((frame.x0_m, frame.y0_m), frame.x1_m - frame.x0_m, frame.y1_m - frame.y0_m,
-                             facecolor=_GREY, edgecolor="none", zorder=0))
+                             facecolor=GREY, edgecolor="none", zorder=0))
     axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="white", edgecolor="none", zorder=0))
-    for boxes, colour, order in _layers(world):
+    for boxes, colour, order in layers(world):
         # The hairline keeps boxes that touch from showing a seam.
         axes.add_collection(PolyCollection(
-            list(_corners(boxes)), facecolors=colour, edgecolors=colour, linewidths=0.2, zorder=order,
-            rasterized=len(boxes) > _MANY), autolim=False)
+            list(corners(boxes)), facecolors=colour, edgecolors=colour, linewidths=0.2, zorder=order,
+            rasterized=len(boxes) > MANY), autolim=False)
     for x, y, radius in world.obstacles.cylinders.tolist():
-        axes.add_patch(Circle((x, y), radius, facecolor=_GREY, edgecolor="none", zorder=1))
+        axes.add_patch(Circle((x, y), radius, facecolor=GREY, edgecolor="none", zorder=1))
+    for corners_of_floor, floor in zip(corners(world.obstacles.floors), floors_of(world.obstacles.floors), strict=True):
+        axes.add_patch(Polygon(corners_of_floor, zorder=0.4, **_floor_style(floor)))
+    for passage in world.passages:
+        ax, ay, bx, by = passage.ends_m
+        axes.plot([ax, bx], [ay, by], color=_PASSAGE, linestyle=(0, (2.2, 1.2)), linewidth=2.4, zorder=3.5,
+                  dash_capstyle="butt")
+        axes.annotate(passage.name, ((ax + bx) / 2, (ay + by) / 2), xytext=(3, 0), textcoords="offset points",
+                      color=_PASSAGE, fontsize=7, va="center", zorder=6, path_effects=[_HALO])
     return axes
 
 
-def _layers(world: World) -> list[tuple[FloatArray, str, float]]:
-    """Boxes with their colours, from below: what is known to be occupied lies over what only counts as such."""
-    boxes, cells = world.obstacles.boxes, world.obstacles.cells
-    if not _has_unknown(world) or cells is None or cells.unknown is None:
-        return [(boxes, _GREY, 1.0)] if len(boxes) else []
-    try:
-        known = boxes_of(replace(cells, occupied=cells.occupied & ~cells.unknown, unknown=None))
-    except TooManyBoxes:
-        return [(boxes, _LIGHT_GREY, 0.5)]
-    # Where a grid stands askew, the first four fill what is outside it.
-    return [(boxes, _LIGHT_GREY, 0.5), (known[4 if cells.origin[2] else 0:], _GREY, 1.0)]
-
-
-def _has_unknown(world: World) -> bool:
-    cells = world.obstacles.cells
-    return cells is not None and cells.unknown is not None and bool(cells.unknown.any())
-
-
-def _tick_step(length_m: float) -> float:
-    """The least of 1, 2, 5, 10, ... m that makes twelve ticks at most."""
-    steps = (step * 10.0**power for power in range(-3, 6) for step in (1, 2, 5))
-    return next(step for step in steps if length_m <= 12 * step)
-
-
-def _corners(boxes: FloatArray) -> FloatArray:
-    """Corners of boxes, shape (k, 4, 2)."""
-    cosine, sine = np.cos(boxes[:, 4])[:, None], np.sin(boxes[:, 4])[:, None]
-    along, across = boxes[:, 2, None] * np.array([1, -1, -1, 1]), boxes[:, 3, None] * np.array([1, 1, -1, -1])
-    return np.stack([boxes[:, 0, None] + cosine * along - sine * across,
-                     boxes[:, 1, None] + sine * along + cosine * across], axis=-1)
+def _floor_style(floor: Floor) -> dict[str, Any]:
+    return {"facecolor": tuple(channel / 255 for channel in floor.color), "edgecolor": "#7fb6d3", "hatch": "////",
+            "linewidth": 0.6}
 
 
 def _planned(axes: Axes, overlays: Overlays) -> None:
     if overlays.roadmap is not None:
         edges = len(overlays.roadmap)
         axes.add_collection(LineCollection(
-            list(overlays.roadmap), colors="#56B4E9", linewidths=0.1, zorder=2, rasterized=edges > _MANY,
+            list(overlays.roadmap), colors="#56B4E9", linewidths=0.1, zorder=2, rasterized=edges > MANY,
             alpha=min(1.0, max(_OPAQUE / max(edges, 1), _FAINTEST))), autolim=False)
     axes.add_collection(LineCollection(list(overlays.paths), colors="#0072B2", linewidths=0.6, zorder=3),
                         autolim=False)
@@ -238,6 +212,30 @@ def _routes(axes: Axes, overlays: Overlays) -> None:
             axes.plot(*leg.path.T, color=colour, linestyle=style, linewidth=width, zorder=4 + 0.01 * number,
                       dash_capstyle="butt", solid_capstyle="round")
             _arrow(axes, leg.path, colour)
+
+
+def _judged(axes: Axes, overlays: Overlays) -> None:
+    """Legs in the colour of their judgement, each with its direction."""
+    for number, leg in enumerate(overlays.judged):
+        colour, style, width = _JUDGED[leg.judged]
+        axes.plot(*leg.path.T, color=colour, linestyle=style, linewidth=width, zorder=4 + 0.01 * number,
+                  dash_capstyle="butt", solid_capstyle="round")
+        _arrow(axes, leg.path, colour)
+
+
+def _marks(axes: Axes, overlays: Overlays) -> None:
+    """What was met, the larger the more often; a ring about a place that a robot never got away from."""
+    for mark in overlays.marks:
+        shape, colour, _ = _MARKS[mark.kind]
+        size = min(_MARK_PT * math.sqrt(1 + math.log2(mark.count)), _MOST_MARK_PT)
+        axes.plot(mark.x_m, mark.y_m, marker=shape, markersize=size, color=colour, markeredgecolor="white",
+                  markeredgewidth=0.7, zorder=7.5)
+        if mark.stuck:
+            axes.plot(mark.x_m, mark.y_m, marker="o", markersize=size + 6, color="none", markeredgecolor=colour,
+                      markeredgewidth=1.6, zorder=7.5)
+        if mark.count > 1:
+            axes.annotate(str(mark.count), (mark.x_m, mark.y_m), xytext=(0.5 * size + 3, 0.3 * size), fontsize=7,
+                          textcoords="offset points", color=colour, weight="bold", zorder=8, path_effects=[_HALO])
 
 
 def _arrow(axes: Axes, path: FloatArray, colour: str) -> None:
@@ -270,16 +268,19 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
     boxes = [[line.get_window_extent(renderer) for line in lines] for lines in labels]
     to_pixels = axes.transData.transform
     at = to_pixels(np.array([(site.x_m, site.y_m) for site in world.sites]))
-    drawn = [_every(to_pixels(leg.path)) for legs in overlays.routes.values() for leg in legs]
+    drawn = [every(to_pixels(leg.path)) for legs in overlays.routes.values() for leg in legs]
+    drawn += [every(to_pixels(leg.path)) for leg in overlays.judged]
+    drawn += [every(to_pixels(np.reshape(passage.ends_m, (2, 2))), 4.0) for passage in world.passages]
+    drawn += [to_pixels(np.array([[mark.x_m, mark.y_m]] * _MARK_WEIGHT)) for mark in overlays.marks]
     if len(overlays.paths) <= _MOST_MINDED:
-        drawn += [_every(to_pixels(path), 16.0) for path in overlays.paths]
-    x0, y0, x1, y1 = _shown(world).tolist()
+        drawn += [every(to_pixels(path), 16.0) for path in overlays.paths]
+    x0, y0, x1, y1 = shown_of(world).tolist()
     sizes = np.array([[max(box.width for box in group), sum(box.height for box in group)] for group in boxes])
     radii = np.array([_MARKERS[site.kind][2] for site in world.sites]) * DPI / 72 / 2
     centres = place_labels(
         at, sizes, radii=radii,
         frame=np.concatenate([to_pixels((x0, y0)), to_pixels((x1, y1))]),
-        lines=np.concatenate(drawn) if drawn else np.empty((0, 2)), solid=to_pixels(_within(world)))
+        lines=np.concatenate(drawn) if drawn else np.empty((0, 2)), solid=to_pixels(within(world)))
     back = axes.transData.inverted().transform
     for (x, y), lines, group in zip(centres, labels, boxes, strict=True):
         top = y + sum(box.height for box in group) / 2
@@ -301,28 +302,6 @@ def _earned(world: World, poi: str) -> list[str]:
     return [" | ".join(values[k:k + _PER_LINE]) for k in range(0, len(values), _PER_LINE)]
 
 
-def _within(world: World) -> FloatArray:
-    """Points in obstacles, about a hundred across the picture: where a label is harder to read."""
-    points = []
-    x0, y0, x1, y1 = _shown(world).tolist()
-    step = max(x1 - x0, y1 - y0) / 100
-    for x, y, hx, hy, yaw in world.obstacles.boxes[:_MANY].tolist():
-        a, b = (np.linspace(-h, h, min(int(2 * h / step) + 2, 100)) for h in (hx, hy))
-        grid = np.stack(np.meshgrid(a, b), axis=-1).reshape(-1, 2)
-        points.append(grid @ np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]) + (x, y))
-    for x, y, radius in world.obstacles.cylinders.tolist():
-        angles = np.linspace(0, 2 * math.pi, 12)
-        points.append(np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles)], axis=-1))
-    return np.concatenate(points) if points else np.empty((0, 2))
-
-
-def _every(path: FloatArray, step: float = 8.0) -> FloatArray:
-    """Points along a path, so many pixels apart."""
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-    at = np.arange(0, arc[-1] + step, step)
-    return np.column_stack([np.interp(at, arc, path[:, 0]), np.interp(at, arc, path[:, 1])])
-
-
 def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> None:
     """What is what, to the right of the map."""
     handles: list[Any] = []
@@ -331,9 +310,9 @@ def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> N
         if kind in kinds:
             handles.append(Line2D([], [], linestyle="none", marker=marker, color=colour, markersize=size,
                                   markeredgecolor="black", markeredgewidth=0.8, label=_KINDS[kind]))
-    handles.append(Patch(facecolor=_GREY, label="obstacle"))
-    if _has_unknown(world):
-        handles.append(Patch(facecolor=_LIGHT_GREY, label="unknown, counts as an obstacle"))
+    handles.append(Patch(facecolor=GREY, label="obstacle"))
+    if has_unknown(world):
+        handles.append(Patch(facecolor=LIGHT_GREY, label="unknown, counts as an obstacle"))
     if overlays.roadmap is not None:
         handles.append(Line2D([], [], color="#56B4E9", linewidth=0.8, label="roadmap"))
     if overlays.paths:
@@ -343,6 +322,7 @@ def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> N
         stops = ", ".join(leg.destination for leg in legs) or "stays home"
         handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=width,
                               label=textwrap.fill(f"{robot}: {stops}", 30)))
+    handles += _legend_of_meetings(world, overlays)
     left = frame.left_in + (frame.x1_m - frame.x0_m) * frame.in_per_m + 0.15
     top = frame.bottom_in + (frame.y1_m - frame.y0_m) * frame.in_per_m
     legend = figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(
@@ -354,6 +334,31 @@ def _legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -> N
     lines = ["Incentives below a point of interest:", *textwrap.wrap(names, 36), "", *robots]
     figure.text(left / frame.width_in, box.y0 / DPI / frame.height_in - 0.18 / frame.height_in, "\n".join(lines),
                 va="top", fontsize=8, linespacing=1.45)
+
+
+def _legend_of_meetings(world: World, overlays: Overlays) -> list[Any]:
+    """What is what of floors, passages, judged legs and marks."""
+    floors = {f"{floor.friction:g}": floor for floor in floors_of(world.obstacles.floors)}
+    handles: list[Any] = [Patch(label=f"floor, friction {friction}", **_floor_style(floor))
+                          for friction, floor in sorted(floors.items())[:_MOST_FLOORS]]
+    if world.passages:
+        handles.append(Line2D([], [], color=_PASSAGE, linestyle=(0, (2.2, 1.2)), linewidth=2.4,
+                              label="passage that may be shut"))
+    for judged in _JUDGED:
+        if any(leg.judged == judged for leg in overlays.judged):
+            colour, style, width = _JUDGED[judged]
+            handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=width, label=_JUDGED_TOLD[judged]))
+    for kind, (shape, colour, what) in _MARKS.items():
+        if count := sum(mark.count for mark in overlays.marks if mark.kind == kind):
+            handles.append(Line2D([], [], linestyle="none", marker=shape, color=colour, markersize=7,
+                                  markeredgecolor="white", label=counted(count, what)))
+    if any(mark.stuck for mark in overlays.marks):
+        handles.append(Line2D([], [], linestyle="none", marker="o", color="none", markersize=11, markeredgewidth=1.6,
+                              markeredgecolor=_MARKS["contact"][1], label="a robot got stuck here"))
+    return handles
+
+
+_MOST_FLOORS = 4  # frictions in a legend
 
 
 def _limits(fuel_s: float, mission_s: float) -> str:

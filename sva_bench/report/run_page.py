@@ -10,6 +10,7 @@ from urllib.parse import quote
 import numpy as np
 
 from sva_bench.analysis.catalogue import Section, statistics
+from sva_bench.analysis.driving import driving_told
 from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import Estimate, Share
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -17,6 +18,8 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
+from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.wording import (
@@ -69,6 +72,7 @@ def write_report(path: Path, content: Content) -> None:
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
         *_measured(scenarios),
+        *meetings_section(content),
         *_legs(content.legs.without_reaction()),
         *_routes(content.routes),
         *_recordings(content),
@@ -85,7 +89,8 @@ def _answer(summary: AnySummary, world: World) -> list[str]:
     unproved = "" if summary.reproducible else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
-            *(note(remark) for remark in remarks(summary)), unproved, "</div>"]
+            *(f"<p><b>{CONTRADICTED}</b> {sentence(said)}</p>" for said in contradictions(summary)),
+            *(note(remark) for remark in (*upset_by_noise(summary), *remarks(summary))), unproved, "</div>"]
 
 
 def _findings(summary: Summary, world: World) -> Iterator[tuple[str, str]]:
@@ -269,4 +274,5 @@ def _again(summary: AnySummary, manifest: Manifest) -> list[str]:
             f"<pre><code>{text(shlex.join(manifest.command))}</code></pre>",
             note(f"sva-bench {manifest.version}, seed {summary.seed}, Python {manifest.machine.python}; "
                  f"{packages}. The resolved world and all options stand in manifest.json, the figures in summary.json, "
-                 "every trial in outcomes.parquet.")]
+                 "every trial in outcomes.parquet."),
+            *([] if summary.drives is None else [note(f"Driven: {driving_told(summary.drives)}.")])]

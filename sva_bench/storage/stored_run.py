@@ -28,8 +28,10 @@ from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
 from sva_bench.storage.agreement import Claim, Key, check_outcomes, check_routes
 from sva_bench.storage.manifest import MANIFEST, Manifest
+from sva_bench.storage.met_tables import FILES as MET_FILES
+from sva_bench.storage.met_tables import read_met
 from sva_bench.storage.run_folder import MAP, Legs, made_for, recording_stem, stem_of
-from sva_bench.storage.tables import LEGS, OUTCOMES, TRAVEL_TIMES, pieces_of
+from sva_bench.storage.tables import CONTACTS, LEGS, OUTCOMES, TRAVEL_TIMES, WAITS, pieces_of
 from sva_bench.storage.tables import write_csv as write_table_as_csv
 from sva_bench.world.load import world_of
 from sva_bench.world.model import World
@@ -52,6 +54,7 @@ class Content:
         world: The world, for its picture.
         manifest: What was run.
         lacking: Files of the run folder that are missing, and that the report can do without.
+        contacts, waits: What robots met on the legs: the rows of these tables, none where there are none.
     """
 
     summary: AnySummary
@@ -62,6 +65,8 @@ class Content:
     manifest: Manifest
     lacking: tuple[str, ...] = ()
     reaction_stems: Mapping[Key, str] = field(default_factory=dict)
+    contacts: pa.Table = field(default_factory=CONTACTS.empty_table)
+    waits: pa.Table = field(default_factory=WAITS.empty_table)
 
 
 def run_folder_at(path: Path) -> Path:
@@ -135,7 +140,8 @@ def write_csv(folder: Path) -> list[Path]:
         BadInput: If one can't be written.
     """
     written = []
-    for name, schema in (("legs", LEGS), ("outcomes", OUTCOMES), ("travel_times", TRAVEL_TIMES)):
+    met = [(name, schema) for name, schema in MET_FILES.items() if (folder / f"{name}.parquet").exists()]
+    for name, schema in (("legs", LEGS), ("outcomes", OUTCOMES), ("travel_times", TRAVEL_TIMES), *met):
         path = folder / f"{name}.csv"
         with draft_file(path) as draft, _complete(folder):
             write_table_as_csv(folder / f"{name}.parquet", draft, schema)
@@ -208,8 +214,9 @@ def _content(folder: Path) -> Content:
     told: dict[Key, str] = {
         (s.name, name, r.policy, r.news): recording_stem((s.name, name, r.policy, r.news), foreign=foreign)
         for s in summary.scenarios for r in s.reactions or () for name, plan in r.plans.items() if plan.reacted > 0}
+    contacts, waits = read_met(folder, world, legs, words)
     return Content(summary=summary, routes=routes, stems=stems, manifest=manifest, world=world, legs=legs,
-                   reaction_stems=told, lacking=_lacking(
+                   reaction_stems=told, contacts=contacts, waits=waits, lacking=_lacking(
                        folder, [scenario.name for scenario in world.scenarios], [*stems.values(), *told.values()]))
 
 

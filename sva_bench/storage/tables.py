@@ -59,6 +59,17 @@ LEGS = _schema({
     "waited_s": (_FIGURE, "s")})
 """A row per leg driven, with the first trial that it belongs to."""
 
+_MET = {"scenario": (_WORD, ""), "planner": (_WORD, ""), "policy": (_WORD, ""), "news": (_WORD, ""),
+        "trial": (_COUNT, "1"), "rollout": (_COUNT, "1"), "robot": (_WORD, ""), "leg": (_COUNT, "1"),
+        "origin": (_WORD, ""), "destination": (_WORD, ""), "since_s": (_FIGURE, "s of driving since the leg began"),
+        "lasts_s": (_FIGURE, "s"), "x_m": (_FIGURE, "m"), "y_m": (_FIGURE, "m")}
+
+CONTACTS = _schema({**_MET, "solid": (_WORD, ""), "stuck": (pa.bool_(), "")})
+"""A row each time that a hull came to touch an obstacle on a leg of ``LEGS``; written where there is any."""
+
+WAITS = _schema({**_MET, "cause": (_WORD, "")})
+"""A row for each wait on a leg of ``LEGS``; written where there is any."""
+
 TRAVEL_TIMES = _schema({
     "origin": (_WORD, ""), "destination": (_WORD, ""), "model": (_WORD, ""), "raw_s": (_FIGURE, "s"),
     "repaired_s": (_FIGURE, "s"), "via": (_WORD, "")})

@@ -23,7 +23,7 @@ from sva_bench.study.planning import unlimited
 from sva_bench.study.publish import Run, Stopwatch, publish
 from sva_bench.study.recourse import Stage, react_in_scenarios
 from sva_bench.study.run import refuse_too_many_rows
-from sva_bench.study.summing import by_case, head_of
+from sva_bench.study.summing import by_case, head_of, with_drives
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
@@ -84,6 +84,7 @@ def measure_plans(
             drives=drives), options, compared_reaction, progress)
     if reactions:
         summary = summary.with_reactions({name: found.results for name, found in reactions.items()})
+    summary = with_drives(summary, drives)
     return Compared(instances=instances, executed=executed, summary=summary, clock=clock,
                     reacted=tuple(run for found in reactions.values() for run in found.reacted))
 

@@ -24,6 +24,7 @@ from sva_bench.recording.rerun import record
 from sva_bench.report.run_page import write_report
 from sva_bench.storage.agreement import Key
 from sva_bench.storage.manifest import manifest_of
+from sva_bench.storage.met_tables import contact_table, wait_table, write_met
 from sva_bench.storage.run_folder import (
     legs_of,
     made_for,
@@ -105,6 +106,8 @@ def publish(
                 progress("recording", len(executed) + number + 1, len(executed) + len(reacted))
         legs = legs_of([*executed, *reacted])
         write_legs(folder / "legs.parquet", legs)
+        contacts, waits = contact_table([*executed, *reacted]), wait_table([*executed, *reacted])
+        write_met(folder, contacts, waits)
         write_outcomes(folder / "outcomes.parquet", [*executed, *reacted], [r.name for r in world.robots],
                        settings_of(world, options))
         write_record(folder / "summary.json", summary)
@@ -112,7 +115,7 @@ def publish(
         write_record(folder / "manifest.json", manifest)
         write_report(folder / "report.html", Content(
             summary=summary, routes=routes, stems=stems, reaction_stems=told, legs=legs, world=world,
-            manifest=manifest))
+            manifest=manifest, contacts=contacts, waits=waits))
     return Run(folder=out / name, summary=summary)
 
 

@@ -22,7 +22,7 @@ from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, plan_scenarios, two_cases
 from sva_bench.study.publish import Run, Stopwatch, publish
 from sva_bench.study.recourse import Stage, react_in_scenarios
-from sva_bench.study.summing import head_of, proved, summarise
+from sva_bench.study.summing import head_of, proved, summarise, with_drives
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import Scenario, World
@@ -102,6 +102,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
             drives=drives), options, reaction_result, progress)
     if reactions:
         summary = summary.with_reactions({name: found.results for name, found in reactions.items()})
+    summary = with_drives(summary, drives)
     return Measured(costs=costs, planned=planned, clock=clock, summary=summary,
                     reacted=tuple(run for found in reactions.values() for run in found.reacted),
                     executed=[run for run in executed if run.case.role != "worst_tie"])

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
+from sva_bench.analysis.driving import DrivesMade, driving_told
 from sva_bench.analysis.over_trials import Judged, ScenarioTrials, promise_of, scenario_summary
 from sva_bench.analysis.results import Promise, ScenarioFacts
-from sva_bench.analysis.summaries import Failures, Head, Reach, Summary, Travel
+from sva_bench.analysis.summaries import ComparisonSummary, Failures, Head, Reach, Summary, Travel
 from sva_bench.choices import Role
+from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.plan import Plan
@@ -16,6 +20,10 @@ from sva_bench.study.options import Options
 from sva_bench.study.planning import Planned, model_is_executed
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import Scenario, World
+
+_log = logging.getLogger(__name__)
+
+SummaryT = TypeVar("SummaryT", Summary, ComparisonSummary)
 
 
 def summarise(
@@ -72,6 +80,25 @@ def head_of(world: World, settings: Settings, costs: Mapping[str, FuelCosts], *,
         travel=Travel(pairs=pairs, triangle_violations_pct=round(changed / pairs, 6) if pairs else 0.0,
                       max_excess_pct=round(max((c.max_excess_pct for c in costs.values()), default=0.0), 6)),
         reproducible=reproducible)
+
+
+def with_drives(summary: SummaryT, drives: Drives) -> SummaryT:
+    """The summary with how its drives were made."""
+    made = drives_made(drives)
+    _log.info("%s", driving_told(made))
+    return replace(summary, drives=made)
+
+
+def drives_made(drives: Drives) -> DrivesMade:
+    """The figures of what was driven."""
+    made = [*drives.hops.values(), *drives.whole.values()]
+    times = [float(one.leg_s.sum()) for one in made]
+    total_s, physics_s = sum(times), sum(one.in_physics * time_s for one, time_s in zip(made, times, strict=True))
+    checks = [100 * abs(time_s / one.twin_s - 1) for one, time_s in zip(made, times, strict=True) if one.twin_s]
+    return DrivesMade(
+        unit="hops" if drives.hops else "routes", count=len(made),
+        in_physics_pct=min(round(100 * physics_s / total_s, 6), 100.0) if total_s > 0 else 0.0, checked=len(checks),
+        worst_check_pct=round(max(checks), 6) if checks else None, tipped_over=sum(one.tipped_over for one in made))
 
 
 def by_case(executed: Sequence[Executed]) -> dict[tuple[str, str], Executed]:

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.execution.outcome import Event
 from sva_bench.recording.colors import ALARM, BLUE, PURPLE, ROBOT_COLORS, VERMILLION, YELLOW, pale
-from sva_bench.recording.story import Level, Story, corners, dashes, story_of
+from sva_bench.recording.log import Level
+from sva_bench.recording.story import Story, corners, dashes, story_of
 from tests.recording.missions import WORLD, mission_with_news, trace
 
 

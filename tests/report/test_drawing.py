@@ -22,7 +22,8 @@ from sva_bench.generate.terrain import random_places, random_terrain
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world, frame_of
+from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world
+from sva_bench.report.ground import frame_of
 from sva_bench.report.labels import place_labels
 from sva_bench.travel.roadmap import roadmap_edges
 from sva_bench.world.maps.ros import read_ros_map

@@ -14,6 +14,7 @@ from sva_bench.execution.execute import Executed, Settings
 from sva_bench.execution.reacted import Reacted
 from sva_bench.files.records import as_dict
 from sva_bench.mission.plan import Plan
+from sva_bench.storage.met_tables import contact_table, wait_table
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.run_folder import legs_of
 from sva_bench.storage.tables import LEGS
@@ -62,6 +63,16 @@ class Result(Generic[SummaryT]):
     def legs(self) -> pa.Table:
         """A row per leg that was driven, with times as planned and as driven [s], as in ``legs.parquet``."""
         return pa.table(vars(legs_of([*self.executed, *self.reacted])), schema=LEGS)
+
+    @property
+    def contacts(self) -> pa.Table:
+        """A row each time that a hull came to touch an obstacle on a leg, as in ``contacts.parquet``."""
+        return contact_table([*self.executed, *self.reacted])
+
+    @property
+    def waits(self) -> pa.Table:
+        """A row for each wait on a leg, as in ``waits.parquet``."""
+        return wait_table([*self.executed, *self.reacted])
 
     def as_dict(self) -> dict[str, Any]:
         """The summary as ``summary.json`` holds it."""

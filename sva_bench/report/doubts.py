@@ -1,0 +1,67 @@
+"""What a reader should doubt, in sentences: a model that the execution contradicts, and plans that noise upsets."""
+
+from __future__ import annotations
+
+from sva_bench.analysis.results import PlanResult
+from sva_bench.analysis.scenarios import ScenarioSummary
+from sva_bench.analysis.summaries import AnySummary, Summary
+from sva_bench.analysis.unseen import EXECUTION_LOSSES
+from sva_bench.report.wording import per_cent, with_interval
+
+CONTRADICTED = "The execution contradicts the model."
+"""What a contradiction is announced by."""
+_TOLERANCE = 1e-6  # relative: of sums in another order
+_MOST_NAMED = 6
+
+
+def contradictions(summary: AnySummary) -> list[str]:
+    """A sentence for each scenario whose executed VSS contradicts the modelled one.
+
+    It does where its interval excludes the modelled value, or has the other sign. Failures that are drawn may do so by
+    chance, so the execution must have cost one of the plans something, too.
+    """
+    if not isinstance(summary, Summary):
+        return []
+    return [said for scenario in summary.scenarios if (said := _contradiction(scenario)) is not None]
+
+
+def _contradiction(scenario: ScenarioSummary) -> str | None:
+    vss, found = scenario.vss, scenario.vss.executed
+    lost = {name: _lost(plan) for name, plan in scenario.plans.items() if name in ("stochastic", "deterministic")}
+    if vss.same_plan or found.ci95 is None or not any(amount for amount, _ in lost.values()):
+        return None
+    slack = _TOLERANCE * max(1.0, abs(vss.modelled))
+    excluded = not found.ci95[0] - slack <= vss.modelled <= found.ci95[1] + slack
+    turned = min(vss.modelled, found.mean) < -slack and max(vss.modelled, found.mean) > slack
+    if not excluded and not turned:
+        return None
+    how = "and not" if excluded else "of the other sign than"
+    return (f"{scenario.name}: executed, planning for failures is worth {with_interval(found)}, {how} the "
+            f"{vss.modelled:.1f} of the model: {_why(lost)}.")
+
+
+def _why(lost: dict[str, tuple[float, str]]) -> str:
+    """What cost most, and where to look: by end. What each source of noise cost stands beside the ledger."""
+    name, (amount, end) = max(lost.items(), key=lambda item: item[1][0])
+    return (f"what cost most is that robots of the {name} plan ended {end.replace('_', ' ')} ({amount:.1f}); see "
+            '"From promise to execution"')
+
+
+def _lost(plan: PlanResult) -> tuple[float, str]:
+    """The most that an end of the execution cost a plan, and which end."""
+    return max((-getattr(plan.ledger, end), end) for end in EXECUTION_LOSSES)
+
+
+def upset_by_noise(summary: AnySummary) -> list[str]:
+    """How often some robot of each plan ran dry, was late or got stuck; nothing where none did."""
+    told = []
+    for scenario in summary.scenarios:
+        shares = {name: plan.bad.share for name, plan in scenario.plans.items() if plan.bad is not None}
+        if any(shares.values()):
+            told.append(f"{scenario.name}: " + ", ".join(f"{name} {per_cent(100 * share)}"
+                                                         for name, share in shares.items()))
+    if not told:
+        return []
+    left = f"; {len(told) - _MOST_NAMED} more scenarios" if len(told) > _MOST_NAMED else ""
+    return ["Missions in which some robot ran out of fuel, came home late or got stuck, which no plan reckons with: "
+            f"{'; '.join(told[:_MOST_NAMED])}{left}."]

@@ -1,0 +1,69 @@
+"""``world check --noise``: what noise leaves of the margins of a world's plans."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sva_bench.__main__ import run_command_line
+from tests.worlds_for_tests import SMALL
+
+DOOR = Path(__file__).parents[2] / "examples" / "one-door.yaml"
+
+
+def test_legs_are_told_as_json_and_the_same_again(capsys: pytest.CaptureFixture[str]) -> None:
+    told = []
+    for _ in range(2):
+        assert run_command_line(["world", "check", "--noise", str(DOOR), "--draws", "60", "--json"]) == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1]
+    found = json.loads(told[0])
+    assert (found["format"], found["draws"], found["seed"]) == ("sva-bench/noise-check@1", 60, 0)
+    (plan,) = found["plans"]
+    assert plan["scenarios"] == ["nominal"]
+    assert 0 < plan["bad"] < 1
+    for leg in plan["legs"]:
+        assert leg["driven_s"]["q05"] <= leg["driven_s"]["q50"] <= leg["driven_s"]["q95"]
+        assert leg["fuel_margin_s"]["q01"] <= leg["fuel_margin_s"]["q05"]
+        # What one draw in a hundred falls short of is below zero where more than that run dry or late.
+        assert (leg["dry"] > 0.01) == (leg["fuel_margin_s"]["q01"] < 0)
+        assert (leg["judged"] == "edge") == (max(leg["dry"], leg["late"], leg["stuck"]) > 0.01)
+    assert plan["bad"] >= max(max(leg["dry"], leg["late"]) for leg in plan["legs"])
+
+
+def test_a_table_with_the_worst_legs_first_and_a_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "margins.png"
+    assert run_command_line(["world", "check", "--noise", str(DOOR), "--draws", "40", "-o", str(picture)]) == 0
+    out = capsys.readouterr().out
+    rows = [line for line in out.splitlines() if line.startswith("│ uv")]
+    edge = ["knife's edge" in row for row in rows]
+    assert edge == sorted(edge, reverse=True)
+    assert any(edge)
+    assert "some robot runs dry, is late or gets stuck in" in out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_given_plan_is_checked_in_place_of_ours(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = tmp_path / "mine.json"
+    plan.write_text(json.dumps({"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}))
+    assert run_command_line(["world", "check", "--noise", str(DOOR), "--plan", str(plan), "--draws", "20",
+                             "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["plans"]
+    assert found["plan"] == "mine"
+    assert [(leg["origin"], leg["destination"], leg["judged"]) for leg in found["legs"]] == [
+        ("base", "p1", "safe"), ("p1", "base", "safe")]
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (["--noise"], "has no noise"), (["--draws", "5"], "--draws belongs to --noise"),
+    (["--json"], "--json belongs to --noise"), (["--noise", "-o", "margins.pdf"], "PNG or SVG")])
+def test_what_makes_no_sense_is_one_error(options: list[str], said: str, tmp_path: Path,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    quiet = tmp_path / "quiet.yaml"
+    quiet.write_text(SMALL.replace("noise: {wheel_gain_sd: 0.01}", ""))
+    assert run_command_line(["world", "check", str(quiet), *options]) == 2
+    message = capsys.readouterr().err
+    assert said in message
+    assert message.count("error:") == 1

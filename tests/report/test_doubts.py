@@ -1,0 +1,53 @@
+"""What a page says first of a model that the execution contradicts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sva_bench.analysis.results import Ledger, Share
+from sva_bench.analysis.summaries import Summary
+from sva_bench.report.doubts import contradictions, upset_by_noise
+from tests.results_for_tests import summary
+
+
+def run_of(modelled: float, ci95: tuple[float, float] | None, lost: float = 30.0, *, same: bool = False,
+           bad: float | None = None) -> Summary:
+    """A run whose deterministic plan lost so much to robots that ran dry."""
+    whole = summary(ci95, 100.0)
+    (scenario,) = whole.scenarios
+    plan = scenario.plans["deterministic"]
+    told: Ledger = replace(plan.ledger, out_of_fuel=-lost)
+    plans = {**scenario.plans, "deterministic": replace(
+        plan, ledger=told, bad=None if bad is None else Share(share=bad, ci95=None))}
+    return replace(whole, scenarios=(replace(
+        scenario, plans=plans, vss=replace(scenario.vss, modelled=modelled, same_plan=same)),))
+
+
+@pytest.mark.parametrize(("modelled", "ci95", "said"), [
+    (10.0, (-30.0, -12.0), "worth -21.0 [-30.0, -12.0], and not the 10.0 of the model"),
+    (10.0, (30.0, 50.0), "worth 40.0 [30.0, 50.0], and not the 10.0 of the model"),
+    (2.0, (-20.0, 10.0), "worth -5.0 [-20.0, 10.0], of the other sign than the 2.0 of the model")])
+def test_it_is_said_with_both_figures_and_where_to_look(modelled: float, ci95: tuple[float, float], said: str) -> None:
+    (sentence,) = contradictions(run_of(modelled, ci95))
+    assert said in sentence
+    assert sentence.startswith("S: ")
+    assert "robots of the deterministic plan ended out of fuel (30.0)" in sentence
+    assert "From promise to execution" in sentence
+
+
+@pytest.mark.parametrize("found", [
+    run_of(40.0, (30.0, 50.0)),  # within the interval
+    run_of(10.0, (30.0, 50.0), 0.0),  # nothing went wrong: the draws of failures are to blame
+    run_of(10.0, None), run_of(10.0, (30.0, 50.0), same=True),
+    run_of(30.0 - 1e-9, (30.0, 50.0))])  # rounding
+def test_nothing_is_said_where_nothing_is_contradicted(found: Summary) -> None:
+    assert contradictions(found) == []
+
+
+def test_missions_that_noise_upsets_are_said_by_plan() -> None:
+    assert upset_by_noise(run_of(10.0, (30.0, 50.0))) == []
+    assert upset_by_noise(run_of(10.0, (30.0, 50.0), bad=0.0)) == []
+    (said,) = upset_by_noise(run_of(10.0, (30.0, 50.0), bad=0.31))
+    assert "S: deterministic 31 %" in said
