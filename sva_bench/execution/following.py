@@ -9,7 +9,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Engine, Pose
-from sva_bench.robot.disturbance import UNDISTURBED, Disturbance, error_at
+from sva_bench.robot.disturbance import UNDISTURBED, Disturbance, error_at, room_for
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import delayed, patience_steps
@@ -36,7 +36,7 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
     limits, dt, half = model.limits, 1.0 / CONTROL_HZ, 0.5 * model.track_m
     check = round(_STUCK_CHECK_S * CONTROL_HZ)
     waves, queue = disturbance.waves, np.zeros((disturbance.delay_steps, 2))
-    lost, late = len(waves) > 0, len(queue) > 0
+    lost, late, parts = waves.shape[1] > 0, len(queue) > 0, room_for(waves)
     where, step = engine.pose, engine.step
     total = 0
     pose = where()
@@ -46,7 +46,7 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
         for number in range(1, patience_steps(stretch, model) + 1):
             x, y, yaw = pose
             if lost:
-                ex, ey, eyaw = error_at(waves, x, y)
+                ex, ey, eyaw = error_at(waves, parts, x, y)
                 x, y, yaw = x + ex, y + ey, yaw + eyaw
             speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
             phase = state[0]

