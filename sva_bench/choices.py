@@ -56,9 +56,13 @@ Standing = Literal["alive", "unheard", "dead", "home"]
 """What a team knows of a robot: ``unheard`` is one that has not reported from any stop yet."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
-Role = Literal["stochastic", "deterministic", "anticipative", "informed", "informed_part", "worst_tie", "given"]
-"""What a plan is executed for: ours, the third made for a reaction; what is behind the informed planner, and one of its
-plans; the least fortunate of the deterministic plans that tie; or given from elsewhere."""
+Role = Literal["stochastic", "deterministic", "anticipative", "calibrated", "informed", "informed_part", "worst_tie",
+               "given"]
+"""What a plan is executed for: ours, the third made for a reaction and the fourth for calibrated costs; what is behind
+the informed planner, and one of its plans; the least fortunate of the deterministic plans that tie; or given from
+elsewhere."""
+Best = Literal["best"]
+"""What plans are calibrated for in place of a share of bad missions: the greatest executed value."""
 EventKind = Literal["departed", "arrived", "collected", "refuelled", "failed", "out_of_fuel", "late", "stuck", "home"]
 NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payload", "capacity", "people", "passages",
                     "floors", "contact"]
