@@ -20,6 +20,9 @@ InstanceFamily = Literal["A", "B", "C"]
 # Planning
 PathPlanner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
 Objective = Literal["stochastic", "deterministic"]
+OwnPlan = Literal["stochastic", "deterministic", "calibrated"]
+"""The plans of a scenario that are made for its own sake; the third on request."""
+OWN_PLANS: tuple[OwnPlan, ...] = get_args(OwnPlan)
 PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess", "anticipative"]
 """What a plan was made for; ``cvar`` and ``excess`` are the stochastic objective with a risk, and ``anticipative`` is
 the value with a reaction."""

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from sva_bench.choices import End, FailureProcess, Objective, Status
+from sva_bench.choices import End, FailureProcess, OwnPlan, Status
 from sva_bench.files.fields import Name, NonNegativeInt, Probability
 from sva_bench.files.printable import is_name
 from sva_bench.files.records import Record, stands_after
@@ -280,7 +280,7 @@ class ScenarioFacts(Record):
 
     Attributes:
         name, availability: The scenario.
-        plans: Promises of its two plans.
+        plans: Promises of its own plans.
         modelled_range: Least and greatest modelled VSS over all deterministic plans that tie.
         same_plan: Whether both have the same routes.
         vss_mean_value: VSS after Birge, against the plan for the mean scenario.
@@ -291,7 +291,7 @@ class ScenarioFacts(Record):
 
     name: Name
     availability: Availability
-    plans: Mapping[Objective, Promise]
+    plans: Mapping[OwnPlan, Promise]
     modelled_range: Interval | None
     same_plan: bool
     vss_mean_value: Amount | None

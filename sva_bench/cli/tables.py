@@ -16,6 +16,7 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
+from sva_bench.report.calibration_page import calibration_lines, mark_of
 from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
@@ -55,6 +56,8 @@ def print_summary(summary: AnySummary) -> None:
         for said in reaction_lines(summary):
             console.print(said, highlight=False, markup=False)
     else:
+        for said in calibration_lines(summary.scenarios):
+            console.print(said, highlight=False, markup=False)
         print_reactions(summary, console)
         _print_assumptions(summary, console)
     if not summary.reproducible:
@@ -92,7 +95,7 @@ def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
                 worth = [vss_verdict(scenario.vss), f"{scenario.vss.modelled:.1f}",
                          "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]
             table.add_row(
-                "" if number else scenario.name, name + proof, *((lost,) if given else ()),
+                "" if number else scenario.name, name + mark_of(scenario, name) + proof, *((lost,) if given else ()),
                 *(cell(entry, plan) for entry in shown), *(f"{plan.by_robot[robot]:.1f}" for robot in robots),
                 *(worth if compared else ()), end_section=number == len(scenario.plans) - 1)
     return table

@@ -17,6 +17,7 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.calibration_page import calibration_section, mark_of
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.wording import (
@@ -61,6 +62,7 @@ def write_report(path: Path, content: Content) -> None:
              "Values in the units of the world file's incentives; 95 % intervals in brackets, over trials and noise "
              "draws."),
         *_charts(summary),
+        *(calibration_section(summary.scenarios) if isinstance(summary, Summary) else ()),
         *reaction_section(summary),
         *_world(content.world),
         *_over_trials(scenarios),
@@ -170,7 +172,7 @@ def _statistics(scenarios: Scenarios, section: Section) -> str:
     """A table of statistics, a row for each scenario and plan."""
     entries = statistics("page", section)
     return table(["scenario", "plan", *(entry.heading for entry in entries)],
-                 [[s.name, name, *(cell(entry, plan) for entry in entries)] for s in scenarios
+                 [[s.name, name + mark_of(s, name), *(cell(entry, plan) for entry in entries)] for s in scenarios
                   for name, plan in s.plans.items()], words=(0, 1))
 
 
