@@ -113,7 +113,7 @@ def run(
                       calibrate=target, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    _show(result.summary, result.folder, as_json, csv=csv)
+    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
 
 
 def execute(
@@ -174,10 +174,10 @@ def execute(
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, as_json, csv=csv)
+    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
 
 
-def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False) -> None:
+def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False, wide: bool = False) -> None:
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
@@ -188,5 +188,5 @@ def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_summary(summary)
+        print_summary(summary, wide=wide)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)

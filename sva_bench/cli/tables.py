@@ -18,6 +18,7 @@ from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_page import calibration_lines, mark_of
 from sva_bench.report.compared_reactions import reaction_lines
+from sva_bench.report.source_table import SOURCES_HEAD, source_rows
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     answer,
@@ -33,8 +34,8 @@ _ALWAYS_SHOWN = 3
 """Robots that have a column however narrow the terminal is."""
 
 
-def print_summary(summary: AnySummary) -> None:
-    """Print a summary as a table, and what it comes to."""
+def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
+    """Print a summary as a table, and what it comes to; ``wide``: what each source of noise did, too."""
     console, travel = results(), summary.travel
     robots = list(summary.scenarios[0].availability)
     shown = _robots_that_fit(summary, console, robots)
@@ -60,6 +61,8 @@ def print_summary(summary: AnySummary) -> None:
             console.print(said, highlight=False, markup=False)
         print_reactions(summary, console)
         _print_assumptions(summary, console)
+    if wide:
+        _print_sources(summary, console)
     if not summary.reproducible:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
 
@@ -115,6 +118,16 @@ def _print_unhappy(summary: AnySummary, console: Console) -> None:
     if unhappy:
         console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
                       highlight=False)
+
+
+def _print_sources(summary: AnySummary, console: Console) -> None:
+    if rows := source_rows(summary.scenarios):
+        table = Table(title="What each source of noise did", title_justify="left")
+        for number, heading in enumerate(SOURCES_HEAD):
+            table.add_column(heading, justify="left" if number < 3 else "right")
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
 
 
 def _print_assumptions(summary: Summary, console: Console) -> None:

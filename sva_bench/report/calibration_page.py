@@ -45,7 +45,8 @@ def _told(found: Calibration) -> str:
     if found.is_nominal:
         return f"calibrated {goal}: the nominal plan is it already; {wrong}."
     return (f"calibrated {goal}: made for {_costs(found)}, {promised}; {wrong}, of the nominal plan's "
-            f"{bad_pct(found.nominal.bad)}. By the twin it is worth {found.executed:.1f}, the nominal one {found.nominal.executed:.1f}.")
+            f"{bad_pct(found.nominal.bad)}. By the twin it is worth {found.executed:.1f}, the nominal one "
+            f"{found.nominal.executed:.1f}.")
 
 
 def _costs(found: Calibration) -> str:

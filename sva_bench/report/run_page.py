@@ -20,6 +20,7 @@ from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.calibration_page import calibration_section, mark_of
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
+from sva_bench.report.source_table import source_section
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
@@ -67,6 +68,7 @@ def write_report(path: Path, content: Content) -> None:
         *_world(content.world),
         *_over_trials(scenarios),
         *_from_promise(scenarios),
+        *source_section(scenarios),
         *reaction_ledgers(summary),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),

@@ -22,6 +22,7 @@ from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, own_cases, plan_scenarios, with_calibration
 from sva_bench.study.publish import Run, Stopwatch, publish
 from sva_bench.study.recourse import Stage, react_in_scenarios
+from sva_bench.study.sources import Grounds, with_sources
 from sva_bench.study.summing import head_of, proved, summarise
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -94,6 +95,9 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
         if larger is None:
             break
         options = replace(options, trials=larger[0], rollouts=larger[1])
+    with clock.phase("sources"):
+        summary = with_sources(Grounds(world=world, costs=costs, settings=settings, executor=executor, drives=drives),
+                               summary, executed)
     if options.assumptions:
         plans = {name: p.by_process for name, p in planned.items() if p.by_process is not None}
         with clock.phase("execution"):
