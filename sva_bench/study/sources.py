@@ -115,7 +115,7 @@ class _Effects:
         rest_s: Seconds beyond the planned ones that no source has [s].
     """
 
-    by_source: Mapping[NoiseName, SourceEffect]
+    by_source: Mapping[SourceName, SourceEffect]
     of_physics: tuple[NoiseName, float] | None
     twin: float
     rest_s: float
@@ -129,7 +129,7 @@ def _effects(
     routes = [(robot.name, case.plan.route(robot.name)) for robot in grounds.world.robots]
     taken = {source: _taken_s(twin.routes, routes) for source, twin in twins.items()}
     value = {source: twin.value[key] for source, twin in twins.items()}
-    by_source = {source: SourceEffect(incentive=value[None] - value[source] + 0.0,
+    by_source: dict[SourceName, SourceEffect] = {source: SourceEffect(incentive=value[None] - value[source] + 0.0,
                                       seconds=taken[None] - taken[source] + 0.0)
                  for source in twins if source is not None}
     physics_s = 0.0 if grounds.settings.fidelity == "kinematic" else _beyond_s(
@@ -176,7 +176,7 @@ def _attached(
 
 def _sources_of(plan: PlanResult, effects: _Effects) -> dict[SourceName, SourceEffect]:
     """All sources and the interplay, which add up to what the noise did to the plan."""
-    sources: dict[SourceName, SourceEffect] = {**effects.by_source}
+    sources = dict(effects.by_source)
     if effects.of_physics is not None:
         name, seconds = effects.of_physics
         sources[name] = SourceEffect(incentive=plan.executed.mean - effects.twin + 0.0, seconds=seconds + 0.0)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -61,9 +64,6 @@ def test_a_source_that_is_switched_off_leaves_the_others() -> None:
 
 
 def world_of_everything(noise: Noise) -> World:
-    import tempfile
-    from pathlib import Path
-
     with tempfile.TemporaryDirectory() as folder:
         calm = world_of(Path(folder), SMALL)
     return replace(calm, noise=noise, passages=(DOOR,), obstacles=replace(
@@ -97,7 +97,7 @@ def test_all_sources_together_add_up_in_physics_and_what_the_twin_misses_is_cont
         assert total(plan) == pytest.approx(plan.beside_draws, abs=1e-9)
     assert from_dict(Summary, as_dict(summary)) == summary
     rows = [row for row in source_rows(summary.scenarios) if row[2] != "interplay"]
-    for a, b in zip(rows, rows[1:], strict=False):
+    for a, b in pairwise(rows):
         assert a[:2] != b[:2] or abs(float(a[3])) >= abs(float(b[3]))
 
 
