@@ -1,4 +1,4 @@
-"""Results of calibrated planning, and the share of bad missions that a number of draws proves."""
+"""Results of calibrated planning, and what plans are calibrated for."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from sva_bench.analysis.results import Amount, Share
-from sva_bench.analysis.statistics import bounded_mean
 from sva_bench.choices import Best
 from sva_bench.errors import BadInput
 from sva_bench.files.fields import Probability
@@ -104,27 +103,6 @@ class Calibration(Record):
         if (self.quantile, self.factor) not in [(tried.quantile, tried.factor) for tried in self.curve]:
             raise ValueError("curve: expected the plan of 'quantile' and 'factor' on it")
         return self
-
-
-def share_of(bad: int, draws: int, *, varies: bool = True) -> Share:
-    """A share of draws with its interval, Clopper and Pearson's; exact where all draws are equal."""
-    share = bad / draws
-    if not varies:
-        return Share(share=share, ci95=(share, share))
-    return Share(share=share, ci95=bounded_mean(draws, share, draws * share * (1 - share), (0.0, 1.0)))
-
-
-def proves(found: Share, target: float) -> bool:
-    """Whether the upper end of a share's interval is at most the one asked for."""
-    return found.ci95 is not None and found.ci95[1] <= target
-
-
-def most_bad(draws: int, target: float) -> int:
-    """The greatest number of bad draws that still proves a share; -1 where none does."""
-    bad = -1
-    while bad < draws and proves(share_of(bad + 1, draws), target):
-        bad += 1
-    return bad
 
 
 def draws_for(target: Target) -> int:

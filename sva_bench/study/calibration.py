@@ -20,10 +20,8 @@ from sva_bench.analysis.calibration import (
     Target,
     Tried,
     draws_for,
-    most_bad,
-    proves,
-    share_of,
 )
+from sva_bench.analysis.proof import most_bad, proves, share_of
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.twin_draws import TwinDraws, as_planned
 from sva_bench.mission.instance import Instance

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sva_bench.analysis.calibration import Target, draws_for, most_bad, proves, share_of, target_of, target_text
+from sva_bench.analysis.calibration import Target, draws_for, target_of, target_text
+from sva_bench.analysis.proof import most_bad, proves, share_of
 from sva_bench.errors import BadInput
 from sva_bench.execution.twin_draws import TwinDraws, as_planned, draws_seed
 from sva_bench.files.records import as_dict, from_dict

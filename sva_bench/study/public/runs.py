@@ -84,8 +84,8 @@ def run(
         news: When it learns of one: ``instant``, when the ``report`` from a robot's next stop is overdue, each robot
             at a ``station``, or ``never``; of several, each is measured. By default the world's, or ``report``.
         anticipate: With a policy: make a plan for the reaction too, the planner ``anticipative``.
-        calibrate: Make the planner ``calibrated`` too: on costs raised until at most so many per cent of missions go
-            wrong though nobody fails, 1 or ``"1%"``; or until it is worth most under noise, ``"best"``.
+        calibrate: Make the planner ``calibrated`` too: for at most so many per cent of missions that go wrong though
+            nobody fails, 1 or ``"1%"``, or for the greatest executed value, ``"best"``.
         time_limit: Stop each solve after so many seconds and take its best plan; none by default.
         gap: Relative gap at which a plan counts as optimal.
         evpi: Work out the value of perfect information however long it takes.
@@ -117,11 +117,10 @@ def run(
         policies=policies_of(names_of("policy", policy) or ()), news=news_of(names_of("news", news) or ()),
         anticipate=flag("anticipate", anticipate), calibrate=_target(calibrate),
         precision=_precision(precision, max_trials, trials, rollouts)))
-    count = _workers(workers)
     read, path = world_given(world, scenario, margin, _process("plan_failure", plan_failure),
                              _process("execute_failure", execute_failure))
     check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
-    with nullcontext() if path is None else about(path), local_workers(count, PRELOAD) as executor:
+    with nullcontext() if path is None else about(path), local_workers(_workers(workers), PRELOAD) as executor:
         done = measure(read, options, executor, told)
         folder = None if place is None else publish_run(read, options, done, place, told, _command()).folder
     return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
