@@ -22,6 +22,9 @@ InstanceFamily = Literal["A", "B", "C"]
 # Planning
 PathPlanner = Literal["prmstar", "rrtconnect", "fmt", "bfmt", "informedrrtstar"]
 Objective = Literal["stochastic", "deterministic"]
+OwnPlan = Literal["stochastic", "deterministic", "calibrated"]
+"""The plans of a scenario that are made for its own sake; the third on request."""
+OWN_PLANS: tuple[OwnPlan, ...] = get_args(OwnPlan)
 PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess", "anticipative"]
 """What a plan was made for; ``cvar`` and ``excess`` are the stochastic objective with a risk, and ``anticipative`` is
 the value with a reaction."""
@@ -58,9 +61,13 @@ Standing = Literal["alive", "unheard", "dead", "home"]
 """What a team knows of a robot: ``unheard`` is one that has not reported from any stop yet."""
 End = Literal["home", "failed", "out_of_fuel", "late", "stuck"]
 ENDS: tuple[End, ...] = get_args(End)
-Role = Literal["stochastic", "deterministic", "anticipative", "informed", "informed_part", "worst_tie", "given"]
-"""What a plan is executed for: ours, the third made for a reaction; what is behind the informed planner, and one of its
-plans; the least fortunate of the deterministic plans that tie; or given from elsewhere."""
+Role = Literal["stochastic", "deterministic", "anticipative", "calibrated", "informed", "informed_part", "worst_tie",
+               "given"]
+"""What a plan is executed for: ours, the third made for a reaction and the fourth for calibrated costs; what is behind
+the informed planner, and one of its plans; the least fortunate of the deterministic plans that tie; or given from
+elsewhere."""
+Best = Literal["best"]
+"""What plans are calibrated for in place of a share of bad missions: the greatest executed value."""
 EventKind = Literal["departed", "waits", "touches", "arrived", "collected", "refuelled", "failed", "out_of_fuel",
                     "late", "stuck", "home"]
 DriveUnit = Literal["hops", "routes"]
@@ -73,4 +80,6 @@ NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payloa
                     "floors", "contact"]
 """What the execution meets that a plan doesn't know of, by the names under which its effects are reported."""
 NOISE_NAMES: tuple[NoiseName, ...] = get_args(NoiseName)
+SourceName = Literal[NoiseName, "interplay"]
+"""What the ledger of sources is divided into: the noise, and what is due to no source by itself."""
 NoisePreset = Literal["realistic"]

@@ -32,6 +32,7 @@ class Stream(IntEnum):
     PASSAGE = 16
     PEOPLE = 17
     CHECKED_DRIVE = 18
+    CALIBRATION = 19
 
 
 def seed_for(root: int, stream: Stream, *index: int) -> np.random.SeedSequence:

@@ -58,12 +58,14 @@ class ScenarioTrials:
 
     Attributes:
         stochastic, deterministic: Those of the two plans.
+        calibrated: Those of the calibrated plan, where there is one.
         worst: Those of the tied deterministic plan of least expected value; ``None`` where no tie has less.
         informed: The perfect-information plans, with ``--informed``.
     """
 
     stochastic: Executed
     deterministic: Executed
+    calibrated: Executed | None = None
     worst: Executed | None = None
     informed: Judged | None = None
 
@@ -79,6 +81,8 @@ def scenario_summary(facts: ScenarioFacts, trials: ScenarioTrials, *, noisy: boo
     s, d, informed = trials.stochastic, trials.deterministic, trials.informed
     results = {"stochastic": plan_result(facts.plans["stochastic"], s, noisy=noisy),
                "deterministic": plan_result(facts.plans["deterministic"], d, noisy=noisy)}
+    if trials.calibrated is not None:
+        results["calibrated"] = plan_result(facts.plans["calibrated"], trials.calibrated, noisy=noisy)
     beyond = difference_figure(s, d, noisy=noisy)
     found = vss_figures(facts, results, estimate(beyond))
     ends = [found.executed.mean, *([float(np.mean(totals(s) - totals(trials.worst)))] if trials.worst else [])]

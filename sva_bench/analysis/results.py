@@ -5,13 +5,14 @@ Each is created where its figures are computed, and validated where it is read f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from sva_bench.choices import End, FailureProcess, Objective, Status
+from sva_bench.choices import End, FailureProcess, OwnPlan, SourceName, Status
 from sva_bench.files.fields import Name, NonNegativeInt, Probability
 from sva_bench.files.printable import is_name
 from sva_bench.files.records import Record, stands_after
@@ -114,6 +115,19 @@ class Ledger(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SourceEffect(Record):
+    """What a source of noise does to a plan.
+
+    Attributes:
+        incentive: Mean value with it less that without it, everything else being the same.
+        seconds: How much longer the team's routes take with it [s], driven whole, waits included.
+    """
+
+    incentive: Amount
+    seconds: Amount
+
+
+@dataclass(frozen=True, kw_only=True)
 class Promise(Record):
     """The values of a plan that are known before any trial.
 
@@ -158,12 +172,27 @@ class PlanResult(PlanFigures):
         distribution: Distribution over trials.
         end_shares: Share of trials with each end, by robot.
         bad: Share of trials in which some robot ran out of fuel, was late or got stuck; ``None`` in older folders.
+        sources: What each source of noise did; empty without noise. The incentives add up to what was executed less
+            what was expected of the failures drawn.
     """
 
     executed_controlled: Estimate = field(metadata=stands_after("executed"))
     distribution: Distribution = field(metadata=stands_after("executed_controlled"))
     end_shares: Mapping[Name, Mapping[End, Share]] = field(metadata=stands_after("distribution"))
     bad: Share | None = field(default=None, metadata=stands_after("end_shares"))
+    sources: Mapping[SourceName, SourceEffect] = field(default_factory=dict, metadata=stands_after("ledger"))
+
+    @property
+    def beside_draws(self) -> float:
+        """Executed value less what was expected and what the failures drawn did to it."""
+        return self.executed.mean - self.expected - self.ledger.draws
+
+    @model_validator(mode="after")
+    def _adds_up(self) -> PlanResult:
+        found = math.fsum(effect.incentive for effect in self.sources.values())
+        if self.sources and abs(found - self.beside_draws) > 1e-6 * max(1.0, abs(self.executed.mean)):
+            raise ValueError(f"sources: expected incentives that add up to {self.beside_draws:g}, found {found:g}")
+        return self
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -282,7 +311,7 @@ class ScenarioFacts(Record):
 
     Attributes:
         name, availability: The scenario.
-        plans: Promises of its two plans.
+        plans: Promises of its own plans.
         modelled_range: Least and greatest modelled VSS over all deterministic plans that tie.
         same_plan: Whether both have the same routes.
         vss_mean_value: VSS after Birge, against the plan for the mean scenario.
@@ -293,7 +322,7 @@ class ScenarioFacts(Record):
 
     name: Name
     availability: Availability
-    plans: Mapping[Objective, Promise]
+    plans: Mapping[OwnPlan, Promise]
     modelled_range: Interval | None
     same_plan: bool
     vss_mean_value: Amount | None

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from sva_bench.analysis.calibration import Calibration
 from sva_bench.analysis.reaction_results import ComparedReaction, ReactionResult
 from sva_bench.analysis.results import (
     AssumptionRow,
@@ -37,6 +38,7 @@ class ScenarioSummary(ScenarioFigures):
     Attributes:
         evpi_executed: Executed EVPI, with ``--informed``.
         assumptions: Plans executed under each failure process, with ``--assumptions``.
+        calibration: How the calibrated plan was found, with ``--calibrate``.
         reactions: Results of teams that react, by policy and news, where they do.
     """
 
@@ -44,6 +46,7 @@ class ScenarioSummary(ScenarioFigures):
     vss: Vss
     evpi_executed: Annotated[PerfectInformation | None, BeforeValidator(not_null)] = None
     assumptions: Annotated[tuple[AssumptionRow, ...] | None, BeforeValidator(not_null)] = None
+    calibration: Annotated[Calibration | None, BeforeValidator(not_null)] = None
     reactions: Annotated[tuple[ReactionResult, ...] | None, BeforeValidator(not_null)] = None
 
     @model_validator(mode="after")
@@ -51,6 +54,8 @@ class ScenarioSummary(ScenarioFigures):
         _refuse_other_robots(self.plans, self.availability)
         if not {"stochastic", "deterministic"} <= set(self.plans):
             raise ValueError("a scenario with 'vss' has the plans 'stochastic' and 'deterministic'")
+        if (self.calibration is None) == ("calibrated" in self.plans):
+            raise ValueError("a scenario has the plan 'calibrated' if and only if it has 'calibration'")
         s, d = self.stochastic.executed.mean, self.deterministic.executed.mean
         if abs(self.vss.executed.mean - (s - d)) > 1e-6 * max(abs(s), abs(d)):
             raise ValueError("vss.executed.mean: expected the difference between the plans' means, "
@@ -63,9 +68,11 @@ class UnitScenario(ScenarioFigures):
     """One scenario of one world, variant and seed of a batch.
 
     Attributes:
+        calibration: How the calibrated plan was found, where one was asked for.
         reactions: Results of teams that react, by policy and news, where they do.
     """
 
+    calibration: Annotated[Calibration | None, BeforeValidator(not_null)] = None
     reactions: Annotated[tuple[ReactionResult, ...] | None, BeforeValidator(not_null)] = None
 
 

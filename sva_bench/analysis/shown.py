@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sva_bench.analysis.calibration import Calibration
 from sva_bench.analysis.reaction_results import ComparedReaction, ReactionResult
-from sva_bench.analysis.results import PlanFigures, ScenarioPlans, VssFigures
+from sva_bench.analysis.results import PlanFigures, ScenarioPlans, Share, VssFigures
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.files.notebook import notebook_table
 from sva_bench.files.printable import counted
@@ -27,6 +28,7 @@ def lines_of(scenarios: Sequence[ScenarioPlans]) -> list[str]:
                           for name, plan in scenario.plans.items())
         vss = _vss(scenario)
         lines.append(f"{scenario.name}: {plans}" + (f"; VSS {vss}" if vss else ""))
+        lines += [f"  calibrated: {_calibrated(found)}"] if (found := _calibration(scenario)) else []
         lines += [f"  {reaction.name}: {_told(reaction)}" for reaction in _reactions(scenario)]
     more = len(scenarios) - _MOST_LINES
     return [*lines, f"and {more} more"] if more > 0 else lines
@@ -40,6 +42,8 @@ def table_of(title: str, scenarios: Sequence[ScenarioPlans]) -> str:
         rows += [["" if number else scenario.name, name, *_cells(plan),
                   *([] if compared else ["" if number else _vss(scenario)])]
                  for number, (name, plan) in enumerate(scenario.plans.items())]
+        if found := _calibration(scenario):
+            rows.append(["", _calibrated(found), *([""] * (len(_HEAD) - (3 if compared else 2)))])
         rows += [["", f"{name}, {reaction.name}", *_cells(plan), *(
             [] if isinstance(reaction, ComparedReaction) else ["" if number else _difference(reaction.vss)])]
                  for reaction in _reactions(scenario) for number, (name, plan) in enumerate(reaction.plans.items())]
@@ -52,6 +56,21 @@ def _cells(plan: PlanFigures) -> list[str]:
 
 def _reactions(scenario: ScenarioPlans) -> tuple[ReactionResult | ComparedReaction, ...]:
     return scenario.reactions or () if isinstance(scenario, ScenarioSummary | ComparedScenario) else ()
+
+
+def _calibration(scenario: ScenarioPlans) -> Calibration | None:
+    return scenario.calibration if isinstance(scenario, ScenarioSummary) else None
+
+
+def _calibrated(found: Calibration) -> str:
+    """How often it goes wrong, beside the nominal plan."""
+    missed = "" if found.reached else ", share not reached"
+    return (f"{_percentage(found.bad)} of missions go wrong, of the nominal plan {_percentage(found.nominal.bad)}"
+            f"{missed}")
+
+
+def _percentage(found: Share) -> str:
+    return _figure(100 * found.share, found.ci95 and (100 * found.ci95[0], 100 * found.ci95[1])) + " %"
 
 
 def _told(reaction: ReactionResult | ComparedReaction) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from sva_bench.analysis.calibration import Calibration
 from sva_bench.analysis.driving import DrivesMade
 from sva_bench.analysis.results import (
     MOST_ROLLOUTS,
@@ -96,10 +97,17 @@ class Head(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Facts(Head):
-    """The modelled values of a batch point, known before any trial."""
+    """The modelled values of a batch point, known before any trial.
+
+    Attributes:
+        scenarios: Those of each scenario.
+        reach: POIs that robots cannot reach.
+        calibrations: How calibrated plans were found, by scenario; empty where none was asked for.
+    """
 
     scenarios: Annotated[tuple[ScenarioFacts, ...], Field(min_length=1, max_length=10_000)]
     reach: Reach
+    calibrations: Mapping[Name, Calibration] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

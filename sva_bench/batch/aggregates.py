@@ -73,7 +73,8 @@ def unit_summary(note: Note) -> UnitSummary:
         world=facts.world, seed=facts.seed, trials=note.trials, rollouts=facts.rollouts, fidelity=facts.fidelity,
         failure=facts.failure, travel=facts.travel, reproducible=facts.reproducible, reach=facts.reach,
         variant=note.variant, scenarios=tuple(
-            scenario_of(scenario, note.tallies[scenario.name], note.robots, note.reactions.get(scenario.name))
+            scenario_of(scenario, note.tallies[scenario.name], note.robots, note.reactions.get(scenario.name),
+                        facts.calibrations.get(scenario.name))
             for scenario in facts.scenarios))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sva_bench.analysis.calibration import LEAST_DRAWS, draws_for
 from sva_bench.batch.cache import Cache
 from sva_bench.batch.folder import units_in
 from sva_bench.batch.grid import Grid, Point
@@ -19,7 +20,7 @@ from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 
 # Measured on a core of a shared virtual machine.
-_PATHS_S, _PLANS_S, _REACTION_S, _ROW_S = 5.0, 5.0, 2.5, 1.5e-6
+_PATHS_S, _PLANS_S, _CALIBRATION_S, _REACTION_S, _ROW_S = 5.0, 5.0, 20.0, 2.5, 1.5e-6
 _REAL_TIME = 135.0
 """Speed of physics relative to real time."""
 _TWIN_TIME = 3000.0
@@ -54,7 +55,7 @@ def estimates(grid: Grid, cache: Cache, folder: Path, progress: OnProgress = lam
 def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: Cache, seen: set[str]) -> StrandCost:
     world = point.world
     left = [count for first, count in grid.ranges() if grid.unit_name(point, seed, first) not in done]
-    rows = sum(left) * len(world.scenarios) * 2 * len(world.robots)
+    rows = sum(left) * len(world.scenarios) * (2 if grid.options.calibrate is None else 3) * len(world.robots)
     each = _REAL_TIME if grid.options.fidelity != "kinematic" else _TWIN_TIME
     seconds = rows * _ROW_S
     if grid.options.fidelity == "physics":
@@ -83,11 +84,16 @@ def _seconds(job: Job, each: float) -> float:
     if isinstance(job, TravelTimesJob):
         return _PATHS_S
     if isinstance(job, PlansJob):
-        return _PLANS_S * len(job.world.scenarios)
+        return (_PLANS_S + _calibration_s(job.options)) * len(job.world.scenarios)
     if isinstance(job, ReactionsJob):
         return _reactions_s(job.world, job.options)
     assert isinstance(job, DriveJob)
     return _USUAL_MISSION_S / each
+
+
+def _calibration_s(options: Options) -> float:
+    """Estimated processor time to calibrate a scenario's plan [s]."""
+    return 0.0 if options.calibrate is None else _CALIBRATION_S * draws_for(options.calibrate) / LEAST_DRAWS
 
 
 def _reactions_s(world: World, options: Options) -> float:
@@ -97,7 +103,7 @@ def _reactions_s(world: World, options: Options) -> float:
 def _beyond(job: Job, point: Point, grid: Grid, each: float) -> float:
     """Estimated processor time of the steps after one whose result isn't cached [s]."""
     scenarios = len(point.world.scenarios)
-    plans = _PLANS_S * scenarios if isinstance(job, TravelTimesJob) else 0.0
+    plans = (_PLANS_S + _calibration_s(grid.options)) * scenarios if isinstance(job, TravelTimesJob) else 0.0
     if not isinstance(job, ReactionsJob):
         plans += _reactions_s(point.world, grid.options)
     if isinstance(job, DriveJob | ReactionsJob) or grid.options.fidelity == "physics":

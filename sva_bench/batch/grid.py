@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sva_bench import __version__
+from sva_bench.analysis.calibration import target_of, target_text
 from sva_bench.batch.schema import BatchSettings, OptionsEntry, PointEntry
 from sva_bench.choices import PathPlanner
 from sva_bench.errors import BadInput
@@ -77,7 +78,8 @@ class Grid:
         options = OptionsEntry(
             trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, informed=False, assumptions=False,
             time_limit_s=stored.limits.time_limit_s, gap=stored.limits.gap, evpi=stored.evpi,
-            policies=stored.policies, news=stored.news, anticipate=stored.anticipate or None)
+            policies=stored.policies, news=stored.news, anticipate=stored.anticipate or None,
+            calibrate=None if stored.calibrate is None else target_text(stored.calibrate))
         return BatchSettings(version=__version__, seeds=tuple(self.seeds), options=options,
                              unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points})
 
@@ -150,6 +152,7 @@ def grid_of(document: Part, settings: BatchSettings) -> Grid:
     options = Options(
         trials=stored.trials, rollouts=stored.rollouts, fidelity=stored.fidelity, evpi=stored.evpi,
         policies=stored.policies, news=stored.news, anticipate=bool(stored.anticipate),
+        calibrate=None if stored.calibrate is None else target_of(stored.calibrate),
         limits=SolveLimits(time_limit_s=stored.time_limit_s, gap=stored.gap))
     points = []
     for name, entry in settings.points.items():

@@ -24,7 +24,7 @@ from sva_bench.robot.disturbance import UNDISTURBED
 from sva_bench.robot.model import RobotModel
 from sva_bench.study.costs import instance_of
 from sva_bench.study.options import Options
-from sva_bench.study.planning import Planned, plan_scenarios
+from sva_bench.study.planning import Planned, plan_scenarios, with_calibration
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.times import TravelTimes, plan_travel_times
 from sva_bench.world.model import World
@@ -84,11 +84,15 @@ class PlansJob:
 
     @property
     def key(self) -> str:
-        """The instances, and when solves may stop."""
+        """The instances, and when solves may stop; of a calibrated plan also what the twin makes of it."""
+        calibrated: tuple[object, ...] = ()
+        if self.options.calibrate is not None:
+            world = self.world
+            calibrated = (self.options.calibrate, world.noise, world.passages, world.sites, self.costs)
         instances = [instance_of(self.world, self.costs, scenario) for scenario in self.world.scenarios]
         return digest(self.kind, [s.name for s in self.world.scenarios], instances, self.world.plan_failure,
                       self.world.execute_failure, self.options.limits, self.options.evpi, self.options.informed,
-                      self.options.assumptions)
+                      self.options.assumptions, *calibrated)
 
     @property
     def what(self) -> str:
@@ -97,13 +101,16 @@ class PlansJob:
 
     def run(self) -> dict[str, Planned]:
         """Make them."""
-        return plan_scenarios(self.world, self.costs, self.options, lambda *_: None)
+        planned = plan_scenarios(self.world, self.costs, self.options, lambda *_: None)
+        return with_calibration(self.world, self.costs, planned, self.options, None, lambda *_: None)
 
     def fits(self, result: Mapping[str, Planned]) -> bool:
         """Of these scenarios, made for these instances, and feasible there."""
         return list(result) == [scenario.name for scenario in self.world.scenarios] and all(
             digest(planned.instance) == digest(instance_of(self.world, self.costs, scenario))
             and all(_is_plan(plan, planned.instance) for plan in (*planned.all_plans(), planned.worst) if plan)
+            and (planned.calibrated is None) == (self.options.calibrate is None)
+            and (planned.calibrated is None or _is_plan(planned.calibrated.plan, planned.calibrated.instance))
             for scenario, planned in zip(self.world.scenarios, result.values(), strict=True))
 
 

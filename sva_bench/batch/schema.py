@@ -13,7 +13,7 @@ from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.results import MOST_ROLLOUTS, MOST_TRIALS, Words, low_and_high
 from sva_bench.analysis.summaries import Facts
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
-from sva_bench.choices import ENDS, Fidelity, News, Objective, PathPlanner, PolicyName
+from sva_bench.choices import ENDS, OWN_PLANS, Fidelity, News, OwnPlan, PathPlanner, PolicyName
 from sva_bench.files.fields import Name, NonNegativeInt, Number, Seed
 from sva_bench.files.records import Record
 
@@ -40,6 +40,7 @@ class OptionsEntry(Record):
     policies: tuple[PolicyName, ...] = field(default_factory=tuple)
     news: tuple[News, ...] = field(default_factory=tuple)
     anticipate: bool | None = None
+    calibrate: Words | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +121,7 @@ class StoredTally(Record):
     """Sums over a scenario's trials."""
 
     difference: StoredFigure
-    plans: Mapping[Objective, StoredPlan]
+    plans: Mapping[OwnPlan, StoredPlan]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,15 +147,19 @@ class StoredNote(Record):
             if any(not {"stochastic", "deterministic"} <= set(result.plans) or set(result.plans) != set(
                     result.value_of_recourse) for result in results):
                 raise ValueError(f"reactions.{name}: not of the two plans")
+        own = OWN_PLANS[: 3 if self.facts.calibrations else 2]
         for number, scenario in enumerate(self.facts.scenarios):
-            if tuple(scenario.availability) != self.robots or len(scenario.plans) != 2:
-                raise ValueError(f"facts.scenarios[{number}]: expected the robots of 'robots', and two plans")
+            if tuple(scenario.availability) != self.robots or tuple(scenario.plans) != own:
+                raise ValueError(f"facts.scenarios[{number}]: expected the robots of 'robots', and the plans "
+                                 f"{', '.join(own)}")
+        if self.facts.calibrations and list(self.facts.calibrations) != names:
+            raise ValueError("facts.calibrations: expected one for each scenario, in its order")
         for name, tally in self.tallies.items():
             plans = tally.plans.values()
             figures = [tally.difference, *(plan.total for plan in plans),
                        *(figure for plan in plans for figure in plan.statistics.values())]
-            if len(plans) != 2 or any(len(plan.by_robot) != len(self.robots) for plan in plans) \
+            if tuple(tally.plans) != own or any(len(plan.by_robot) != len(self.robots) for plan in plans) \
                     or len({tuple(plan.statistics) for plan in plans}) != 1 \
                     or {f.count for f in figures} != {self.trials} or len({len(f.counts) for f in figures}) != 1:
-                raise ValueError(f"tallies.{name}: not of two plans, these robots and these trials")
+                raise ValueError(f"tallies.{name}: not of these plans, robots and these trials")
         return self

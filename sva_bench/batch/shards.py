@@ -16,6 +16,7 @@ from sva_bench.analysis.summaries import Facts
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.schema import StoredNote
 from sva_bench.batch.tallies import Tally, stored_tally, tally_from, tally_of
+from sva_bench.choices import OWN_PLANS
 from sva_bench.errors import BadFile
 from sva_bench.execution.execute import Executed, Settings
 from sva_bench.files.complaints import dotted, first_complaint
@@ -96,7 +97,7 @@ def shard_of(
     runs = {(run.case.scenario.name, run.case.planner): run for run in executed}
     note = Note(facts=facts, variant=variant, robots=robots, first=settings.first, trials=settings.trials,
                 reactions=reactions, tallies={
-        s.name: tally_of(runs[s.name, "stochastic"], runs[s.name, "deterministic"], noisy=world.noisy)
+        s.name: tally_of({name: runs[s.name, name] for name in OWN_PLANS if (s.name, name) in runs}, noisy=world.noisy)
         for s in world.scenarios})
     stored = StoredNote(
         facts=facts, variant=variant, robots=robots, first=note.first, trials=note.trials, reactions=reactions,

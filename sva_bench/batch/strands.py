@@ -14,7 +14,7 @@ from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import drives_ahead, planned_legs
 from sva_bench.study.costs import reach_of
 from sva_bench.study.options import Options, reactions_of, settings_of
-from sva_bench.study.planning import Planned, two_cases
+from sva_bench.study.planning import Planned, own_cases
 from sva_bench.study.summing import facts_of, head_of, proved
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.workers.engine import Job
@@ -34,7 +34,7 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     times = yield [TravelTimesJob(world=world, model=model, planner=point.planner) for model in models]
     costs = {model.name: fuel_costs(time, world.margin) for model, time in zip(models, times, strict=True)}
     (planned,) = yield [PlansJob(world=world, costs=costs, options=options)]
-    cases = tuple(case for scenario in world.scenarios for case in two_cases(scenario, planned[scenario.name]))
+    cases = tuple(case for scenario in world.scenarios for case in own_cases(scenario, planned[scenario.name]))
     settings = settings_of(world, options)
     drives = Drives()
     if settings.fidelity != "physics":
@@ -44,7 +44,8 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     reactions: Reactions = {}
     if left[0][0] == 0 and reactions_of(world, options):  # the unit of the first trials has them with it
         (reactions,) = yield [ReactionsJob(
-            world=world, costs=costs, options=options, cases=cases, drives=drives,
+            world=world, costs=costs, options=options, drives=drives,
+            cases=tuple(case for case in cases if case.role != "calibrated"),
             instances={name: plans.instance for name, plans in planned.items()})]
     facts, legs = facts_at(world, options, costs, planned), planned_legs(world, costs, cases)
     yield [TrialsJob(
@@ -59,5 +60,7 @@ def facts_at(
 ) -> Facts:
     """The modelled values of a world, known before any trial."""
     head = head_of(world, settings_of(world, options), costs, reproducible=proved(planned))
-    return Facts(**vars(head), reach=reach_of(world, costs), scenarios=tuple(
-        facts_of(world, scenario, planned[scenario.name]) for scenario in world.scenarios))
+    return Facts(
+        **vars(head), reach=reach_of(world, costs),
+        scenarios=tuple(facts_of(world, scenario, planned[scenario.name]) for scenario in world.scenarios),
+        calibrations={name: plans.calibrated.result for name, plans in planned.items() if plans.calibrated})

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import Field
 
+from sva_bench.analysis.calibration import Target, target_of
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
 from sva_bench.choices import FailureProcess, Fidelity, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
@@ -53,7 +54,7 @@ class Sweep:
         planners: How paths are planned.
         scenarios: Names of the scenarios to execute.
         margin, plan_failure, execute_failure: In place of the worlds' own.
-        policies, news, anticipate, evpi: As for ``Options``.
+        policies, news, anticipate, calibrate, evpi: As for ``Options``.
         time_limit_s, gap: When a solve may stop.
         vary: Values by dotted key of a world file.
         file: The sweep file that the settings are from, if any.
@@ -74,6 +75,7 @@ class Sweep:
     policies: tuple[PolicyName, ...] | None = None
     news: tuple[News, ...] | None = None
     anticipate: bool | None = None
+    calibrate: Target | None = None
     evpi: bool | None = None
     time_limit_s: float | None = None
     gap: float | None = None
@@ -104,6 +106,7 @@ class _SweepFile(Section):
     policy: Annotated[list[str], Field(min_length=1)] | str | None = None
     news: Annotated[list[str], Field(min_length=1)] | str | None = None
     anticipate: bool | None = None
+    calibrate: str | None = None
     evpi: bool | None = None
     time_limit_s: Number | None = Field(default=None, ge=0)
     gap: Number | None = Field(default=None, ge=0)
@@ -130,6 +133,7 @@ def _from_file(document: Document) -> Sweep:
     seeds = _words_at(document, "seeds", file.seeds, seeds_of)
     policies = _words_at(document, "policy", file.policy, policies_of)
     news = _words_at(document, "news", file.news, news_of)
+    targets = _words_at(document, "calibrate", file.calibrate, lambda words, what: (target_of(words[0], what),))
     for key, values in (file.set or {}).items():
         if not values:
             raise document.error(("set", key), "give at least one value")
@@ -144,7 +148,8 @@ def _from_file(document: Document) -> Sweep:
         unit_trials=file.unit_trials, planners=tuple(file.planners) if file.planners else None,
         scenarios=tuple(file.scenarios) if file.scenarios else None, margin=file.margin,
         plan_failure=file.plan_failure, execute_failure=file.execute_failure, policies=policies, news=news,
-        anticipate=file.anticipate, evpi=file.evpi, time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set,
+        anticipate=file.anticipate, evpi=file.evpi,
+        calibrate=targets[0] if targets else None, time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set,
         file=document)
 
 
@@ -289,7 +294,8 @@ def _options_of(sweep: Sweep) -> Options:
     return Options(
         trials=sweep.trials or 1000, rollouts=sweep.rollouts or 32, fidelity=sweep.fidelity or "rollout",
         limits=SolveLimits(time_limit_s=sweep.time_limit_s, gap=1e-6 if sweep.gap is None else sweep.gap),
-        policies=sweep.policies or (), news=sweep.news or (), anticipate=bool(sweep.anticipate), evpi=bool(sweep.evpi))
+        policies=sweep.policies or (), news=sweep.news or (), anticipate=bool(sweep.anticipate),
+        calibrate=sweep.calibrate, evpi=bool(sweep.evpi))
 
 
 def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tuple[World, list[str]]]:

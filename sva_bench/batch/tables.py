@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from sva_bench.analysis.calibration_table import CALIBRATION_COLUMNS, calibration_rows
 from sva_bench.analysis.over_maps import BatchSummary
 from sva_bench.batch.folder import write
 from sva_bench.batch.reactions_over_maps import vss_of
@@ -33,7 +34,8 @@ class _Reaction(Protocol[Gain_co]):
 
 
 def write_tables(folder: Path, summary: BatchSummary) -> None:
-    """Write ``maps.csv``, map by map, and ``aggregate.csv``, over maps; the same of reactions where there are any.
+    """Write ``maps.csv``, map by map, and ``aggregate.csv``, over maps; the same of reactions, and ``calibration.csv``,
+    where there are any.
 
     Raises:
         BadInput: If they cannot be written.
@@ -42,6 +44,10 @@ def write_tables(folder: Path, summary: BatchSummary) -> None:
             for row in summary.maps]
     over = [[row.variant, row.scenario, row.maps, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct.mean,
              *_ends(row.vss_pct.ci95)] for row in summary.aggregate]
+    curves = [[unit.world, unit.variant, unit.seed, *row] for unit in summary.units
+              for row in calibration_rows(unit.scenarios)]
+    if curves:
+        _write(folder / "calibration.csv", ("world", "variant", "seed", *CALIBRATION_COLUMNS), curves)
     if summary.reactions:
         _write(folder / "reactions.csv", (*_REACTION, "maps", *_GAIN, "pct_low", "pct_high"), _over_maps(summary))
         _write(folder / "reactions-maps.csv", ("world", "seed", *_REACTION, *_GAIN), _map_by_map(summary))

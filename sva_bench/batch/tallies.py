@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sva_bench.analysis.calibration import Calibration
 from sva_bench.analysis.catalogue import measured
 from sva_bench.analysis.figures import difference_figure, value_figure
 from sva_bench.analysis.moments import Clusters, Figure, Moments, joined
@@ -17,7 +18,7 @@ from sva_bench.analysis.scenarios import UnitScenario
 from sva_bench.analysis.statistics import estimate
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.batch.schema import StoredFigure, StoredPlan, StoredTally
-from sva_bench.choices import ENDS, Objective
+from sva_bench.choices import ENDS, OwnPlan
 from sva_bench.execution.execute import Executed
 
 
@@ -42,21 +43,21 @@ class PlanTally:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tally:
-    """Sums over both plans' trials under one scenario, and over their differences."""
+    """Sums over the trials of a scenario's own plans, and over the differences of the first two."""
 
-    plans: Mapping[Objective, PlanTally]
+    plans: Mapping[OwnPlan, PlanTally]
     difference: Figure
 
 
-def tally_of(stochastic: Executed, deterministic: Executed, *, noisy: bool) -> Tally:
-    """Add up the trials of a scenario."""
+def tally_of(runs: Mapping[OwnPlan, Executed], *, noisy: bool) -> Tally:
+    """Add up the trials of a scenario's own plans."""
     def added_up(run: Executed) -> PlanTally:
         return PlanTally(total=value_figure(run, noisy=noisy), by_robot=run.value.sum(axis=0),
                          ends=np.bincount(run.end.ravel(), minlength=len(ENDS)), charged=charges(run),
                          statistics=measured(run, noisy=noisy))
 
-    return Tally(plans={"stochastic": added_up(stochastic), "deterministic": added_up(deterministic)},
-                 difference=difference_figure(stochastic, deterministic, noisy=noisy))
+    return Tally(plans={name: added_up(run) for name, run in runs.items()},
+                 difference=difference_figure(runs["stochastic"], runs["deterministic"], noisy=noisy))
 
 
 def join(a: Tally, b: Tally) -> Tally:
@@ -73,9 +74,10 @@ def _join(a: PlanTally, b: PlanTally) -> PlanTally:
 
 
 def scenario_of(
-    facts: ScenarioFacts, tally: Tally, robots: Sequence[str], reactions: tuple[ReactionResult, ...] | None
+    facts: ScenarioFacts, tally: Tally, robots: Sequence[str], reactions: tuple[ReactionResult, ...] | None,
+    calibration: Calibration | None,
 ) -> UnitScenario:
-    """The results of a scenario, from its modelled values and its tally, with those of reactions."""
+    """The results of a scenario, from its modelled values and its tally, with those of reactions and calibration."""
     count = tally.difference.drawn.count
     plans: dict[str, PlanFigures] = {name: plan_figures(
         facts.plans[name], estimate(plan.total),
@@ -87,7 +89,7 @@ def scenario_of(
         name=facts.name, availability=facts.availability, plans=plans,
         vss=vss_figures(facts, plans, estimate(tally.difference)), vss_mean_value=facts.vss_mean_value,
         vss_mean_value_executed=facts.vss_mean_value, ws=facts.ws, evpi=facts.evpi,
-        value_of_process=facts.value_of_process, reactions=reactions)
+        value_of_process=facts.value_of_process, reactions=reactions, calibration=calibration)
 
 
 def stored_tally(tally: Tally) -> StoredTally:

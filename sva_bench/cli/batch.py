@@ -15,6 +15,7 @@ from sva_bench.cli.loading import loading
 from sva_bench.cli.options import (
     Anticipate,
     AsJson,
+    Calibrate,
     ExecuteFailure,
     MarginOption,
     NewsNames,
@@ -88,6 +89,7 @@ def over(
     policy: PolicyNames = None,
     news: NewsNames = None,
     anticipate: Anticipate = False,
+    calibrate: Calibrate = None,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
                                                       "takes.")] = False,
     time_limit: TimeLimit = None,
@@ -116,6 +118,7 @@ def over(
     set_up_logging(verbose)
     load_libraries()
     with loading():
+        from sva_bench.analysis.calibration import target_of
         from sva_bench.batch.cache import default_folder
         from sva_bench.batch.grid import batch_name
         from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
@@ -130,7 +133,8 @@ def over(
         planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
         margin=margin, plan_failure=plan_failure, execute_failure=execute_failure,
         policies=policies_of(policy) if policy else None, news=news_of(news) if news else None,
-        anticipate=anticipate or None, evpi=evpi or None,
+        anticipate=anticipate or None, calibrate=None if calibrate is None else target_of(calibrate),
+        evpi=evpi or None,
         time_limit_s=time_limit, gap=gap,
         vary=varied(vary) if vary else None, unit_trials=unit_trials))
     with progress_bars() as progress:

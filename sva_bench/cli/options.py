@@ -64,6 +64,10 @@ NewsNames = Annotated[list[str] | None, typer.Option(
     show_default=f"the world's, or {USUAL_NEWS}")]
 Anticipate = Annotated[bool, typer.Option("--anticipate", help="With a policy: make a plan for the reaction too, the "
                                           "planner anticipative.")]
+Calibrate = Annotated[str | None, typer.Option(
+    "--calibrate", metavar="SHARE%|best", help="Make the planner calibrated too: on costs raised until at most this "
+    "share of missions goes wrong though nobody fails, such as 1%; or until it is worth most under noise.",
+    show_default="none")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
 

@@ -13,6 +13,7 @@ from sva_bench.cli.options import (
     Anticipate,
     AsCsv,
     AsJson,
+    Calibrate,
     ExecuteFailure,
     FidelityOption,
     Gap,
@@ -59,6 +60,7 @@ def run(
     policy: PolicyNames = None,
     news: NewsNames = None,
     anticipate: Anticipate = False,
+    calibrate: Calibrate = None,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
@@ -84,6 +86,7 @@ def run(
     Writes a run folder with travel times, instances, plans, outcomes, recordings and a summary.
     """
     with loading():
+        from sva_bench.analysis.calibration import target_of
         from sva_bench.analysis.precision import precision_of
         from sva_bench.study.inputs import about, load
 
@@ -91,6 +94,7 @@ def run(
     if precision is None and max_trials is not None:
         raise BadInput("--max-trials belongs to --precision; --trials says how many there are without it")
     asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts)
+    target = None if calibrate is None else target_of(calibrate)
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
     loaded = load(world, scenario, margin, plan_failure, execute_failure)
@@ -105,10 +109,11 @@ def run(
     tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
-                      assumptions=assumptions, policies=policies, news=heard, anticipate=anticipate, precision=asked)
+                      assumptions=assumptions, policies=policies, news=heard, anticipate=anticipate,
+                      calibrate=target, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    _show(result.summary, result.folder, as_json, csv=csv)
+    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
 
 
 def execute(
@@ -169,10 +174,10 @@ def execute(
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, as_json, csv=csv)
+    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
 
 
-def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False) -> None:
+def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False, wide: bool = False) -> None:
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
@@ -183,5 +188,5 @@ def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_summary(summary)
+        print_summary(summary, wide=wide)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)

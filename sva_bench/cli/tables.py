@@ -16,8 +16,10 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
+from sva_bench.report.calibration_page import calibration_lines, mark_of
 from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
+from sva_bench.report.source_table import SOURCES_HEAD, source_rows
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     answer,
@@ -33,8 +35,8 @@ _ALWAYS_SHOWN = 3
 """Robots that have a column however narrow the terminal is."""
 
 
-def print_summary(summary: AnySummary) -> None:
-    """Print a summary as a table, and what it comes to."""
+def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
+    """Print a summary as a table, and what it comes to; ``wide``: what each source of noise did, too."""
     console, travel = results(), summary.travel
     robots = list(summary.scenarios[0].availability)
     shown = _robots_that_fit(summary, console, robots)
@@ -58,8 +60,12 @@ def print_summary(summary: AnySummary) -> None:
         for said in reaction_lines(summary):
             console.print(said, highlight=False, markup=False)
     else:
+        for said in calibration_lines(summary.scenarios):
+            console.print(said, highlight=False, markup=False)
         print_reactions(summary, console)
         _print_assumptions(summary, console)
+    if wide:
+        _print_sources(summary, console)
     if not summary.reproducible:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
 
@@ -95,7 +101,7 @@ def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
                 worth = [vss_verdict(scenario.vss), f"{scenario.vss.modelled:.1f}",
                          "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]
             table.add_row(
-                "" if number else scenario.name, name + proof, *((lost,) if given else ()),
+                "" if number else scenario.name, name + mark_of(scenario, name) + proof, *((lost,) if given else ()),
                 *(cell(entry, plan) for entry in shown), *(f"{plan.by_robot[robot]:.1f}" for robot in robots),
                 *(worth if compared else ()), end_section=number == len(scenario.plans) - 1)
     return table
@@ -115,6 +121,16 @@ def _print_unhappy(summary: AnySummary, console: Console) -> None:
     if unhappy:
         console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
                       highlight=False)
+
+
+def _print_sources(summary: AnySummary, console: Console) -> None:
+    if rows := source_rows(summary.scenarios):
+        table = Table(title="What each source of noise did", title_justify="left")
+        for number, heading in enumerate(SOURCES_HEAD):
+            table.add_column(heading, justify="left" if number < 3 else "right")
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
 
 
 def _print_assumptions(summary: Summary, console: Console) -> None:

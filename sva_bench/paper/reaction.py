@@ -18,7 +18,7 @@ from sva_bench.files.printable import counted
 from sva_bench.report.wording import with_interval
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
-from sva_bench.study.planning import plan_scenarios, two_cases
+from sva_bench.study.planning import own_cases, plan_scenarios
 from sva_bench.study.recourse import Stage, react_in_scenarios
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import Scenario, World
@@ -56,7 +56,7 @@ def reaction(
         for process in get_args(FailureProcess):
             here = replace(world, plan_failure=process, execute_failure=process)
             planned = plan_scenarios(here, costs, options, progress)
-            cases = [case for scenario in here.scenarios for case in two_cases(scenario, planned[scenario.name])]
+            cases = [case for scenario in here.scenarios for case in own_cases(scenario, planned[scenario.name])]
             executed = execute(here, costs, cases, own, executor,
                                lambda done, of: progress("driving routes", done, of), drives)
             found = react_in_scenarios(Stage(

@@ -19,7 +19,7 @@ from sva_bench.files.printable import counted
 from sva_bench.report.wording import verdict, with_interval
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
-from sva_bench.study.planning import plan_scenarios, two_cases
+from sva_bench.study.planning import own_cases, plan_scenarios
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import NOMINAL, World
 
@@ -67,7 +67,7 @@ def simulation(
         planned = plan_scenarios(replace(world, plan_failure="mission", execute_failure="mission"), costs, Options(),
                                  progress)
         own = replace(settings, rollouts=settings.rollouts if world.noisy else 1)
-        cases = [case for scenario in world.scenarios for case in two_cases(scenario, planned[scenario.name])]
+        cases = [case for scenario in world.scenarios for case in own_cases(scenario, planned[scenario.name])]
         drives = Drives()
         found: dict[str, dict[FailureProcess, Simulated]] = {s.name: {} for s in world.scenarios}
         for process in _PROCESSES:

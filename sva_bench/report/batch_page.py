@@ -9,6 +9,7 @@ from sva_bench.analysis.over_maps import BatchSummary, OverMaps, labelled
 from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.calibration_page import bad_pct
 from sva_bench.report.page import figure, heading, note, sentence, table, write_page
 from sva_bench.report.reactions_over_maps import answers_over_maps, reaction_table
 from sva_bench.report.wording import (
@@ -49,7 +50,21 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
                for unit in summary.units for s in unit.scenarios],
               sections=[unit.label for unit in summary.units for _ in unit.scenarios]),
     ]
-    write_page(path, "batch", parts)
+    write_page(path, "batch", [*parts, *_calibrated(summary)])
+
+
+def _calibrated(summary: BatchSummary) -> list[str]:
+    """How often calibrated plans go wrong and what they are worth, map by map."""
+    rows = [[s.name, str(unit.seed), found.chosen.name + ("" if found.reached else " (share not reached)"),
+             f"{found.nominal.promised:.1f}", f"{found.promised:.1f}", bad_pct(found.nominal.bad), bad_pct(found.bad),
+             with_interval(s.stochastic.executed), with_interval(s.plans["calibrated"].executed)]
+            for unit in summary.units for s in unit.scenarios if (found := s.calibration) is not None]
+    if not rows:
+        return []
+    return [heading("Calibrated plans"), table(
+        ["scenario", "seed", "made for costs at", "promised, nominal", "calibrated", "missions that go wrong, nominal",
+         "calibrated", "executed, stochastic", "calibrated"], rows, words=(0, 2),
+        sections=[unit.label for unit in summary.units for s in unit.scenarios if s.calibration is not None])]
 
 
 def _reactions(summary: BatchSummary) -> list[str]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from sva_bench.analysis.calibration import Calibration
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
@@ -72,6 +73,35 @@ def differences(rows: Sequence[tuple[str, Estimate]], title: str, unit: str) -> 
         axes.grid(axis="x", color="#ddd")
 
     return chart(_name("differences", title), f"{title}: means and 95 % intervals", (6.0, 1.3 + 0.34 * len(rows)), draw)
+
+
+def calibration_curve(scenario: str, found: Calibration) -> str:
+    """Points on a line: what plans promise and what they are worth by how often they go wrong.
+
+    Args:
+        scenario: Its name.
+        found: Its calibration.
+    """
+    bad = [100 * tried.bad.share for tried in found.curve]
+    lines = {"promised": [tried.promised for tried in found.curve],
+             "executed by the twin": [tried.executed for tried in found.curve]}
+
+    def draw(axes: Axes) -> None:
+        for number, (name, values) in enumerate(lines.items()):
+            colour, shape = mark(number)
+            axes.plot(bad, values, color=colour, marker=shape, linewidth=1.2, markersize=6, label=name)
+        axes.plot(100 * found.chosen.bad.share, found.chosen.executed, marker="o", markersize=14, fillstyle="none",
+                  color="black", linestyle="none", label="chosen" if found.reached else "shown")
+        if found.share is not None:
+            axes.axvline(100 * found.share, color="#444", linewidth=1, linestyle="--", label="asked for")
+        axes.set_xlabel("missions that go wrong [%]")
+        axes.set_ylabel("value [world file's units]")
+        axes.set_title(f"{scenario}: the price of caution")
+        axes.grid(color="#ddd")
+        _legend(axes)
+
+    return chart(_name("calibration", scenario), f"{scenario}: promised and executed value of plans for higher and "
+                 "higher costs, by the share of missions that go wrong", (4.8, 3.6), draw)
 
 
 def distributions(scenarios: Sequence[AnyScenario]) -> str:

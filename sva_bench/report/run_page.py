@@ -18,10 +18,12 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.calibration_page import calibration_section, mark_of
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
 from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
+from sva_bench.report.source_table import source_section
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
@@ -64,10 +66,12 @@ def write_report(path: Path, content: Content) -> None:
              "Values in the units of the world file's incentives; 95 % intervals in brackets, over trials and noise "
              "draws."),
         *_charts(summary),
+        *(calibration_section(summary.scenarios) if isinstance(summary, Summary) else ()),
         *reaction_section(summary),
         *_world(content.world),
         *_over_trials(scenarios),
         *_from_promise(scenarios),
+        *source_section(scenarios),
         *reaction_ledgers(summary),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
@@ -175,7 +179,7 @@ def _statistics(scenarios: Scenarios, section: Section) -> str:
     """A table of statistics, a row for each scenario and plan."""
     entries = statistics("page", section)
     return table(["scenario", "plan", *(entry.heading for entry in entries)],
-                 [[s.name, name, *(cell(entry, plan) for entry in entries)] for s in scenarios
+                 [[s.name, name + mark_of(s, name), *(cell(entry, plan) for entry in entries)] for s in scenarios
                   for name, plan in s.plans.items()], words=(0, 1))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from sva_bench.analysis.calibration_table import CALIBRATION_COLUMNS, calibration_rows
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
 from sva_bench.analysis.reaction_table import reaction_columns, reaction_rows
 from sva_bench.analysis.results import SUMMARY, SUMMARY_OF_REACTIONS
@@ -150,6 +151,8 @@ def write_csv(folder: Path) -> list[Path]:
     plans = [[scenario.name, name, *csv_cells(plan)]
              for scenario in summary.scenarios for name, plan in scenario.plans.items()]
     written.append(_write_rows(folder / "statistics.csv", ["scenario", "planner", *csv_columns()], plans))
+    if curves := calibration_rows(summary.scenarios):
+        written.append(_write_rows(folder / "calibration.csv", CALIBRATION_COLUMNS, curves))
     if reactions := reaction_rows(summary):
         written.append(_write_rows(folder / "reactions.csv", reaction_columns(summary), reactions))
     return written

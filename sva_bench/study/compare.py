@@ -23,6 +23,7 @@ from sva_bench.study.planning import unlimited
 from sva_bench.study.publish import Run, Stopwatch, publish
 from sva_bench.study.recourse import Stage, react_in_scenarios
 from sva_bench.study.run import refuse_too_many_rows
+from sva_bench.study.sources import Grounds, with_sources
 from sva_bench.study.summing import by_case, head_of, with_drives
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -78,6 +79,9 @@ def measure_plans(
         scenarios=tuple(comparison_summary(
             [_judged(world, instances[s.name], plan, runs[s.name, name]) for name, plan in plans.items()], robots,
             noisy=world.noisy) for s in world.scenarios))
+    with clock.phase("sources"):
+        summary = with_sources(Grounds(world=world, costs=costs, settings=settings, executor=executor, drives=drives),
+                               summary, executed)
     with clock.phase("reactions"):
         reactions = react_in_scenarios(Stage(
             world=world, costs=costs, instances=instances, executed=executed, settings=settings, executor=executor,

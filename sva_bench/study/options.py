@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from sva_bench.analysis.calibration import Target, target_of, target_text
 from sva_bench.analysis.precision import Precision
 from sva_bench.choices import Fidelity, News, PathPlanner, PolicyName
 from sva_bench.execution.execute import Settings
@@ -31,6 +32,8 @@ class Options:
         policies: What the team does about failures, each measured; empty = what the world says.
         news: When it learns of one, each measured with each policy; empty = what the world says.
         anticipate: Make a plan for each reaction too.
+        calibrate: What a calibrated plan is made for: the greatest share of bad missions, or the greatest value;
+            ``None`` = none is made.
         precision: Stopping rule, by which trials and noise draws grow; ``None`` = fixed numbers.
     """
 
@@ -46,6 +49,7 @@ class Options:
     policies: tuple[PolicyName, ...] = ()
     news: tuple[News, ...] = ()
     anticipate: bool = False
+    calibrate: Target | None = None
     precision: Precision | None = None
 
     def as_dict(self) -> dict[str, Any]:
@@ -54,6 +58,7 @@ class Options:
             "precision_pct": self.precision.pct, "max_trials": self.precision.max_trials}
         asked |= {key: list(words) for key, words in (("policies", self.policies), ("news", self.news)) if words}
         asked |= {"anticipate": True} if self.anticipate else {}
+        asked |= {} if self.calibrate is None else {"calibrate": target_text(self.calibrate)}
         return {**asked, "informed": self.informed, "assumptions": self.assumptions, "trials": self.trials,
                 "rollouts": self.rollouts, "fidelity": self.fidelity, "planner": self.planner,
                 "time_limit_s": self.limits.time_limit_s, "gap": self.limits.gap, "evpi": self.evpi}
@@ -69,7 +74,8 @@ class Options:
             planner=told["planner"], limits=SolveLimits(time_limit_s=told["time_limit_s"], gap=told["gap"]),
             evpi=told["evpi"], informed=told["informed"], assumptions=told["assumptions"], precision=precision,
             policies=tuple(told.get("policies", ())), news=tuple(told.get("news", ())),
-            anticipate=told.get("anticipate", False))
+            anticipate=told.get("anticipate", False),
+            calibrate=target_of(told["calibrate"]) if "calibrate" in told else None)
 
 
 def reactions_of(world: World, options: Options) -> tuple[Reaction, ...]:

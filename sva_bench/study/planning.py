@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from sva_bench.choices import FailureProcess
+from sva_bench.choices import FailureProcess, OwnPlan
 from sva_bench.errors import BadInput
 from sva_bench.execution.execute import Case, Executed
 from sva_bench.mission.certify import certify, expected_value
@@ -27,6 +28,7 @@ from sva_bench.solver.two_stage import (
     plan_stochastic,
     wait_and_see,
 )
+from sva_bench.study.calibration import Calibrated, calibrate
 from sva_bench.study.costs import instance_of, nominal_scenario
 from sva_bench.study.given_plans import InfeasiblePlan
 from sva_bench.study.options import Options
@@ -89,6 +91,7 @@ class Planned:
             the plan for ``mission``; ``None`` where no other is planned for or executed.
         informed: The perfect-information plans, on request.
         by_process: The plans for each failure process, where they are known.
+        calibrated: The plan for calibrated costs, on request.
     """
 
     instance: Instance
@@ -101,6 +104,7 @@ class Planned:
     value_of_process: float | None
     informed: InformedPlans | None
     by_process: PlansByProcess | None
+    calibrated: Calibrated | None = None
 
     def all_plans(self) -> list[Plan]:
         """Every plan that is executed for its own sake."""
@@ -178,10 +182,35 @@ def _defined(world: World, process: FailureProcess) -> bool:
         for scenario in world.scenarios for robot in world.robots)
 
 
-def two_cases(scenario: Scenario, planned: Planned) -> list[Case]:
-    """Both plans of a scenario, to be executed."""
-    return [Case(scenario=scenario, planner="stochastic", plan=planned.stochastic, role="stochastic"),
-            Case(scenario=scenario, planner="deterministic", plan=planned.deterministic, role="deterministic")]
+def with_calibration(
+    world: World, costs: Mapping[str, FuelCosts], planned: Mapping[str, Planned], options: Options,
+    executor: Executor | None, progress: OnProgress,
+) -> dict[str, Planned]:
+    """The plans of each scenario with the calibrated one, if it is asked for.
+
+    Args:
+        world, costs: The world and its fuel costs.
+        planned: The plans for nominal costs.
+        options: What is asked for, and when solves may stop.
+        executor: Where drives run; ``None`` = here.
+        progress: Called as costs and plans are made.
+
+    Raises:
+        KeyboardInterrupt: On Ctrl-C.
+    """
+    if options.calibrate is None:
+        return dict(planned)
+    found = calibrate(world, costs, {name: (plans.stochastic, plans.instance) for name, plans in planned.items()},
+                      options.calibrate, options.limits, executor, progress)
+    return {name: replace(plans, calibrated=found[name]) for name, plans in planned.items()}
+
+
+def own_cases(scenario: Scenario, planned: Planned) -> list[Case]:
+    """Both plans of a scenario, and the calibrated one where there is one, to be executed."""
+    made: dict[OwnPlan, Plan] = {"stochastic": planned.stochastic, "deterministic": planned.deterministic}
+    if planned.calibrated is not None:
+        made["calibrated"] = planned.calibrated.plan
+    return [Case(scenario=scenario, planner=name, plan=plan, role=name) for name, plan in made.items()]
 
 
 def plan_informed(instance: Instance, limits: SolveLimits, known: Knowledge, *, force: bool) -> InformedPlans:

@@ -19,9 +19,10 @@ from sva_bench.study.assumptions import cross_table
 from sva_bench.study.costs import plan_costs, reach_of
 from sva_bench.study.informed import cases_of, combined_trials
 from sva_bench.study.options import Options, settings_of
-from sva_bench.study.planning import Planned, model_is_executed, plan_scenarios, two_cases
+from sva_bench.study.planning import Planned, model_is_executed, own_cases, plan_scenarios, with_calibration
 from sva_bench.study.publish import Run, Stopwatch, publish
 from sva_bench.study.recourse import Stage, react_in_scenarios
+from sva_bench.study.sources import Grounds, with_sources
 from sva_bench.study.summing import head_of, proved, summarise, with_drives
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -58,8 +59,10 @@ def publish_run(
     command: Sequence[str] | None = None,
 ) -> Run:
     """Write the run folder of what was measured; ``command``: as for ``publish``."""
-    return publish(world, options, done.costs, {name: p.instance for name, p in done.planned.items()}, done.executed,
-                   done.summary, out, done.clock, progress, command=command, reacted=done.reacted)
+    instances = {name: p.instance for name, p in done.planned.items()}
+    instances |= {f"{name}-calibrated": p.calibrated.instance for name, p in done.planned.items() if p.calibrated}
+    return publish(world, options, done.costs, instances, done.executed, done.summary, out, done.clock, progress,
+                   command=command, reacted=done.reacted)
 
 
 def measure(world: World, options: Options, executor: Executor | None, progress: OnProgress) -> Measured:
@@ -68,12 +71,15 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
     Raises:
         BadInput: If there are more trials than a run can keep in memory.
     """
-    refuse_too_many_rows(world, max(options.trials, options.precision.max_trials if options.precision else 0), 2)
+    refuse_too_many_rows(world, max(options.trials, options.precision.max_trials if options.precision else 0),
+                         2 if options.calibrate is None else 3)
     clock = Stopwatch()
     with clock.phase("travel"):
         costs = plan_costs(world, options.planner, progress)
     with clock.phase("planning"):
         planned = plan_scenarios(world, costs, options, progress)
+    with clock.phase("calibration"):
+        planned = with_calibration(world, costs, planned, options, executor, progress)
     cases = [case for scenario in world.scenarios for case in _cases_of(world, scenario, planned[scenario.name])]
     drives = Drives()
     reach = reach_of(world, costs)
@@ -89,6 +95,9 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
         if larger is None:
             break
         options = replace(options, trials=larger[0], rollouts=larger[1])
+    with clock.phase("sources"):
+        summary = with_sources(Grounds(world=world, costs=costs, settings=settings, executor=executor, drives=drives),
+                               summary, executed)
     if options.assumptions:
         plans = {name: p.by_process for name, p in planned.items() if p.by_process is not None}
         with clock.phase("execution"):
@@ -110,7 +119,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
 
 def _cases_of(world: World, scenario: Scenario, planned: Planned) -> list[Case]:
     """All cases to be executed in a scenario."""
-    cases = two_cases(scenario, planned)
+    cases = own_cases(scenario, planned)
     if model_is_executed(world) and planned.worst is not None:  # the VSS against the least fortunate of the ties
         cases.append(Case(scenario=scenario, planner="worst of ties", plan=planned.worst, role="worst_tie"))
     return cases if planned.informed is None else [*cases, *cases_of(scenario, planned.informed)]

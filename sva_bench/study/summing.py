@@ -17,7 +17,7 @@ from sva_bench.execution.execute import Executed, Settings
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.plan import Plan
 from sva_bench.study.options import Options
-from sva_bench.study.planning import Planned, model_is_executed
+from sva_bench.study.planning import Planned, model_is_executed, unlimited
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import Scenario, World
 
@@ -37,10 +37,12 @@ def summarise(
         plans = planned[scenario.name]
         trials = ScenarioTrials(
             stochastic=runs[scenario.name, "stochastic"], deterministic=runs[scenario.name, "deterministic"],
-            worst=runs.get((scenario.name, "worst_tie")), informed=None if plans.informed is None else Judged(
+            worst=runs.get((scenario.name, "worst_tie")), calibrated=runs.get((scenario.name, "calibrated")),
+            informed=None if plans.informed is None else Judged(
                 expected=plans.informed.expected,
                 executed=plans.informed.promised(runs[scenario.name, "informed"])))
-        scenarios.append(scenario_summary(facts_of(world, scenario, plans), trials, noisy=world.noisy))
+        summed = scenario_summary(facts_of(world, scenario, plans), trials, noisy=world.noisy)
+        scenarios.append(replace(summed, calibration=None if plans.calibrated is None else plans.calibrated.result))
     return Summary(**vars(head), scenarios=tuple(scenarios), reach=reach,
                    precision=None if options.precision is None else options.precision.reached(scenarios))
 
@@ -48,7 +50,8 @@ def summarise(
 def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:
     """The modelled values of a scenario: each plan's closed-form value, and those of both together."""
     mission = model_is_executed(world)
-    truth = replace(plans.instance, failure=world.execute_failure)
+    # A calibrated plan may take more than the nominal costs leave: costs at the median have no margin for it.
+    truth = unlimited(replace(plans.instance, failure=world.execute_failure))
 
     def promise(plan: Plan) -> Promise:
         return promise_of(plan, expected_value(truth, plan))
@@ -56,7 +59,8 @@ def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:
     least, most = plans.vss_range
     return ScenarioFacts(
         name=scenario.name, availability={robot.name: scenario.availability[robot.name] for robot in world.robots},
-        plans={"stochastic": promise(plans.stochastic), "deterministic": promise(plans.deterministic)},
+        plans={"stochastic": promise(plans.stochastic), "deterministic": promise(plans.deterministic),
+               **({} if plans.calibrated is None else {"calibrated": promise(plans.calibrated.plan)})},
         modelled_range=(least + 0.0, most + 0.0) if mission else None,
         same_plan=plans.stochastic.drives_like(plans.deterministic),
         # The collapsed model is the mean scenario's problem, so the plan for the mean is the stochastic one.
@@ -67,7 +71,8 @@ def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:
 
 def proved(planned: Mapping[str, Planned]) -> bool:
     """Whether all plans are proved optimal."""
-    return all(plan.status == "optimal" for p in planned.values() for plan in p.all_plans())
+    return all(plan.status == "optimal" for p in planned.values() for plan in p.all_plans()) and all(
+        p.calibrated is None or p.calibrated.proved for p in planned.values())
 
 
 def head_of(world: World, settings: Settings, costs: Mapping[str, FuelCosts], *, reproducible: bool) -> Head:

@@ -80,7 +80,7 @@ def test_a_new_entry_shows_in_summary_terminal_page_and_csv(
 def test_a_new_entry_adds_up_over_ranges_of_trials(tmp_path: Path) -> None:
     done = measure(world_of(tmp_path), QUICK, None, lambda *_: None)
     s, d = (next(run for run in done.executed if run.case.role == role) for role in ("stochastic", "deterministic"))
-    whole = tally_from(stored_tally(tally_of(s, d, noisy=True)))
+    whole = tally_from(stored_tally(tally_of({"stochastic": s, "deterministic": d}, noisy=True)))
     twice = join(whole, whole)
     for plan, again in zip(whole.plans.values(), twice.plans.values(), strict=True):
         one, two = plan.statistics["everybody_home"], again.statistics["everybody_home"]

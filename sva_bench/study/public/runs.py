@@ -9,6 +9,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import cast
 
+from sva_bench.analysis.calibration import Target, target_of
 from sva_bench.analysis.precision import Precision, precision_of
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import NEWS, FailureProcess, Fidelity, News, PathPlanner, PolicyName
@@ -61,8 +62,8 @@ def run(
     execute_failure: FailureProcess | None = None, policy: PolicyName | Sequence[PolicyName] | None = None,
     news: News | Sequence[News] | None = None, anticipate: bool = False, time_limit: float | None = None,
     gap: float = 1e-6, evpi: bool = False, informed: bool = False, assumptions: bool = False,
-    precision: float | str | None = None, max_trials: int | None = None, out: PathLike | None = None,
-    workers: int | None = None, progress: OnProgress | None = None,
+    calibrate: float | str | None = None, precision: float | str | None = None, max_trials: int | None = None,
+    out: PathLike | None = None, workers: int | None = None, progress: OnProgress | None = None,
 ) -> Result[Summary]:
     """Plan, execute and measure a mission, as ``sva-bench run`` does; nothing is written unless ``out`` says where.
 
@@ -83,6 +84,8 @@ def run(
         news: When it learns of one: ``instant``, when the ``report`` from a robot's next stop is overdue, each robot
             at a ``station``, or ``never``; of several, each is measured. By default the world's, or ``report``.
         anticipate: With a policy: make a plan for the reaction too, the planner ``anticipative``.
+        calibrate: Make the planner ``calibrated`` too: for at most so many per cent of missions that go wrong though
+            nobody fails, 1 or ``"1%"``, or for the greatest executed value, ``"best"``.
         time_limit: Stop each solve after so many seconds and take its best plan; none by default.
         gap: Relative gap at which a plan counts as optimal.
         evpi: Work out the value of perfect information however long it takes.
@@ -112,12 +115,12 @@ def run(
         limits=SolveLimits(time_limit_s=optional(number, "time_limit", time_limit, 0), gap=number("gap", gap, 0)),
         evpi=flag("evpi", evpi), informed=flag("informed", informed), assumptions=flag("assumptions", assumptions),
         policies=policies_of(names_of("policy", policy) or ()), news=news_of(names_of("news", news) or ()),
-        anticipate=flag("anticipate", anticipate), precision=_precision(precision, max_trials, trials, rollouts)))
-    count = _workers(workers)
+        anticipate=flag("anticipate", anticipate), calibrate=_target(calibrate),
+        precision=_precision(precision, max_trials, trials, rollouts)))
     read, path = world_given(world, scenario, margin, _process("plan_failure", plan_failure),
                              _process("execute_failure", execute_failure))
     check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
-    with nullcontext() if path is None else about(path), local_workers(count, PRELOAD) as executor:
+    with nullcontext() if path is None else about(path), local_workers(_workers(workers), PRELOAD) as executor:
         done = measure(read, options, executor, told)
         folder = None if place is None else publish_run(read, options, done, place, told, _command()).folder
     return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
@@ -247,7 +250,14 @@ def _options(
         rollouts=integer("rollouts", rollouts, 1, MOST_ROLLOUTS), fidelity=choice("fidelity", fidelity, Fidelity),
         planner=choice("planner", planner, PathPlanner), limits=rest.limits, evpi=rest.evpi, informed=rest.informed,
         assumptions=rest.assumptions, policies=rest.policies, news=rest.news, anticipate=rest.anticipate,
-        precision=rest.precision)
+        calibrate=rest.calibrate, precision=rest.precision)
+
+
+def _target(calibrate: float | str | None) -> Target | None:
+    if calibrate is None:
+        return None
+    text = calibrate if isinstance(calibrate, str) else f"{number('calibrate', calibrate, 0):.17g}%"
+    return target_of(text, "calibrate: ")
 
 
 def _precision(precision: float | str | None, max_trials: int | None, trials: int, rollouts: int) -> Precision | None:
