@@ -56,5 +56,6 @@ bench-paper: setup  ## a part of the paper's own table of runtimes: under ten mi
 
 bench: setup  ## figures of the README; see benchmarks/
 	for file in travel_times physics maps recording solver_small batch; do $(BIN)/python benchmarks/$$file.py || exit 1; done
+	$(BIN)/python -m benchmarks.noise --speed
 	$(BIN)/python -m benchmarks.planners
 	time $(BIN)/sva-bench run worlds/four-rooms.yaml
