@@ -13,9 +13,9 @@ import pytest
 import sva_bench as sb
 from sva_bench.__main__ import run_command_line
 from sva_bench.analysis.reaction_table import GIVEN_COLUMNS
-from sva_bench.analysis.summaries import ComparisonSummary
+from sva_bench.analysis.summaries import ComparisonSummary, summary_form
 from sva_bench.choices import NEWS, POLICY_NAMES
-from sva_bench.files.records import from_dict
+from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.compared_reactions import given_answers
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -204,6 +204,38 @@ def test_execute_with_reactions_prints_json_writes_csv_with_ranks_and_a_page(
     assert "VSS" not in shown.split("Each plan with the reaction")[1].split("</table>")[0]
     for answer in given_answers(from_dict(ComparisonSummary, told)):
         assert all(said in page for said in (answer.condition, *answer.sentences))
+
+
+@pytest.mark.parametrize("words", [["run"], ["execute", "p.json"], ["execute", "p.json", "both.json"]])
+@pytest.mark.parametrize("anticipate", [False, True])
+def test_what_a_command_wrote_is_read_reported_and_replayed(
+    words: list[str], anticipate: bool, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "both.json").write_text(OTHER)
+    command, *plans = words
+    asked = ["--policy", "resolve", "--news", "report,instant", "--out", "out",
+             *(["--anticipate"] if anticipate else [])]
+    assert run_command_line([command, "w.yaml", *plans, *QUICK, *asked, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    (run,) = (folder / "out").iterdir()
+    read = from_dict(summary_form(told), told)
+    assert as_dict(read) == told
+    measured = ["stochastic", "deterministic"] if command == "run" else [plan.removesuffix(".json") for plan in plans]
+    page = (run / "report.html").read_bytes()
+    assert run_command_line(["report", str(run)]) == 0
+    assert (run / "report.html").read_bytes() == page
+    capsys.readouterr()
+    for scenario in read.scenarios:
+        for reaction in scenario.reactions or ():
+            names = [*measured, *(["anticipative"] if anticipate else [])]
+            assert list(reaction.plans) == names
+            assert bool(reaction.candidates) == anticipate
+            assert not anticipate or {tried.plan for tried in reaction.candidates} & set(measured)
+            again = ["replay", str(run), "--trial", "0", "--scenario", scenario.name, "--workers", "1", "--json"]
+            assert run_command_line([*again, "--policy", "resolve", "--news", reaction.news]) == 0
+            rows = json.loads(capsys.readouterr().out)["rows"]
+            assert list(dict.fromkeys(row["planner"] for row in rows)) == names
+    assert ("chosen from" in page.decode()) == anticipate
 
 
 def test_execute_prints_its_answers_and_writes_no_csv_unasked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
