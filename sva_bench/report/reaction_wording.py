@@ -96,7 +96,8 @@ def assumptions_of(rows: Sequence[AnyReacting]) -> list[str]:
     tried = "" if any("anticipative" in row.reaction.plans for row in rows) else \
         " No plan was made for the reaction; --anticipate makes one and tries it too."
     return [f"Who knows what when: {'; '.join(f'{own} news: {KNOWS[own]}' for own in news)}. The team counts on its "
-            "schedule, and on reports of robots that run late; a leg is driven to its end before new orders are taken.",
+            "schedule, and on reports of robots that run late; a leg is driven to its end before new orders are taken, so "
+            "a robot on its last leg home, or home, is told nothing more.",
             f"{_histories(rows)}{_driven_whole(rows)}{tried}"]
 
 
