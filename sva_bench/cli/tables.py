@@ -87,7 +87,8 @@ def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
             proof = "" if plan.status in ("optimal", None) else f" ({plan.status})"
             lost, worth = "", ["", "", ""]
             if isinstance(plan, GivenPlanResult):
-                proof, lost = proof if plan.feasible else " (infeasible)", lost_robots(plan)
+                # How far a given plan was proved is not said: "feasible" would look as if the others weren't.
+                proof, lost = "" if plan.feasible else " (infeasible)", lost_robots(plan)
             if not number and not isinstance(scenario, ComparedScenario):
                 worth = [vss_verdict(scenario.vss), f"{scenario.vss.modelled:.1f}",
                          "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]
