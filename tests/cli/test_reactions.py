@@ -264,3 +264,11 @@ def test_a_notebook_shows_given_plans_with_and_without_the_reaction(tmp_path: Pa
     assert [(row["plan"], float(row["executed [95 %]"].split()[0])) for row in rows] == [
         (name, round(mean, 1)) for name, mean in expected]
     assert "&lt;i&gt;, resolve on instant news" in shown
+
+
+def test_a_plan_that_no_robot_could_drive_is_said_not_to_be_helped_by_allowing_it(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "twice.json").write_text(OTHER.replace('"p1"', '"p4"'))
+    assert run_command_line(["execute", "w.yaml", "twice.json", "--allow-infeasible", *QUICK]) == 3
+    assert "no robot could drive that, even where infeasible plans are allowed" in capsys.readouterr().err
