@@ -101,15 +101,20 @@ def assumptions_of(rows: Sequence[AnyReacting]) -> list[str]:
     """What answers about these rest on."""
     if not rows:
         return []
-    news = dict.fromkeys(row.reaction.news for row in rows)
     tried = "" if any("anticipative" in row.reaction.plans for row in rows) else \
         " --anticipate makes a plan for the reaction and compares it with those given." \
         if isinstance(rows[0], GivenReacting) else \
         " No plan was made for the reaction; --anticipate makes one and tries it too."
-    return [f"Who knows what when: {'; '.join(f'{own} news: {KNOWS[own]}' for own in news)}. The team counts on its "
-            "schedule, and on reports of robots that run late; a leg is driven to its end before new orders are taken, "
-            "so a robot on its last leg home, or home, is told nothing more.",
+    return [knows_what_when(row.reaction.news for row in rows),
             f"{_histories(rows)}{_driven_whole(rows)}{tried}"]
+
+
+def knows_what_when(news: Iterable[News]) -> str:
+    """Who is taken to know what when, for some kinds of news."""
+    told = "; ".join(f"{own} news: {KNOWS[own]}" for own in dict.fromkeys(news))
+    return f"Who knows what when: {told}. The team counts on its schedule, and on reports of robots that run late; a " \
+           "leg is driven to its end before new orders are taken, so a robot on its last leg home, or home, is told " \
+           "nothing more."
 
 
 def _driven_whole(rows: Sequence[AnyReacting]) -> str:
