@@ -13,10 +13,9 @@ from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
-from sva_bench.cli.reaction_table import print_reactions
+from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
-from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     answer,
@@ -52,8 +51,7 @@ def print_summary(summary: AnySummary) -> None:
     for said in remarks(summary):
         console.print(said, highlight=False)
     if isinstance(summary, ComparisonSummary):
-        for said in reaction_lines(summary):
-            console.print(said, highlight=False, markup=False)
+        print_given_reactions(summary, console)
     else:
         print_reactions(summary, console)
         _print_assumptions(summary, console)

@@ -272,3 +272,21 @@ def test_a_plan_that_no_robot_could_drive_is_said_not_to_be_helped_by_allowing_i
     (folder / "twice.json").write_text(OTHER.replace('"p1"', '"p4"'))
     assert run_command_line(["execute", "w.yaml", "twice.json", "--allow-infeasible", *QUICK]) == 3
     assert "no robot could drive that, even where infeasible plans are allowed" in capsys.readouterr().err
+
+
+def test_execute_prints_a_table_with_each_plan_under_each_kind_of_news(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "both.json").write_text(OTHER)
+    assert run_command_line(["execute", "w.yaml", "p.json", "both.json", *QUICK, "--policy", "resolve", "--news",
+                             "report,instant", "--out", "out"]) == 0
+    told = capsys.readouterr().out.split("If the team re-plans (policy resolve)")[1].split("Who knows")[0]
+    (run,) = (folder / "out").iterdir()
+    summary = json.loads((run / "summary.json").read_text())
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in told.splitlines() if line.startswith("│")]
+    expected = [(name, f"{plan['executed']['mean']:.1f}", str(next(
+        row["rank"] for row in reaction["ranking"] if row["plan"] == name)))
+        for scenario in summary["scenarios"] for reaction in scenario["reactions"]
+        for name, plan in reaction["plans"].items()]
+    assert [(row[2], row[3].split()[0], row[5]) for row in rows] == expected
+    assert [row[1] for row in rows if row[1]] == ["report", "instant"] * 2
