@@ -174,8 +174,7 @@ def test_that_a_plan_made_for_the_reaction_is_one_of_the_two_is_said(best: str) 
 def test_which_missions_the_vss_without_reaction_is_of_is_said_once_where_it_is_not_that_of_the_run(
     histories: HistoryMode
 ) -> None:
-    found = summary_of(*(reaction(news, values, histories=histories)
-                         for news, values in (("report", MORE), ("instant", LOSES))))  # type: ignore[arg-type]
+    found = summary_of(reaction("report", MORE, histories=histories), reaction("instant", LOSES, histories=histories))
     clause = "without reaction: over all histories; the figures above are of the trials drawn"
     assert said(found).count(clause) == (histories == "enumerated")
     assert page_of(found).count(clause) == printed(found, 10_000).count(clause) == (histories == "enumerated")
