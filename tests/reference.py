@@ -47,7 +47,8 @@ def reference() -> str:
     parts.append("## What they take and give\n")
     for name in TYPES:
         kind = getattr(sb, name)
-        members = [f"- `.{member}`: {_first_line(value)}" for member, value in _members(kind).items()
+        members = [f"- `.{member}{'()' if inspect.isfunction(value) else ''}`: {_first_line(value)}"
+                   for member, value in _members(kind).items()
                    if not member.startswith("_") and (inspect.isfunction(value) or isinstance(value, property))]
         parts.append(f"### `sb.{name}`\n\n{_told(kind)}" + ("\n" + "\n".join(members) + "\n" if members else ""))
     parts.append("## Errors\n\nAll can be caught by these names, or together as `sb.SvaBenchError`:\n")

@@ -30,7 +30,7 @@ from sva_bench.recording.rerun import end_s
 from sva_bench.study.given_plans import InfeasiblePlan
 from sva_bench.study.public.arguments import by_argument
 from sva_bench.travel.times import UnreachableSite
-from tests.reference import ERRORS
+from tests.reference import ERRORS, TYPES, reference
 from tests.worlds_for_tests import SMALL, world_of
 
 FUNCTIONS = ("load_world", "travel_times", "fuel_costs", "make_instance", "plan", "certify", "execute", "run", "record")
@@ -119,6 +119,13 @@ def test_every_error_that_a_function_is_said_to_raise_can_be_caught_by_a_public_
     for error in raised - {"ValueError", "KeyboardInterrupt"}:
         assert issubclass(getattr(sb, error), sb.SvaBenchError), error
         assert error in ERRORS
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_the_reference_shows_methods_as_calls_and_attributes_as_attributes(name: str) -> None:
+    told = reference().split(f"### `sb.{name}`\n")[1].split("\n### ")[0].split("\n## ")[0]
+    for member, call in re.findall(r"^- `\.(\w+)(\(\))?`:", told, re.MULTILINE):
+        assert bool(call) == (not isinstance(getattr(getattr(sb, name), member), property)), member
 
 
 def test_every_public_error_is_in_the_reference() -> None:

@@ -56,6 +56,8 @@ def end_figures(run: Executed, robot: int, *, noisy: bool) -> dict[End, Figure]:
             possible = is_uncertain if end == "failed" else most > 0
             lost, (least, greatest) = min(1.0, float(reached.sum())) if possible else 0.0, later
             bounds = (least, lost + greatest) if end == "home" else (-greatest, lost - least)
+            if end == "failed" and run.terms.survival is None and run.terms.rate is None:
+                bounds = 0.0, 0.0  # a robot that fails for the whole mission never leaves: no noise changes that
         observed = float(drawn.min()), float(drawn.max())
         taken = drawn.astype(np.float64) - happened
         drawn_bounds = (0.0, 1.0) if is_uncertain and end not in EXECUTION_LOSSES else observed

@@ -185,7 +185,9 @@ class ComparedReaction(ReactionFigures):
     Attributes:
         comparisons: Every pair of plans under the policy, by the same histories or trials.
         ranking: The plans from best to worst.
+        candidates: The plans that ``anticipative`` was chosen from; none without it.
     """
 
     comparisons: tuple[Comparison, ...] = field(metadata=stands_after("plans"))
     ranking: tuple[Ranked, ...] = field(metadata=stands_after("comparisons"))
+    candidates: tuple[Candidate, ...] = field(default_factory=tuple)

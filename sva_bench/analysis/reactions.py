@@ -90,7 +90,7 @@ def _ranked(plans: Mapping[str, PlanReacted]) -> list[str]:
 
 
 def compared_reaction(
-    plans: Mapping[str, PlanReacted], candidates: Sequence[Candidate] = (), *, noisy: bool  # noqa: ARG001
+    plans: Mapping[str, PlanReacted], candidates: Sequence[Candidate] = (), *, noisy: bool
 ) -> ComparedReaction:
     """The results of given plans under one policy and news; the arguments are those of ``reaction_result``."""
     some = next(iter(plans.values())).reacted
@@ -104,7 +104,7 @@ def compared_reaction(
         plans=results, comparisons=tuple(comparisons),
         ranking=ranking({name: plan.executed.mean for name, plan in results.items()}, comparisons),
         value_of_recourse={name: _recourse(plan, noisy=noisy) for name, plan in plans.items()},
-        driven_whole=_whole(plans))
+        driven_whole=_whole(plans), candidates=tuple(candidates))
 
 
 def _plan(plan: PlanReacted, *, noisy: bool) -> ReactingPlan:

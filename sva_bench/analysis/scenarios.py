@@ -93,13 +93,15 @@ class ComparedScenario(ScenarioPlans):
     def _is_consistent(self) -> ComparedScenario:
         _refuse_other_robots(self.plans, self.availability)
         for number, reaction in enumerate(self.reactions or ()):
-            if list(reaction.plans) != list(self.plans) or list(reaction.value_of_recourse) != list(self.plans):
-                raise ValueError(f"reactions[{number}]: expected the plans of the scenario, in its order")
+            expected = [*self.plans, *(["anticipative"] if reaction.candidates else [])]
+            if list(reaction.plans) != expected or list(reaction.value_of_recourse) != expected:
+                raise ValueError(f"reactions[{number}]: expected the plans of the scenario, in its order, and behind "
+                                 "them the anticipative one if 'candidates' says what that was chosen from")
         ranked: tuple[ComparedScenario | ComparedReaction, ...] = self, *(self.reactions or ())
         for each in ranked:
-            if sorted(row.plan for row in each.ranking) != sorted(self.plans):
+            if sorted(row.plan for row in each.ranking) != sorted(each.plans):
                 raise ValueError("ranking: expected each of 'plans' once")
-            if not {name for pair in each.comparisons for name in (pair.a, pair.b)} <= set(self.plans):
+            if not {name for pair in each.comparisons for name in (pair.a, pair.b)} <= set(each.plans):
                 raise ValueError("comparisons: expected pairs of 'plans'")
         return self
 

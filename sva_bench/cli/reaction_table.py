@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.results import Estimate
-from sva_bench.analysis.summaries import Summary
+from sva_bench.analysis.summaries import ComparisonSummary, Summary
+from sva_bench.report.compared_reactions import given_reacting, reaction_lines
 from sva_bench.report.reaction_wording import (
     DOUBTED,
+    GivenReacting,
     Reacting,
     changed,
     doubles,
@@ -23,7 +26,7 @@ from sva_bench.report.reaction_wording import (
     vss_pct,
     without_pct,
 )
-from sva_bench.report.wording import listed
+from sva_bench.report.wording import listed, with_interval
 
 _MOST_NAMED = 6
 
@@ -45,6 +48,40 @@ def print_reactions(summary: Summary, console: Console) -> None:
     if twice := doubles(rows):
         more = [f"{len(twice) - _MOST_NAMED} more in report.html"] if len(twice) > _MOST_NAMED else []
         console.print(f"POIs visited by two robots: {listed([*twice[:_MOST_NAMED], *more])}.", highlight=False)
+
+
+def print_given_reactions(summary: ComparisonSummary, console: Console) -> None:
+    """Print what reacting makes of given plans; nothing where nobody reacts."""
+    rows = given_reacting(summary)
+    for policy in dict.fromkeys(row.reaction.policy for row in rows):
+        console.print(given_table([row for row in rows if row.reaction.policy == policy]))
+    for said in reaction_lines(summary):
+        console.print(said, highlight=False, markup=False)
+
+
+def given_table(rows: list[GivenReacting]) -> Table:
+    """Each given plan under each kind of news: its value, what re-planning adds, its rank, and how often orders change.
+
+    What is added is in per cent of the plan's value without reaction, in incentive where that tells nothing.
+    """
+    pct = tell(recourse_pct(reaction, name) for _, reaction in rows for name in reaction.plans)
+    table = Table(title=f"If the team re-plans (policy {rows[0].reaction.policy})", title_justify="left")
+    for heading in ("scenario", "news", "plan", "executed [95 %]", "adds [%]" if pct else "adds", "rank",
+                    "orders\nchange [%]"):
+        words = heading in ("scenario", "news", "plan")
+        table.add_column(heading, justify="left" if words else "right", no_wrap=heading != "plan", overflow="fold")
+    for number, (scenario, reaction) in enumerate(rows):
+        first = not number or rows[number - 1].scenario is not scenario
+        ranks = {row.plan: row.rank for row in reaction.ranking}
+        for k, (name, plan) in enumerate(reaction.plans.items()):
+            gain = reaction.value_of_recourse[name]
+            last = k == len(reaction.plans) - 1 and (
+                number == len(rows) - 1 or rows[number + 1].scenario is not scenario)
+            table.add_row(
+                scenario.name if first and not k else "", "" if k else reaction.news, Text(name),
+                with_interval(plan.executed), _mean(recourse_pct(reaction, name) if pct else gain), str(ranks[name]),
+                f"{100 * plan.reacted:.0f}", end_section=last)
+    return table
 
 
 def reaction_table(rows: list[Reacting]) -> Table:

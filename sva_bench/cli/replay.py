@@ -37,7 +37,7 @@ def replay(
 ) -> None:
     """Play one trial of a finished run again, and record it.
 
-    The recordings go to the run's folder; Of teams that react it is said what was heard when, and how orders changed.
+    The recordings go to the run's folder. Of teams that react it is said what was heard when, and how orders changed.
     --json prints the trial's rows as they stand in outcomes.parquet, and these reactions.
     """
     set_up_logging(verbose)

@@ -13,11 +13,10 @@ from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
-from sva_bench.cli.reaction_table import print_reactions
+from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_page import calibration_lines, mark_of
-from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
 from sva_bench.report.source_table import SOURCES_HEAD, source_rows
 from sva_bench.report.wording import (
@@ -57,8 +56,7 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
     for said in (*upset_by_noise(summary), *remarks(summary)):
         console.print(said, highlight=False)
     if isinstance(summary, ComparisonSummary):
-        for said in reaction_lines(summary):
-            console.print(said, highlight=False, markup=False)
+        print_given_reactions(summary, console)
     else:
         for said in calibration_lines(summary.scenarios):
             console.print(said, highlight=False, markup=False)
@@ -96,7 +94,8 @@ def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
             proof = "" if plan.status in ("optimal", None) else f" ({plan.status})"
             lost, worth = "", ["", "", ""]
             if isinstance(plan, GivenPlanResult):
-                proof, lost = proof if plan.feasible else " (infeasible)", lost_robots(plan)
+                # How far a given plan was proved is not said: "feasible" would look as if the others weren't.
+                proof, lost = "" if plan.feasible else " (infeasible)", lost_robots(plan)
             if not number and not isinstance(scenario, ComparedScenario):
                 worth = [vss_verdict(scenario.vss), f"{scenario.vss.modelled:.1f}",
                          "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]

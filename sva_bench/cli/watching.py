@@ -92,7 +92,7 @@ def over_maps(rows: Sequence[OverMaps], title: str) -> Table:
 def reactions_over_maps(rows: Sequence[ReactionOverMaps]) -> Table:
     """What reacting is worth over maps, as a table."""
     varied = any(row.variant for row in rows)
-    head, words, cells = reaction_table(rows)
+    head, words, cells = reaction_table(rows, narrow=True)
     table = Table(title="Reactions over maps", title_justify="left")
     for number, heading in enumerate(head):
         table.add_column(heading, justify="left" if number in words else "right", overflow="fold")

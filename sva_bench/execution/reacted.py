@@ -80,3 +80,9 @@ class Reacted:
             field.name: value[number:number + 1] for field in fields(self)
             if isinstance(value := getattr(self, field.name), np.ndarray) and value.ndim}
         return replace(self, **alone, played=self.played[number:number + 1], legs=(), whole=None, shown=None)
+
+    def __repr__(self) -> str:
+        """In a line: the arrays would fill many screens."""
+        case, kind = self.case, "histories, all of them" if self.enumerated else "trials"
+        return f"<{case.scenario.name}, {case.planner}, {case.policy} on {case.news} news: {len(self.trial)} {kind}, " \
+               f"mean value {float(self.weight @ self.value.sum(axis=1)):.1f}>"

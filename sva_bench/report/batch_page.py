@@ -11,6 +11,7 @@ from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.calibration_page import bad_pct
 from sva_bench.report.page import figure, heading, note, sentence, table, write_page
+from sva_bench.report.reaction_wording import knows_what_when
 from sva_bench.report.reactions_over_maps import answers_over_maps, reaction_table
 from sva_bench.report.wording import (
     VSS_PCT,
@@ -71,11 +72,11 @@ def _reactions(summary: BatchSummary) -> list[str]:
     """What teams that react make of it."""
     if not summary.reactions:
         return []
-    head, words, cells = reaction_table(summary.reactions)
+    head, words, cells = reaction_table(summary.reactions, narrow=False)
     return [heading("Teams that react"), table(head, cells, words=words), note(
         "VSS: stochastic less deterministic plan under the reaction, of either sign. Recourse: what reacting adds to a "
         "plan. VSS with recourse and anticipation: the best plan for the reaction less the deterministic and the "
-        "stochastic one.")]
+        "stochastic one."), note(knows_what_when(row.news for row in summary.reactions))]
 
 
 def _pictures(summary: BatchSummary) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -204,7 +205,32 @@ def _names(axes: Axes, groups: Sequence[str]) -> None:
 
 
 def _legend(axes: Axes) -> None:
-    axes.legend(loc="upper left", bbox_to_anchor=(0, -0.16), ncols=3, frameon=False, handlelength=1.8, fontsize=9)
+    handles, labels = legend_of(axes)
+    axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(0, -0.16), frameon=False, handlelength=1.8,
+                fontsize=9, ncols=columns_of(labels, axes, 3))
+
+
+def legend_of(axes: Axes) -> tuple[list[Any], list[str]]:
+    """What a legend shows, with names in lines that fit the chart: plans from anywhere may have long ones."""
+    handles, labels = axes.get_legend_handles_labels()
+    most = max(8, int((_width_of(axes) - _LEGEND_MARGIN_IN) / _LETTER_IN))
+    return handles, [textwrap.fill(label, most) for label in labels]
+
+
+def _width_of(axes: Axes) -> float:
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    return float(figure.get_size_inches()[0])
+
+
+def columns_of(labels: Sequence[str], axes: Axes, most: int) -> int:
+    """Columns of a legend that fit the width of a chart, ``most`` at most."""
+    longest = max((len(line) for label in labels for line in label.splitlines()), default=0)
+    return max(1, min(most, int((_width_of(axes) - 0.9) / (0.6 + _LETTER_IN * longest))))
+
+
+_LETTER_IN = 0.08  # of the size of a legend, on average and a little more
+_LEGEND_MARGIN_IN = 1.5  # the axis beside it, and its mark
 
 
 def _offset(number: int, of: int) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from sva_bench.analysis.results import Estimate
 from sva_bench.choices import NEWS
-from sva_bench.report.charts import mark
+from sva_bench.report.charts import columns_of, legend_of, mark
 from sva_bench.report.drawing import Axes, chart
 from sva_bench.report.reaction_wording import AnyReacting, Reacting, recourse_pct, tell, vss_pct, without_pct
 
@@ -102,4 +102,6 @@ def _points(axes: Axes, at: Sequence[float], found: Sequence[Estimate], number: 
 
 
 def _legend(axes: Axes) -> None:
-    axes.figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9, handlelength=1.8)
+    handles, labels = legend_of(axes)
+    axes.figure.legend(handles, labels, loc="outside lower center", ncols=columns_of(labels, axes, 4), frameon=False,
+                       fontsize=9, handlelength=1.8)

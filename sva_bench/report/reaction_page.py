@@ -62,10 +62,11 @@ def reaction_section(summary: AnySummary) -> list[str]:
             "table on top is by the trials of the run."
     if isinstance(summary, ComparisonSummary):
         return [heading("What reacting is worth"), *_recourse_charts(given_reacting(summary)), _pairs(summary),
-                _plans(given_reacting(summary)), note(units)]
+                _plans(given_reacting(summary)), note(units),
+                *_candidates(given_reacting(summary), "the plans given")]
     rows = reacting(summary)
     return [heading("What reacting is worth"), *_charts(rows), _values(rows), _plans(rows), note(units),
-            *_candidates(rows), _meanings(rows)]
+            *_candidates(rows, "the two plans"), _meanings(rows)]
 
 
 def _pairs(summary: ComparisonSummary) -> str:
@@ -173,7 +174,8 @@ def _plans(rows: Sequence[AnyReacting]) -> str:
                  sections=[scenario.name for scenario, reaction in rows for _ in reaction.plans])
 
 
-def _candidates(rows: Sequence[Reacting]) -> list[str]:
+def _candidates(rows: Sequence[AnyReacting], ours: str) -> list[str]:
+    """What the anticipative plan was chosen from, ``ours`` among them; nothing where none was made."""
     columns = list(dict.fromkeys(reaction.name for _, reaction in rows if reaction.candidates))
     found: dict[tuple[str, str, str], dict[str, str]] = {}
     for scenario, reaction in rows:
@@ -182,7 +184,7 @@ def _candidates(rows: Sequence[Reacting]) -> list[str]:
             found.setdefault((scenario.name, tried.plan, exponent), {})[reaction.name] = f"{tried.modelled:.1f}"
     cells = [[*key, *(values.get(name, "") for name in columns)] for key, values in found.items()]
     return [table(["scenario", "candidate", "exponent", *(f"V, {name}" for name in columns)], cells, words=(0, 1),
-                  caption="Plans that the anticipative one was chosen from: the two plans, and those optimal for "
+                  caption=f"Plans that the anticipative one was chosen from: {ours}, and those optimal for "
                           "survival to the power of an exponent; V if all legs are driven as planned")] if cells else []
 
 

@@ -71,11 +71,20 @@ def reaction_answers(summary: Summary) -> list[Answer]:
     News that come to the same, in the digits shown, share an answer; no news has its own.
     """
     found: dict[tuple[PolicyName, bool, tuple[str, ...]], list[News]] = {}
+    beside = None  # the first answer with a VSS without reaction that is another figure than the run's
     for policy, news in dict.fromkeys((row.reaction.policy, row.reaction.news) for row in reacting(summary)):
         rows = [row for row in reacting(summary) if (row.reaction.policy, row.reaction.news) == (policy, news)]
-        said = tuple(part for part in (_worth(rows), _recourse(rows), _best(rows)) if part)
-        found.setdefault((policy, news == "never", said), []).append(news)
-    return [Answer(condition(policy, news), said) for (policy, _, said), news in found.items()]
+        said = tuple(part for part in (_worth(rows), _recourse(rows), _best(rows), _nothing_made(rows)) if part)
+        key = policy, news == "never", said
+        found.setdefault(key, []).append(news)
+        if beside is None and any(r.histories == "enumerated" and r.vss_without_reaction.excludes_zero
+                                  and amount(r.vss_without_reaction) != per_cent(s.vss.executed_pct) for s, r in rows):
+            beside = key
+    return [Answer(condition(key[0], news), (f"{key[2][0][:-1]}{_WITHOUT}.", *key[2][1:]) if key == beside else key[2])
+            for key, news in found.items()]
+
+
+_WITHOUT = " (without reaction: over all histories; the figures above are of the trials drawn)"
 
 
 def condition(policy: PolicyName, news: Sequence[News]) -> str:
@@ -92,12 +101,20 @@ def assumptions_of(rows: Sequence[AnyReacting]) -> list[str]:
     """What answers about these rest on."""
     if not rows:
         return []
-    news = dict.fromkeys(row.reaction.news for row in rows)
     tried = "" if any("anticipative" in row.reaction.plans for row in rows) else \
+        " --anticipate makes a plan for the reaction and compares it with those given." \
+        if isinstance(rows[0], GivenReacting) else \
         " No plan was made for the reaction; --anticipate makes one and tries it too."
-    return [f"Who knows what when: {'; '.join(f'{own} news: {KNOWS[own]}' for own in news)}. The team counts on its "
-            "schedule, and on reports of robots that run late; a leg is driven to its end before new orders are taken.",
+    return [knows_what_when(row.reaction.news for row in rows),
             f"{_histories(rows)}{_driven_whole(rows)}{tried}"]
+
+
+def knows_what_when(news: Iterable[News]) -> str:
+    """Who is taken to know what when, for some kinds of news."""
+    told = "; ".join(f"{own} news: {KNOWS[own]}" for own in dict.fromkeys(news))
+    return f"Who knows what when: {told}. The team counts on its schedule, and on reports of robots that run late; a " \
+           "leg is driven to its end before new orders are taken, so a robot on its last leg home, or home, is told " \
+           "nothing more."
 
 
 def _driven_whole(rows: Sequence[AnyReacting]) -> str:
@@ -240,28 +257,38 @@ def gained(gain: Gain) -> str:
 
 def _best(rows: Sequence[Reacting]) -> str:
     """Which of the plans tried is the best for the reaction, and by how much."""
-    said = [f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over}{_by_as_much(r)})"
+    said = [f"{_level(r)} in {s.name}" if r.best.ci95 == (0.0, 0.0) else
+            f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over})"
             for s, r in rows if r.best.over is not None and not _is_worthless(r)]
     return f"The best plan for it, of those tried: {few_of(said)}." if said else ""
 
 
+def _level(reaction: ReactionResult) -> str:
+    """The best plan and the next where they are worth exactly the same."""
+    best = reaction.best
+    return "both" if {best.plan, best.over} == {"stochastic", "deterministic"} else \
+        f"the {best.plan} and the {best.over} alike"
+
+
+def _nothing_made(rows: Sequence[Reacting]) -> str:
+    """Where the plan made for the reaction is one of the two plans."""
+    said = [f"the {r.best.plan} in {s.name}" for s, r in rows
+            if "anticipative" in r.plans and r.best.plan != "anticipative" and not _is_worthless(r)]
+    return f"No plan made for it is better than the two: the anticipative plan is {few_of(said)}." if said else ""
+
+
 def lead(reaction: ReactionResult) -> str:
     """How far the best plan is ahead of the next, in words that end before the next one's name."""
-    ahead = lead_pct(reaction)
-    known = Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
+    ahead, best = lead_pct(reaction), reaction.best
+    known = Estimate(mean=best.mean, ci95=best.ci95)
     if not known.excludes_zero:
-        return "exactly as good as the" if known.ci95 == (0.0, 0.0) else "not distinguishable from the"
-    if _by_as_much(reaction):
-        return "over the"
-    told = ahead is not None and abs(ahead.mean) <= MOST_PER_CENT
-    return f"{_signed(ahead.mean) if told and ahead is not None else f'{known.mean:+.1f} of incentive'} over the"
-
-
-def _by_as_much(reaction: ReactionResult) -> str:
-    """Behind a lead that is the VSS just told: in per cent of the other plan it would be another figure."""
-    best = reaction.best
-    same = (best.plan, best.over) == ("deterministic", "stochastic") and reaction.vss.distinguishable
-    return " by as much" if same else ""
+        return "not distinguishable from the"
+    pct = None if ahead is None else ahead.mean
+    if (best.plan, best.over) == ("deterministic", "stochastic") and reaction.vss.distinguishable:
+        # It is the VSS just told: in per cent of the other plan it would be another figure.
+        pct = None if reaction.vss.executed_pct is None else -reaction.vss.executed_pct
+    told = pct is not None and abs(pct) <= MOST_PER_CENT
+    return f"{_signed(pct) if told and pct is not None else f'{known.mean:+.1f} of incentive'} over the"
 
 
 def _signed(pct: float) -> str:

@@ -43,18 +43,28 @@ def _worth(rows: Sequence[ReactionOverMaps]) -> str:
     return "; ".join(verdict + few_of(those) for verdict, those in said.items() if those) + "."
 
 
-def reaction_table(rows: Sequence[ReactionOverMaps]) -> tuple[list[str], tuple[int, ...], list[list[str]]]:
-    """Headings, columns of words, and the cells of each reaction; values are in per cent where maps have one."""
+def reaction_table(rows: Sequence[ReactionOverMaps], *, narrow: bool
+                   ) -> tuple[list[str], tuple[int, ...], list[list[str]]]:
+    """Headings, columns of words, and the cells of each reaction.
+
+    Args:
+        rows: The reactions.
+        narrow: Whether per cent stand in a second line, and not in a column of their own.
+    """
     varied = any(row.variant for row in rows)
     plans = list(dict.fromkeys(name for row in rows for name in row.value_of_recourse))
-    head = [*(["variant"] if varied else []), "scenario", "reaction", "maps", "VSS",
-            *(f"recourse, {name}" for name in plans), "VSS with recourse", "anticipation"]
-    return head, tuple(range(2 + varied)), [
-        [*([row.variant] if varied else []), row.scenario, f"{row.policy}, {row.news}", str(row.maps), _gain(row.vss),
-         *(_gain(row.value_of_recourse[name]) if name in row.value_of_recourse else "" for name in plans),
-         _gain(row.vss_with_recourse), _gain(row.anticipation)] for row in rows]
+    figures = ["VSS", *(f"recourse, {name}" for name in plans), "VSS with recourse", "anticipation"]
+    shown = [f"{name}\n[%]" for name in figures] if narrow else [
+        heading for name in figures for heading in (name, f"{name} [%]")]
+    cells = [[*([row.variant] if varied else []), row.scenario, f"{row.policy}, {row.news}", str(row.maps),
+              *(cell for gain in (row.vss, *(row.value_of_recourse.get(name) for name in plans),
+                                  row.vss_with_recourse, row.anticipation) for cell in _gain(gain, narrow=narrow))]
+             for row in rows]
+    return [*(["variant"] if varied else []), "scenario", "reaction", "maps", *shown], tuple(range(2 + varied)), cells
 
 
-def _gain(gain: GainOverMaps) -> str:
-    share = "" if gain.pct.mean is None else f", {gain.pct.mean:.1f} %"
-    return with_interval(gain) + share
+def _gain(gain: GainOverMaps | None, *, narrow: bool) -> tuple[str, ...]:
+    """A figure in incentive, and in per cent where maps have a percentage."""
+    amount = "" if gain is None else with_interval(gain)
+    share = "" if gain is None or gain.pct.mean is None else f"{gain.pct.mean:.1f}"
+    return ("\n".join(part for part in (amount, share) if part),) if narrow else (amount, share)

@@ -13,7 +13,7 @@ from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.files.printable import counted
 from sva_bench.mission.failures import process_of
-from sva_bench.world.model import World
+from sva_bench.world.model import Scenario, World
 
 
 class WithInterval(Protocol):
@@ -139,13 +139,26 @@ def reliability_told(world: World, scenario: str, summary: AnySummary) -> str:
     processes = {failure.execute} if isinstance(summary, ComparisonSummary) else {failure.execute, failure.plan}
     in_time = {name for name in processes if process_of(name).terms([]).rate is not None}
     lifetimes = dict(known.mtbf_s) if in_time else {}
-    doubtful = [f"{name} {per_cent(100 * p)}" for name, p in known.availability.items()
-                if p < 1 and not (name in lifetimes and processes == in_time)]
+    doubtful = [f"{listed(names)}{' together' if len(names) > 1 else ''} {per_cent(100 * p)}"
+                for names, p in _available_together(known)
+                if p < 1 and not (names[0] in lifetimes and processes == in_time)]
+    if known.joint is not None and len(doubtful) > 1:
+        doubtful[-1] += " (not independent of each other)"
     parts = [("availability", doubtful),
              ("mean driving time to failure", [f"{name} {mtbf:g} s" for name, mtbf in lifetimes.items()]),
              ("cost of losing a robot", [f"{r.name} {r.loss_cost:g}" for r in world.robots if r.loss_cost > 0])]
     told = [f"{what}: {', '.join(found)}" for what, found in parts if found]
     return "; ".join(told if doubtful or lifetimes else ["all available", *told])
+
+
+def _available_together(scenario: Scenario) -> list[tuple[list[str], float]]:
+    """Robots with their availability; those that are always available or lost together are one entry."""
+    found: dict[tuple[str | int, ...], list[str]] = {}
+    for name, p in scenario.availability.items():
+        states = [k for k, state in enumerate(scenario.joint or ())
+                  if state.probability > 0 and name in state.available]
+        found.setdefault((name,) if scenario.joint is None or p >= 1 else tuple(states), []).append(name)
+    return [(names, scenario.availability[names[0]]) for names in found.values()]
 
 
 def remarks(summary: AnySummary) -> list[str]:

@@ -24,12 +24,20 @@ class InfeasiblePlan(SvaBenchError):
 
     exit_code = ExitCode.INFEASIBLE_PLAN
 
-    def __init__(self, which: Path | str, reasons: Sequence[str]) -> None:
+    def __init__(self, which: Path | str, reasons: Sequence[str], *, undrivable: bool = False) -> None:
         super().__init__(which, reasons)
-        self.which, self.reasons = which, reasons
+        self.which, self.reasons, self.undrivable = which, reasons, undrivable
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _infeasible, (self.which, self.reasons, self.undrivable)
 
     def __str__(self) -> str:
-        return f"{self.which}: the plan is infeasible:\n  " + "\n  ".join(self.reasons)
+        never = "\n  no robot could drive that, even where infeasible plans are allowed" if self.undrivable else ""
+        return f"{self.which}: the plan is infeasible:\n  " + "\n  ".join(self.reasons) + never
+
+
+def _infeasible(which: Path | str, reasons: Sequence[str], undrivable: bool) -> InfeasiblePlan:
+    return InfeasiblePlan(which, reasons, undrivable=undrivable)
 
 
 def read_plans(world: World, paths: Mapping[str, Path]) -> dict[str, Plan]:
@@ -60,7 +68,7 @@ def drivable(world: World, instance: Instance, plan: Plan, which: Path | str) ->
         _log.warning("%s was made for %s, not for %s", which, plan.instance, world.name)
     certificate = certify(instance, replace(plan, value=None))
     if not certificate.feasible:
-        raise InfeasiblePlan(which, certificate.reasons)
+        raise InfeasiblePlan(which, certificate.reasons, undrivable=True)
     return plan
 
 

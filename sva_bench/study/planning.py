@@ -258,7 +258,7 @@ def check_plans(
         if not certificate.feasible:
             never = certify(unlimited(instance), replace(plan, value=None)).reasons if allow_infeasible else ()
             if never or not allow_infeasible:
-                raise InfeasiblePlan(paths[name], never or certificate.reasons)
+                raise InfeasiblePlan(paths[name], never or certificate.reasons, undrivable=bool(never))
             _log.warning("%s is infeasible, and used all the same: %s", paths[name], "; ".join(certificate.reasons))
 
 

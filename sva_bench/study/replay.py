@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -76,16 +76,32 @@ class Replayed:
 
     def told(self) -> list[str]:
         """What was heard when, and whose orders changed to what, in plain lines."""
-        lines = []
+        lines, known = [], set[str]()
         for heard in self.reactions:
-            learned = ", ".join(heard.learned) or "nobody"
-            lines.append(f"at {heard.time_s:.1f} s {learned} learned that {', '.join(heard.failed)} failed" + (
-                "" if heard.after else "; no orders changed"))
-            lines += [f"  {robot}, from {heard.since[robot]}: {_stops(heard.before[robot])}; now {_stops(new)}"
-                      for robot, new in heard.after.items()]
+            known |= set(heard.failed)
+            learned = ", ".join(self._as_it_is(robot, heard.time_s) for robot in heard.learned) or "nobody"
+            changed = "" if heard.after else "; no orders changed" if heard.learned else \
+                self._beyond(known, heard.time_s)
+            lines.append(f"at {heard.time_s:.1f} s {learned} learned that {', '.join(heard.failed)} failed{changed}")
+            lines += [f"  {self._as_it_is(robot, heard.time_s)}, from {heard.since[robot]}: "
+                      f"{_stops(heard.before[robot])}; now {_stops(new)}" for robot, new in heard.after.items()]
         if self.case.policy != "none" and not lines:
             lines.append("nothing was heard of any failure")
         return lines
+
+    def _as_it_is(self, robot: str, time_s: float) -> str:
+        """A robot that is told something: whether it is lost by then, which the team doesn't know yet."""
+        row = next(row for row in self.rows if row["robot"] == robot)
+        lost = row["lost"] or row["end"] in ("failed", "out_of_fuel", "stuck")
+        end = str(row["end"]).replace("_", " ")
+        return f"{robot} ({end}, unknown to the team)" if lost and row["end_time_s"] <= time_s else robot
+
+    def _beyond(self, known: Container[str], time_s: float) -> str:
+        """Why nobody could be told: all robots but those known to be dead are home, or on their last leg there."""
+        where = [f"{self._as_it_is(row['robot'], time_s)} is "
+                 + ("home" if row["end"] in ("home", "late") and row["end_time_s"] <= time_s else "on its way home")
+                 for row in self.rows if row["robot"] not in known]
+        return f"; nobody could be told: {', '.join(where) or 'no robot is left'}"
 
 
 def _stops(orders: Sequence[str]) -> str:

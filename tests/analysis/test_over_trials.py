@@ -116,6 +116,19 @@ def test_where_all_went_well_nothing_is_charged_and_nothing_is_minus_zero() -> N
     assert "-0.0" not in str(entries)
 
 
+def test_how_often_a_robot_fails_for_the_whole_mission_depends_on_no_noise_draw() -> None:
+    # MIXED comes near to running dry: how else missions may end is open, but uv2's failures are those drawn.
+    half = replace(MIXED, drawn_failed=MIXED.end == ENDS.index("failed"))
+    along = replace(half, terms=replace(half.terms, survival=half.terms.share))
+    told = estimate(end_figures(half, 1, noisy=True)["failed"])
+    open_yet = estimate(end_figures(along, 1, noisy=True)["failed"])
+    assert told.mean == open_yet.mean == 0.25
+    assert told.ci95 is not None
+    assert open_yet.ci95 is not None
+    assert told.ci95 == pytest.approx((0.0063, 0.8059), abs=1e-3)  # Clopper and Pearson's for 1 of 4
+    assert open_yet.ci95[0] < told.ci95[0]
+
+
 figures = st.floats(0, 200)
 
 

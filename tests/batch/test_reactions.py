@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import html
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -126,6 +127,10 @@ def test_the_tables_of_reactions_have_a_row_for_each_figure(folder: Path) -> Non
 def test_the_page_of_a_batch_shows_its_reactions_and_begins_with_what_vss_is_under_each(folder: Path) -> None:
     page = html.unescape((folder / "done" / "report.html").read_text()).replace("\u00a0", " ")
     assert "Teams that react" in page
+    assert "Who knows what when: " in page
+    table = page[page.index("Teams that react"):].split("</table>")[0]
+    assert "<th scope=\"col\">VSS [%]</th>" in table
+    assert not re.search(r"<td[^>]*>[^<]*%", table)  # incentive and per cent in columns of their own
     first = page[:page.index("<table")]
     assert "If the team keeps its plan, over these maps" in first
     summary = from_dict(BatchSummary, json.loads((folder / "done" / "summary.json").read_text()))

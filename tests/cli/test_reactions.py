@@ -13,9 +13,9 @@ import pytest
 import sva_bench as sb
 from sva_bench.__main__ import run_command_line
 from sva_bench.analysis.reaction_table import GIVEN_COLUMNS
-from sva_bench.analysis.summaries import ComparisonSummary
+from sva_bench.analysis.summaries import ComparisonSummary, summary_form
 from sva_bench.choices import NEWS, POLICY_NAMES
-from sva_bench.files.records import from_dict
+from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.compared_reactions import given_answers
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -206,6 +206,38 @@ def test_execute_with_reactions_prints_json_writes_csv_with_ranks_and_a_page(
         assert all(said in page for said in (answer.condition, *answer.sentences))
 
 
+@pytest.mark.parametrize("words", [["run"], ["execute", "p.json"], ["execute", "p.json", "both.json"]])
+@pytest.mark.parametrize("anticipate", [False, True])
+def test_what_a_command_wrote_is_read_reported_and_replayed(
+    words: list[str], anticipate: bool, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "both.json").write_text(OTHER)
+    command, *plans = words
+    asked = ["--policy", "resolve", "--news", "report,instant", "--out", "out",
+             *(["--anticipate"] if anticipate else [])]
+    assert run_command_line([command, "w.yaml", *plans, *QUICK, *asked, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    (run,) = (folder / "out").iterdir()
+    read = from_dict(summary_form(told), told)
+    assert as_dict(read) == told
+    measured = ["stochastic", "deterministic"] if command == "run" else [plan.removesuffix(".json") for plan in plans]
+    page = (run / "report.html").read_bytes()
+    assert run_command_line(["report", str(run)]) == 0
+    assert (run / "report.html").read_bytes() == page
+    capsys.readouterr()
+    for scenario in read.scenarios:
+        for reaction in scenario.reactions or ():
+            names = [*measured, *(["anticipative"] if anticipate else [])]
+            assert list(reaction.plans) == names
+            assert bool(reaction.candidates) == anticipate
+            assert not anticipate or {tried.plan for tried in reaction.candidates} & set(measured)
+            again = ["replay", str(run), "--trial", "0", "--scenario", scenario.name, "--workers", "1", "--json"]
+            assert run_command_line([*again, "--policy", "resolve", "--news", reaction.news]) == 0
+            rows = json.loads(capsys.readouterr().out)["rows"]
+            assert list(dict.fromkeys(row["planner"] for row in rows)) == names
+    assert ("chosen from" in page.decode()) == anticipate
+
+
 def test_execute_prints_its_answers_and_writes_no_csv_unasked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line(["execute", "w.yaml", "p.json", *QUICK, "--policy", "resolve", "--out", "out"]) == 0
     assert "If the team re-plans when a robot misses a report, in half p is worth" in " ".join(
@@ -232,3 +264,29 @@ def test_a_notebook_shows_given_plans_with_and_without_the_reaction(tmp_path: Pa
     assert [(row["plan"], float(row["executed [95 %]"].split()[0])) for row in rows] == [
         (name, round(mean, 1)) for name, mean in expected]
     assert "&lt;i&gt;, resolve on instant news" in shown
+
+
+def test_a_plan_that_no_robot_could_drive_is_said_not_to_be_helped_by_allowing_it(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "twice.json").write_text(OTHER.replace('"p1"', '"p4"'))
+    assert run_command_line(["execute", "w.yaml", "twice.json", "--allow-infeasible", *QUICK]) == 3
+    assert "no robot could drive that, even where infeasible plans are allowed" in capsys.readouterr().err
+
+
+def test_execute_prints_a_table_with_each_plan_under_each_kind_of_news(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "both.json").write_text(OTHER)
+    assert run_command_line(["execute", "w.yaml", "p.json", "both.json", *QUICK, "--policy", "resolve", "--news",
+                             "report,instant", "--out", "out"]) == 0
+    told = capsys.readouterr().out.split("If the team re-plans (policy resolve)")[1].split("Who knows")[0]
+    (run,) = (folder / "out").iterdir()
+    summary = json.loads((run / "summary.json").read_text())
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in told.splitlines() if line.startswith("│")]
+    expected = [(name, f"{plan['executed']['mean']:.1f}", str(next(
+        row["rank"] for row in reaction["ranking"] if row["plan"] == name)))
+        for scenario in summary["scenarios"] for reaction in scenario["reactions"]
+        for name, plan in reaction["plans"].items()]
+    assert [(row[2], row[3].split()[0], row[5]) for row in rows] == expected
+    assert [row[1] for row in rows if row[1]] == ["report", "instant"] * 2

@@ -11,6 +11,8 @@ import matplotlib as mpl
 import numpy as np
 import pybullet
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.testing import assert_array_equal
 
@@ -22,6 +24,7 @@ from sva_bench.generate.terrain import random_places, random_terrain
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.report import charts
 from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world
 from sva_bench.report.ground import frame_of
 from sva_bench.report.labels import place_labels
@@ -211,3 +214,18 @@ def test_the_command_draws_a_plan_and_leaves_nothing_half_written(
     assert run_command_line(["world", "draw", str(world), "-o", str(tmp_path / "w.jpg")]) == 2
     assert "let the name end in .png or .svg" in " ".join(capsys.readouterr().err.split())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.json", "w.yaml"]
+
+
+@pytest.mark.parametrize("longest", [4, 30, 90])
+@pytest.mark.parametrize("plans", [2, 4, 8])
+def test_a_legend_keeps_within_its_chart_however_long_names_are(longest: int, plans: int) -> None:
+    figure = Figure(figsize=(4.8, 4.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    for number in range(plans):
+        axes.plot([0, 1], [number, number], label=f"{number} " + "plan-of mine "[:longest] * (longest // 13 + 1))
+    charts._legend(axes)
+    figure.draw_without_rendering()
+    legend = axes.get_legend()
+    assert legend is not None
+    assert legend.get_window_extent().x1 <= figure.bbox.x1

@@ -45,6 +45,7 @@ from sva_bench.study.options import Options
 from sva_bench.study.publish import Run, report_again
 from sva_bench.study.run import run
 from tests.results_for_tests import over_maps
+from tests.results_for_tests import summary as summary_of_test
 from tests.worlds_for_tests import SMALL, world_of
 
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
@@ -345,3 +346,17 @@ def test_a_page_says_lifetimes_and_loss_costs_beside_the_availabilities_and_spea
     mission = replace(done.summary, failure=Failures(plan="mission", execute="mission"))
     assert reliability_told(nominal, "nominal", mission) == \
         "availability: uv2 26 %; cost of losing a robot: uv2 25"  # exp(-120 s / 90 s)
+
+
+@pytest.mark.parametrize(("states", "told"), [
+    ([(0.6, "uv1, uv2"), (0.4, "")], "availability: uv1 and uv2 together 60 %"),
+    ([(0.6, "uv1, uv2"), (0.0, "uv1"), (0.4, "")], "availability: uv1 and uv2 together 60 %"),
+    ([(0.5, "uv1, uv2"), (0.5, "uv1")], "availability: uv2 50 %"),
+    ([(0.5, "uv1"), (0.5, "uv2")], "availability: uv1 50 %, uv2 50 % (not independent of each other)")])
+def test_robots_that_are_available_together_are_told_so(
+    states: list[tuple[float, str]], told: str, tmp_path: Path
+) -> None:
+    joint = ", ".join(f"{{probability: {p}, available: [{names}]}}" for p, names in states)
+    world = world_of(tmp_path, SMALL.replace("{uv2: 0.5}", f"{{joint: [{joint}]}}"))
+    found = replace(summary_of_test((1.0, 2.0), 10.0), failure=Failures(plan="mission", execute="mission"))
+    assert reliability_told(world, "half", found) == told

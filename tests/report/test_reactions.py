@@ -20,7 +20,7 @@ from sva_bench.analysis.reaction_results import Candidate, ReactionResult
 from sva_bench.analysis.reaction_table import REACTION_COLUMNS
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import Summary
-from sva_bench.choices import NEWS
+from sva_bench.choices import NEWS, HistoryMode
 from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.reaction_charts import MOST_SCENARIOS
@@ -46,6 +46,7 @@ from tests.worlds_for_tests import world_of
 
 # The stochastic plan keeps 100 and gains 1 by reacting, the deterministic one 80 and gains 20.
 PAYS = {"stochastic": (100.0, 101.0), "deterministic": (80.0, 100.0), "anticipative": (90.0, 104.0)}
+MORE = {"stochastic": (100.0, 101.0), "deterministic": (70.0, 90.0)}
 LOSES = {"stochastic": (100.0, 101.0), "deterministic": (80.0, 110.0)}
 
 
@@ -150,8 +151,34 @@ def test_no_news_stands_apart_even_where_news_changes_nothing() -> None:
 def test_a_difference_is_told_in_one_percentage_and_not_in_that_of_another_base_too() -> None:
     # -9 is 8.9 % of 101 and 8.2 % of 110.
     found = summary_of(reaction("report", LOSES, half=0.5, best="deterministic", over="stochastic"))
-    assert "the deterministic in S (over the stochastic by as much)" in said(found)
+    assert "the deterministic in S (+8.9 % over the stochastic)" in said(found)
     assert "8.2" not in said(found)
+
+
+def test_plans_that_are_worth_exactly_the_same_are_the_best_together() -> None:
+    level = {"stochastic": (90.0, 100.0), "deterministic": (80.0, 100.0)}
+    assert "of those tried: both in S." in said(summary_of(reaction("report", level, half=0.0)))
+
+
+@pytest.mark.parametrize("best", ["stochastic", "deterministic", "anticipative"])
+def test_that_a_plan_made_for_the_reaction_is_one_of_the_two_is_said(best: str) -> None:
+    over = "stochastic" if best != "stochastic" else "deterministic"
+    plans = {**PAYS, "anticipative": (90.0, 101.0)}
+    found = summary_of(reaction("report", plans, half=0.5, best=best, over=over))
+    told = f"No plan made for it is better than the two: the anticipative plan is the {best} in S." in said(found)
+    assert told == (best != "anticipative")
+    assert "No plan made for it" not in said(summary_of(reaction("report", LOSES)))
+
+
+@pytest.mark.parametrize("histories", ["enumerated", "sampled"])
+def test_which_missions_the_vss_without_reaction_is_of_is_said_once_where_it_is_not_that_of_the_run(
+    histories: HistoryMode
+) -> None:
+    found = summary_of(reaction("report", MORE, histories=histories), reaction("instant", LOSES, histories=histories))
+    clause = "without reaction: over all histories; the figures above are of the trials drawn"
+    assert said(found).count(clause) == (histories == "enumerated")
+    assert page_of(found).count(clause) == printed(found, 10_000).count(clause) == (histories == "enumerated")
+    assert clause not in said(summary_of(reaction("report", PAYS, histories=histories)))  # the same figure
 
 
 @pytest.mark.parametrize("kept", [0.0, -50.0, 0.1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -19,16 +19,19 @@ from sva_bench.analysis.summaries import Summary
 from sva_bench.choices import News
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.execution import plays
+from sva_bench.execution.case import Case
+from sva_bench.execution.team_outcome import Reaction
 from sva_bench.files.records import as_dict
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance_file import read_instance
+from sva_bench.mission.plan import Plan
 from sva_bench.mission.plan_file import read_plan
 from sva_bench.storage.run_folder import recording_stem
 from sva_bench.storage.stored_run import read_content
 from sva_bench.storage.tables import write_table
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run, report_again
-from sva_bench.study.replay import Wanted, replay
+from sva_bench.study.replay import Replayed, Wanted, replay
 from sva_bench.study.run import run
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -265,6 +268,7 @@ def test_a_replay_says_what_was_heard_when_and_how_orders_changed(
                for each in heard)
     assert run_command_line(words) == 0
     said = capsys.readouterr().out
+    said = said.replace(" (failed, unknown to the team)", "")
     for each in heard:
         assert f"at {each['time_s']:.1f} s {', '.join(each['learned']) or 'nobody'} learned that " in said
         for robot, orders in each["orders"].items():
@@ -272,6 +276,25 @@ def test_a_replay_says_what_was_heard_when_and_how_orders_changed(
             assert "now " + (" → ".join(orders["after"]) or "no orders") in said
     assert run_command_line([*words[:6], "--trial", "0", "--workers", "1"]) == 0
     assert "heard" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("ends", "learned", "said"), [
+    ((("home", 9.0), ("failed", 1.0)), (),
+     "nobody learned that uv2 failed; nobody could be told: uv1 is on its way home"),
+    ((("home", 4.0), ("failed", 1.0)), (), "nobody learned that uv2 failed; nobody could be told: uv1 is home"),
+    ((("failed", 9.0), ("failed", 1.0)), ("uv1",), "uv1 learned that uv2 failed; no orders changed"),
+    ((("failed", 4.0), ("failed", 1.0)), ("uv1",),
+     "uv1 (failed, unknown to the team) learned that uv2 failed; no orders changed"),
+    ((("out_of_fuel", 4.0), ("failed", 1.0)), (), "nobody learned that uv2 failed; nobody could be told: uv1 (out of "
+     "fuel, unknown to the team) is on its way home")])
+def test_a_replay_says_who_could_not_be_told_and_who_is_lost_without_being_missed(
+        ends: Sequence[tuple[str, float]], learned: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    rows = [{"robot": robot, "end": end, "end_time_s": at, "lost": end != "home"}
+            for robot, (end, at) in zip(("uv1", "uv2"), ends, strict=True)]
+    case = Case(scenario=world_of(tmp_path, TEXT).scenarios[0], planner="p", plan=Plan(routes={}), policy="resolve",
+                news="report")
+    heard = Reaction(time_s=5.0, failed=("uv2",), learned=learned, before={}, after={})
+    assert Replayed(case=case, rows=rows, recording=tmp_path, reactions=[heard]).told() == [f"at 5.0 s {said}"]
 
 
 @pytest.mark.parametrize(("foreign", "planners"), [

@@ -253,3 +253,18 @@ def test_a_summary_with_reactions_is_of_another_format(world: sb.World, ours: sb
     assert from_dict(Summary, data) == ours.summary
     with pytest.raises(ValidationError, match="format: expected 'sva-bench/summary@2'"):
         from_dict(Summary, {**data, "format": "sva-bench/summary@1"})
+
+
+def test_a_result_with_reactions_is_shown_in_a_few_lines(ours: sb.Result[Summary]) -> None:
+    assert len(ours.reacted) > 4
+    for run in ours.reacted:
+        assert len(repr(run)) < 200
+        assert all(word in repr(run) for word in (run.case.scenario.name, run.case.planner, run.case.news))
+    assert len(repr(ours.reacted)) < 200 * len(ours.reacted)
+
+
+def test_to_record_a_plan_made_for_a_reaction_takes_its_policy(ours: sb.Result[Summary], tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="made for a reaction; add policy='resolve'"):
+        sb.record(ours, tmp_path / "a.rrd", scenario="half", planner="anticipative")
+    with pytest.raises(BadInput, match="planner 'nobody'"):
+        sb.record(ours, tmp_path / "a.rrd", scenario="half", planner="nobody")

@@ -225,6 +225,10 @@ def record(
             raise BadInput(f"{chosen.case.title}: orders never change; record it without a policy")
         record_team(target, result.world, chosen.case, chosen.shown)
         return target
+    reacts = dict.fromkeys(run.case.policy for run in result.reacted
+                           if (run.case.scenario.name, run.case.planner) == (chosen_scenario, planner))
+    if planner not in plans[chosen_scenario] and reacts:
+        raise BadInput(f"planner {planner!r}: this plan was made for a reaction; add policy={next(iter(reacts))!r}")
     name = _one_of("planner", planner, list(plans[chosen_scenario]))
     executed = next(run for run in result.executed
                     if (run.case.scenario.name, run.case.planner) == (chosen_scenario, name))
