@@ -53,7 +53,7 @@ def check_under_noise(
 
 
 def _print_plan(told: PlanTightness, draws: int, console: Console) -> None:
-    table = Table(title=f"{told.plan}, {', '.join(told.scenarios)}: legs under {draws} noise draws",
+    table = Table(title=f"{told.plan}, {', '.join(told.scenarios)}: legs under {counted(draws, 'noise draw')}",
                   title_justify="left")
     for number, heading in enumerate(("robot", "leg", "from", "to", "planned [s]", "driven 5, 50, 95 % [s]",
                                       "fuel left 1, 5 % [s]", "time left 1, 5 % [s]", "dry", "late", "stuck", "")):

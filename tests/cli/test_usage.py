@@ -195,7 +195,7 @@ SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
 def test_every_command_that_draws_takes_a_seed() -> None:
     assert {" ".join(words) for words in SEEDED} == {
         "run", "execute", "reproduce simulation", "reproduce reaction",
-        "batch over", "world random", "world from-map", "instance random"}
+        "batch over", "world random", "world from-map", "world check", "instance random"}
     assert bounds.MOST_SEED == seeds.MOST_SEED
 
 
