@@ -45,7 +45,7 @@ def test_a_unit_has_the_calibrated_plan_of_a_run(folder: Path) -> None:
         assert executed == pytest.approx(alone[scenario["name"]]["plans"]["calibrated"]["executed"]["mean"])
 
 
-def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path) -> None:
     units = summary_in(folder / "done")["units"]
     assert [s["calibration"] for s in units[0]["scenarios"]] == [s["calibration"] for s in units[1]["scenarios"]]
     assert len(list((folder / "cache").glob("*/plans/*/*"))) == 1
