@@ -1,0 +1,81 @@
+"""Calibrated plans in batches: those of a run, from a cache or not, by the command line or a sweep file."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sva_bench as sb
+from sva_bench.__main__ import run_command_line
+from sva_bench.batch.sweep import Sweep, grid_of, sweep_of
+from sva_bench.errors import BadFile
+from tests.worlds_for_tests import SMALL
+
+TIGHT = SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 30").replace("mission_limit_s: 120",
+                                                                          "mission_limit_s: 45")
+NOISY = TIGHT.replace("noise: {wheel_gain_sd: 0.01}", "noise: {speed_gain_sd: 0.05, capacity_sd: 0.05}")
+QUICK = ("--trials", "30", "--rollouts", "3", "--fidelity", "kinematic", "--unit-trials", "15", "--workers", "1")
+
+
+def summary_in(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "summary.json").read_text())
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("batch")
+    (place / "world.yaml").write_text(NOISY, encoding="utf-8")
+    assert run_command_line(["batch", str(place / "world.yaml"), *QUICK, "--seed", "0-1", "--calibrate", "5%", "--csv",
+                             "--cache", str(place / "cache"), "--out", str(place / "done")]) == 0
+    return place
+
+
+def test_a_unit_has_the_calibrated_plan_of_a_run(folder: Path) -> None:
+    run = sb.run(folder / "world.yaml", trials=30, rollouts=3, fidelity="kinematic", calibrate=5, workers=1)
+    alone = {scenario["name"]: scenario for scenario in run.as_dict()["scenarios"]}
+    for scenario in summary_in(folder / "done")["units"][0]["scenarios"]:
+        assert list(scenario["plans"]) == ["stochastic", "deterministic", "calibrated"]
+        assert scenario["calibration"] == alone[scenario["name"]]["calibration"]
+        executed = scenario["plans"]["calibrated"]["executed"]["mean"]
+        assert executed == pytest.approx(alone[scenario["name"]]["plans"]["calibrated"]["executed"]["mean"])
+
+
+def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path) -> None:
+    units = summary_in(folder / "done")["units"]
+    assert [s["calibration"] for s in units[0]["scenarios"]] == [s["calibration"] for s in units[1]["scenarios"]]
+    assert len(list((folder / "cache").glob("*/plans/*/*"))) == 1
+    before = {path: path.stat().st_mtime_ns for path in (folder / "cache").glob("*/plans/*/*")}
+    assert run_command_line(["batch", str(folder / "world.yaml"), *QUICK, "--seed", "0-1", "--calibrate", "5%",
+                             "--cache", str(folder / "cache"), "--out", str(folder / "again")]) == 0
+    assert {path: path.stat().st_mtime_ns for path in (folder / "cache").glob("*/plans/*/*")} == before
+    assert (folder / "again" / "summary.json").read_bytes() == (folder / "done" / "summary.json").read_bytes()
+
+
+def test_table_and_page_show_it(folder: Path) -> None:
+    with (folder / "done" / "calibration.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["seed"] for row in rows} == {"0", "1"}
+    assert {row["draws_for"] for row in rows} == {"choice", "report"}
+    assert "Calibrated plans" in (folder / "done" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_sweep_file_says_it_as_the_option_does(folder: Path) -> None:
+    sweep = folder / "sweep.yaml"
+    lines = f"format: sva-bench/sweep@1\nworlds: [{folder / 'world.yaml'}]\n"
+    sweep.write_text(f"{lines}calibrate: 5%\n", encoding="utf-8")
+    assert grid_of(sweep_of([sweep], Sweep())).options.calibrate == 0.05
+    assert grid_of(sweep_of([sweep], Sweep(calibrate="best"))).options.calibrate == "best"
+    sweep.write_text(f"{lines}calibrate: most\n", encoding="utf-8")
+    with pytest.raises(BadFile, match=":3: calibrate: most: expected the share"):
+        sweep_of([sweep], Sweep())
+
+
+def test_an_option_that_is_no_share_ends_with_2(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("run", "batch"):
+        assert run_command_line([command, str(folder / "world.yaml"), "--calibrate", "1"]) == 2
+        assert "--calibrate 1: expected the share of missions" in capsys.readouterr().err
