@@ -24,11 +24,11 @@ from sva_bench.analysis.calibration import (
 from sva_bench.analysis.proof import most_bad, proves, share_of
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.twin_draws import TwinDraws, as_planned
-from sva_bench.mission.instance import Instance
+from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.solver.two_stage import Knowledge, SolveLimits, knowledge_of, plan_stochastic
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.travel.leg_costs import MEDIAN, NOMINAL_RUNG, LegSamples, Rung, costs_at, typical_excess
+from sva_bench.travel.leg_costs import MEDIAN, NOMINAL_RUNG, LegCosts, LegSamples, Rung, costs_at, typical_excess
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import Scenario, World
 
@@ -121,14 +121,14 @@ class _Ladder:
     Attributes:
         world, limits: The world, and when solves may stop.
         rungs: From the nominal costs up.
-        cost_s: Costs of each robot model on each rung but the first.
+        costs: Costs of each robot on each rung; of none on the first.
         known: What solves on each rung found, which scenarios share.
     """
 
     world: World
     limits: SolveLimits
     rungs: Sequence[Rung]
-    cost_s: Sequence[Mapping[str, FloatArray]]
+    costs: Sequence[Mapping[str, LegCosts]]
     known: dict[int, Knowledge]
 
     def plan(self, number: int, nominal: Plan, instance: Instance) -> _Made:
@@ -143,8 +143,7 @@ class _Ladder:
         if rung == NOMINAL_RUNG:
             return _Made(rung=rung, plan=nominal, instance=instance)
         dearer = replace(instance, vehicles=tuple(
-            replace(vehicle, fuel_s=self.cost_s[number][robot.model.name])
-            for vehicle, robot in zip(instance.vehicles, self.world.robots, strict=True)))
+            _dearer(vehicle, self.costs[number][vehicle.name]) for vehicle in instance.vehicles))
         if number not in self.known:
             self.known[number] = knowledge_of(dearer)
         plan = unless_interrupted(plan_stochastic(dearer, self.limits, known=self.known[number]))
@@ -187,7 +186,7 @@ def _ladder_of(
 ) -> _Ladder:
     """The nominal costs; then quantiles; and for a share factors on the median beyond them."""
     if as_planned(world):
-        return _Ladder(world=world, limits=limits, rungs=[NOMINAL_RUNG], cost_s=[{}], known={})
+        return _Ladder(world=world, limits=limits, rungs=[NOMINAL_RUNG], costs=[{}], known={})
     draws = TwinDraws(world, costs, _FOR_COSTS, executor)
     first = {robot.model.name: robot.name for robot in reversed(world.robots)}
     samples: dict[str, LegSamples] = {}
@@ -202,8 +201,14 @@ def _ladder_of(
         rungs += [Rung(quantile=MEDIAN, factor=factor) for factor in _FACTORS if factor > beyond]
     return _Ladder(
         world=world, limits=limits, rungs=[NOMINAL_RUNG, *rungs], known={},
-        cost_s=[{}, *({model: costs_at(each, rung, world.margin) for model, each in samples.items()}
-                      for rung in rungs)])
+        costs=[{}, *({robot.name: costs_at(samples[robot.model.name], rung, world.margin, robot.idle_share)
+                      for robot in world.robots} for rung in rungs)])
+
+
+def _dearer(vehicle: Vehicle, costs: LegCosts) -> Vehicle:
+    """A vehicle at other costs; with a clock of its own only where it has one."""
+    time_s = None if np.array_equal(costs.time_s, costs.fuel_s) else costs.time_s
+    return replace(vehicle, fuel_s=costs.fuel_s, time_s=time_s)
 
 
 def _calibrated(

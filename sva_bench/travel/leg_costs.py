@@ -49,30 +49,54 @@ class LegSamples:
         object.__setattr__(self, "waits_s", frozen(self.waits_s, (draws, n, n)))
         object.__setattr__(self, "capacity", frozen(self.capacity, (draws,)))
 
-    def cost_s(self) -> FloatArray:
-        """What each leg takes of a nominal tank and of the mission limit, draw by draw [s], shape (draws, n, n).
+    def fuel_s(self, idle_share: float) -> FloatArray:
+        """What each leg takes of a nominal tank, draw by draw [s of driving], shape (draws, n, n).
 
-        An instance has one matrix for both. A wait takes clock alone, and a small tank takes fuel alone, so this is
-        cautious with either.
+        Args:
+            idle_share: Share of the fuel of driving that the robot burns while it waits.
         """
-        cost: FloatArray = (self.driving_s + self.waits_s) / self.capacity[:, None, None]
-        return cost
+        fuel: FloatArray = (self.driving_s + idle_share * self.waits_s) / self.capacity[:, None, None]
+        return fuel
+
+    def clock_s(self) -> FloatArray:
+        """What each leg takes of the mission limit, draw by draw [s], shape (draws, n, n)."""
+        return self.driving_s + self.waits_s
 
 
-def costs_at(samples: LegSamples, rung: Rung, margin: float) -> FloatArray:
-    """Planning costs of a rung from site i to site j [s], metric, shape (n, n); ``inf`` where no robot gets through.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LegCosts:
+    """Planning costs from site i to site j, both metric; ``inf`` where no robot gets through.
 
-    Quantiles of legs may violate the triangle inequality, so they are repaired as nominal times are, and rounded alike:
-    samples that are all the nominal time give the nominal costs to the bit.
+    Attributes:
+        fuel_s: Fuel [s of driving], shape (n, n).
+        time_s: Time on the mission clock [s], shape (n, n).
+    """
+
+    fuel_s: FloatArray
+    time_s: FloatArray
+
+
+def costs_at(samples: LegSamples, rung: Rung, margin: float, idle_share: float = 0.0) -> LegCosts:
+    """Planning costs of a rung.
+
+    A wait takes clock, and fuel by the idle share alone; a small tank takes fuel alone. Quantiles of legs may violate
+    the triangle inequality, so both are repaired as nominal times are, and rounded alike: samples that are all the
+    nominal time give the nominal costs to the bit.
 
     Args:
         samples: What each leg takes.
         rung: The quantile, an observed one, and the factor; not the nominal rung, which needs no samples.
         margin: Relative safety margin, as on nominal costs.
+        idle_share: Share of the fuel of driving that the robot burns while it waits.
     """
     if rung.quantile is None:
         raise ValueError("the nominal costs are no quantile")
-    cost_ms = 1000.0 * rung.factor * np.quantile(samples.cost_s(), rung.quantile, axis=0, method="inverted_cdf")
+    return LegCosts(fuel_s=_metric_at(samples.fuel_s(idle_share), rung.quantile, rung.factor, margin),
+                    time_s=_metric_at(samples.clock_s(), rung.quantile, rung.factor, margin))
+
+
+def _metric_at(samples: FloatArray, quantile: float, factor: float, margin: float) -> FloatArray:
+    cost_ms = 1000.0 * factor * np.quantile(samples, quantile, axis=0, method="inverted_cdf")
     n = len(cost_ms)
     cost_ms = np.where(np.eye(n, dtype=np.bool_), 0.0, np.maximum(np.rint(cost_ms), 1.0))
     # Doubles hold integer milliseconds exactly, so the closure is metric to the bit.
@@ -82,8 +106,11 @@ def costs_at(samples: LegSamples, rung: Rung, margin: float) -> FloatArray:
 
 
 def typical_excess(samples: LegSamples, quantile: float) -> float:
-    """How many times its median a leg takes at a quantile, on average over legs that can be driven."""
-    cost = samples.cost_s()
-    at, median = (np.quantile(cost, q, axis=0, method="inverted_cdf") for q in (quantile, MEDIAN))
+    """How many times its median a leg takes at a quantile, on average over legs that can be driven; of fuel or time."""
+    return max(_excess(cost, quantile) for cost in (samples.fuel_s(1.0), samples.clock_s()))
+
+
+def _excess(cost_s: FloatArray, quantile: float) -> float:
+    at, median = (np.quantile(cost_s, q, axis=0, method="inverted_cdf") for q in (quantile, MEDIAN))
     told = (median > 0) & np.isfinite(at)
     return float(np.mean(at[told] / median[told])) if told.any() else 1.0
