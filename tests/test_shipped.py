@@ -14,7 +14,16 @@ from sva_bench.world.load import load_world
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "worlds").glob("*.yaml")), ids=lambda path: path.stem)
+OF_THE_TUTORIAL = "three-halls"
+
+
+def test_the_world_of_the_tutorial_is_there_beside_those_of_the_paper() -> None:
+    names = {path.stem for path in (ROOT / "worlds").glob("*.yaml")}
+    assert names == {"four-rooms", "maze", "open-field", "three-robots", "warehouse", OF_THE_TUTORIAL}
+
+
+@pytest.mark.parametrize("path", sorted(path for path in (ROOT / "worlds").glob("*.yaml")
+                                        if path.stem != OF_THE_TUTORIAL), ids=lambda path: path.stem)
 def test_a_shipped_world_has_what_the_paper_has(path: Path) -> None:
     world = load_world(path)
     assert world.name == path.stem

@@ -1,0 +1,24 @@
+"""What docs/tutorial.md tells of its world, on fewer draws."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import sva_bench as sb
+
+WORLD = Path(__file__).parents[1] / "worlds" / "three-halls.yaml"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scenario", ["S1", "S2"])
+def test_the_nominal_plan_fails_in_a_fifth_of_missions_and_the_calibrated_one_in_less_than_a_hundredth(
+        scenario: str) -> None:
+    result = sb.run(WORLD, trials=64, rollouts=64, scenario=scenario, calibrate=1)
+    (found,) = result.summary.scenarios
+    assert found.calibration is not None
+    assert found.calibration.reached
+    assert found.calibration.bad.share < 0.01
+    assert found.calibration.nominal.bad.share > 0.2
+    assert found.plans["calibrated"].executed.mean > 0.95 * found.plans["stochastic"].executed.mean
