@@ -93,7 +93,7 @@ def measure(size: int) -> None:
         task = DriveTask(
             obstacles=world.obstacles, model=model, start=(base.x_m, base.y_m, base.heading_rad),
             legs=((costs.times.course("base", longest),), (costs.times.course(longest, "base"),)),
-            fidelity="rollout", traced=False)
+            fidelity="physics", traced=False)
         begun = time.process_time()
         driven = drive_route(task)
         ratios.append(driven.leg_s.sum() / (time.process_time() - begun))

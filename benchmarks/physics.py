@@ -27,7 +27,7 @@ def main() -> None:
     task = DriveTask(
         obstacles=world.obstacles, model=model, start=(base.x_m, base.y_m, base.heading_rad),
         legs=tuple((times.course(a, b),) for a, b in pairwise(ROUTE)),
-        fidelity="rollout", traced=False)
+        fidelity="physics", traced=False)
     drive_route(task)  # compiles
     ratios = []
     for _ in range(RUNS):

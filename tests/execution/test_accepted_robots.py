@@ -83,7 +83,7 @@ def strays_of(model: RobotModel, rng: np.random.Generator, steps: float = 2.0) -
     legs = tuple((stretches(path, heading),) for path, heading in course(model, rng))
     real, ideal = (drive_route(DriveTask(
         obstacles=OPEN, model=model, start=(0.0, 0.0, 0.0), legs=legs, fidelity=fidelity,
-        traced=False)) for fidelity in ("rollout", "kinematic"))
+        traced=False)) for fidelity in ("physics", "kinematic"))
     if real.stuck or ideal.stuck:
         return [f"{model}: stuck on leg {min(len(real.leg_s), len(ideal.leg_s))}"]
     off = np.abs(real.leg_s - ideal.leg_s)
@@ -162,5 +162,5 @@ def test_a_robot_that_turns_for_longer_than_the_check_for_stuck_ones_takes_is_no
         path = np.array([[0.0, 0.0], [2 * math.cos(turn), 2 * math.sin(turn)]])
         driven = drive_route(DriveTask(
             obstacles=OPEN, model=slow, start=(0.0, 0.0, 0.0), legs=((stretches(path, float(turn)),),),
-            fidelity="rollout", traced=False))
+            fidelity="physics", traced=False))
         assert not driven.stuck

@@ -177,7 +177,7 @@ def test_a_drive_that_touches_nothing_does_not_depend_on_what_stands_far_away() 
     # A grid of posts 3 m and more off the way, and none at all.
     posts = np.array([(x, y, 0.2) for x in np.arange(-8, 9, 1.0) for y in (-8.0, -6.0, 6.0, 8.0)])
     hop = stretches(np.array([[0.0, 0.0], [2.0, 0.5], [4.0, 0.0]]), 1.0)
-    bare = DriveTask(obstacles=ROOM, model=MODEL, start=(0.0, 0.0, 0.0), legs=((hop,),), fidelity="rollout",
+    bare = DriveTask(obstacles=ROOM, model=MODEL, start=(0.0, 0.0, 0.0), legs=((hop,),), fidelity="physics",
                      traced=True)
     for obstacles in (replace(ROOM, cylinders=posts), replace(ROOM, cylinders=posts[::-1].copy())):
         result = drive_route(replace(bare, obstacles=obstacles))
@@ -218,7 +218,7 @@ def test_a_robot_that_strays_is_driven_again_among_all_obstacles(monkeypatch: py
 
 def test_drives_of_one_course_are_those_of_each_by_itself() -> None:
     hop = stretches(np.array([[0.0, 0.0], [2.0, 0.0]]), 0.0)
-    tasks = [DriveTask(obstacles=ROOM, model=MODEL, start=(0.0, 0.0, 0.0), legs=((hop,),), fidelity="rollout",
+    tasks = [DriveTask(obstacles=ROOM, model=MODEL, start=(0.0, 0.0, 0.0), legs=((hop,),), fidelity="physics",
                        traced=False, disturbance=Disturbance(wheel_gains=gains))
              for gains in ((1.0, 1.0), (0.98, 1.01), (1.02, 1.0))]
     for task, result in zip(tasks, drive_tasks(tasks), strict=True):

@@ -64,7 +64,7 @@ def drive_ahead(model: RobotModel, obstacles: Obstacles, to_m: float = 3.4) -> F
     """Poses of a drive along y = 1."""
     hop = stretches(np.array([[0.6, 1.0], [to_m, 1.0]]), 0.0)
     driven = drive_route(DriveTask(obstacles=obstacles, model=model, start=(0.6, 1.0, 0.0), legs=((hop,),),
-                                   fidelity="rollout", traced=True))
+                                   fidelity="physics", traced=True))
     return driven.pose
 
 

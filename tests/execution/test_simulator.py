@@ -29,7 +29,7 @@ CLEARANCE_M = 0.297
 NO_BOXES, NO_CYLINDERS = np.empty((0, 5)), np.empty((0, 3))
 
 
-def random_tour(seed: int, stops: int, model: RobotModel = TURTLEBOT, fidelity: Fidelity = "rollout") -> DriveTask:
+def random_tour(seed: int, stops: int, model: RobotModel = TURTLEBOT, fidelity: Fidelity = "physics") -> DriveTask:
     """A robot's tour of random places in a random world."""
     obstacles = random_obstacles(seed, size_m=8.0, boxes=4, walls=3, cylinders=3)
     points = free_places(obstacles, seed, stops, CLEARANCE_M)
@@ -55,7 +55,7 @@ def ahead(obstacles: Obstacles, start: tuple[float, float], end: tuple[float, fl
     path = np.array([start, end])
     heading = float(np.arctan2(*(path[1] - path[0])[::-1]))
     return drive_route(DriveTask(obstacles=obstacles, model=TURTLEBOT, start=(*start, heading),
-                                 legs=((stretches(path, heading),),), fidelity="rollout",
+                                 legs=((stretches(path, heading),),), fidelity="physics",
                                  traced=True))
 
 
@@ -64,7 +64,7 @@ def errors(seeds: range, stops: int, model: RobotModel = TURTLEBOT) -> FloatArra
     found = []
     for seed in seeds:
         real, ideal = (drive_route(random_tour(seed, stops, model, level))
-                       for level in ("rollout", "kinematic"))
+                       for level in ("physics", "kinematic"))
         assert not real.stuck
         long = ideal.leg_s >= 3.0
         found.append(real.leg_s[long] / ideal.leg_s[long] - 1)
@@ -184,7 +184,7 @@ def test_a_leg_may_be_a_chain_of_hops_with_a_stop_at_each() -> None:
     nothing = Obstacles(bounds_m=np.array([0.0, 0, 6, 6]), boxes=NO_BOXES, cylinders=NO_CYLINDERS)
     hops = tuple(stretches(np.array([[x, 1.0], [x + 1.0, 1.0]]), 0.0) for x in (1.0, 2.0, 3.0))
     task = DriveTask(obstacles=nothing, model=TURTLEBOT, start=(1.0, 1.0, 0.0), legs=(hops,),
-                     fidelity="rollout", traced=True)
+                     fidelity="physics", traced=True)
     apart = DriveTask(**{**vars(task), "legs": tuple((hop,) for hop in hops)})
     one, three = drive_route(task), drive_route(apart)
     assert len(one.leg_s) == 1

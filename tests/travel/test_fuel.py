@@ -170,7 +170,7 @@ robots: {uv1: {model: turtlebot2, incentives: {}}}
         task = DriveTask(
             obstacles=world.obstacles, model=TURTLEBOT, start=(start.x_m, start.y_m, start.heading_rad),
             legs=(tuple(times.course(a, b) for a, b in itertools.pairwise(chain)),),
-            fidelity="rollout", traced=False)
+            fidelity="physics", traced=False)
         driven = drive_route(task)
         assert not driven.stuck
         assert_allclose(driven.leg_s, [planned_s], rtol=0.01)  # the error that the planning margin covers
