@@ -60,7 +60,7 @@ def publish_run(
 ) -> Run:
     """Write the run folder of what was measured; ``command``: as for ``publish``."""
     instances = {name: p.instance for name, p in done.planned.items()}
-    instances |= {f"{name}-calibrated": p.calibrated.instance for name, p in done.planned.items() if p.calibrated}
+    instances |= {f"{name}+calibrated": p.calibrated.instance for name, p in done.planned.items() if p.calibrated}
     return publish(world, options, done.costs, instances, done.executed, done.summary, out, done.clock, progress,
                    command=command, reacted=done.reacted)
 

@@ -211,7 +211,7 @@ def test_calibration_stands_in_the_folder(tmp_path: Path, noisy: World) -> None:
     options = Options(trials=16, rollouts=4, fidelity="kinematic", calibrate=0.02)
     done = run(noisy, options, tmp_path, None, lambda *_: None)
     for scenario in noisy.scenarios:
-        instance = read_instance(done.folder / f"instance-{scenario.name}-calibrated.json")
+        instance = read_instance(done.folder / f"instance-{scenario.name}+calibrated.json")
         plan = read_plan(done.folder / "plans" / f"{scenario.name}-calibrated.json", instance)
         assert certify(instance, plan).reasons == ()
     assert read_content(done.folder).summary == done.summary
