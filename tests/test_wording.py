@@ -12,6 +12,7 @@ import pytest
 from sva_bench.files.printable import counted
 from tests.test_architecture import MODULES, PACKAGE
 
+DOCS = PACKAGE.parent / "docs"
 NOUNS = ("stations|pois|points of interest|robots|trials|scenarios|units|worlds|draws|noise draws|"
          "rows|entries|maps|seeds|plans|pairs|legs|stops|routes|vehicles|sets|items|cells|sites|travel times|rollouts|"
          "missions|files|attempts|numbers|outcomes|bytes|variants|keys|values|days|hours|levels|boxes|columns|lines")
@@ -47,3 +48,13 @@ NEVER_ONE = {  # said of what is more than a bound, or two at least
 def test_singular_and_plural_are_distinguished() -> None:
     assert [counted(count, "entry", "entries") for count in (0, 1, 2)] == ["0 entries", "1 entry", "2 entries"]
     assert [counted(count, "map") for count in (0, 1, 2)] == ["0 maps", "1 map", "2 maps"]
+
+
+IDLE = "waits or stops at a POI, each second burns `idle_share` of a second of driving (default 0"
+
+
+@pytest.mark.parametrize("page", ["noise", "contact", "calibration", "formats", "model"])
+def test_pages_say_one_rule_of_what_standing_burns(page: str) -> None:
+    text = " ".join((DOCS / f"{page}.md").read_text(encoding="utf-8").split())
+    assert IDLE in text
+    assert not re.search(r"\bwait\w*\b[^.]* (no|without) fuel", text, re.IGNORECASE)
