@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +29,12 @@ from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.study.bounds import MOST_DRAWS, MOST_SEED
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sva_bench.travel.fuel import FuelCosts
     from sva_bench.world.model import World
+
+_log = logging.getLogger(__name__)
 
 world_app = typer.Typer(no_args_is_help=True, help="Check, make, copy and draw worlds.", rich_markup_mode="rich")
 instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
@@ -79,6 +85,7 @@ def check_world(
 
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
+    _warn_of_passages(loaded, costs)
     console = results()
     for cost in costs.values():
         longest = int(cost.repaired_ms.max()) / 1000
@@ -110,6 +117,15 @@ def _kind_of(picture: Path) -> str:
     return kind
 
 
+def _warn_of_passages(world: World, costs: Mapping[str, FuelCosts]) -> None:
+    """Say which passages can't be what was meant."""
+    with loading():
+        from sva_bench.study.passages import doubtful_passages
+
+    for said in doubtful_passages(world, costs):
+        _log.warning("%s", said)
+
+
 def _check_noise(loaded: World, path: Path, planner: PathPlanner, plan: Path | None, output: Path | None, draws: int,
                  seed: int, *, as_json: bool) -> None:
     """The check under noise."""
@@ -123,6 +139,7 @@ def _check_noise(loaded: World, path: Path, planner: PathPlanner, plan: Path | N
     with about(path):
         with progress_bars() as progress:
             costs = plan_costs(loaded, planner, progress)
+        _warn_of_passages(loaded, costs)
         check_under_noise(loaded, costs, plan, output, draws=draws, seed=seed, as_json=as_json)
 
 

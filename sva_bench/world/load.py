@@ -40,6 +40,7 @@ from sva_bench.world.schema import (
     StationEntry,
     WorldFile,
 )
+from sva_bench.world.within import refuse_outside
 
 _Entry = tuple[SiteKind, str, SiteEntry, tuple[str, ...]]  # a site, and its location in the file
 
@@ -69,6 +70,7 @@ def world_of(
     file = validate(document, WorldFile, KIND)
     root = folder or document.path.parent
     obstacles, source = ground or _map(document, file.map, root)
+    refuse_outside(document, file, obstacles.bounds_m)
     pois = [f"p{k + 1}" for k in range(file.sites.pois.random)] if isinstance(file.sites.pois, RandomPois) else list(
         file.sites.pois)
     robots = tuple(_robot(document, name, entry, pois, root) for name, entry in file.robots.items())

@@ -56,6 +56,25 @@ def test_a_given_plan_is_checked_in_place_of_ours(tmp_path: Path, capsys: pytest
         ("base", "p1", "safe"), ("p1", "base", "safe")]
 
 
+WHOLE, NARROW, ASIDE = "[[3.0, 2.6], [3.0, 6.0]]", "[[3.0, 2.6], [3.0, 2.9]]", "[[5.6, 2.8], [6.0, 2.8]]"
+"""The gap in the wall of the small world; a part narrower than a robot; a corner where no path leads."""
+
+
+@pytest.mark.parametrize(("at", "said"), [
+    (WHOLE, None), (NARROW, "passage d1 is 0.3 m wide, and the narrowest robot 0.354 m"),
+    (ASIDE, "no planned path crosses passage d1")])
+@pytest.mark.parametrize("options", [[], ["--noise", "--draws", "2"]])
+def test_a_passage_that_makes_no_difference_is_warned_of_once(
+    at: str, said: str | None, options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    world = tmp_path / "gap.yaml"
+    world.write_text(f"{SMALL}passages:\n  d1: {{at_m: {at}, blocked: 0.5, wait_s: 1}}\n")
+    assert run_command_line(["world", "check", str(world), *options]) == 0
+    found = [line for line in capsys.readouterr().err.splitlines() if line.startswith("WARNING")]
+    assert len(found) == (said is not None)
+    assert all(str(said) in message for message in found)
+
+
 @pytest.mark.parametrize(("options", "said"), [
     (["--noise"], "has no noise"), (["--draws", "5"], "--draws belongs to --noise"),
     (["--json"], "--json belongs to --noise"), (["--noise", "-o", "margins.pdf"], "PNG or SVG")])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,6 +14,7 @@ from numpy.testing import assert_array_equal
 from ruamel.yaml import YAML
 
 from sva_bench.errors import BadFile
+from sva_bench.geometry.outside import is_outside
 from sva_bench.world.load import load_world, world_as_dict
 from sva_bench.world.model import World
 from sva_bench.world.noise import REALISTIC, LocalisationError, Noise, Passage, People
@@ -107,6 +110,51 @@ def test_what_is_wrong_with_a_floor_is_one_complaint_with_line_and_key(tmp_path:
                                                                       ) -> None:
     text = SMALL.replace("sites:\n", f"    floors: [{floor}]\nsites:\n", 1)
     assert_complains(tmp_path, text, f"map.shapes.floors[0].{key}", says)
+
+
+OUT_OF_BOUNDS = [(7.0, 3.0), (-1.0, 3.0), (3.0, 7.0), (3.0, -1.0), (6.8, 6.8)]
+
+
+@pytest.mark.parametrize("at", OUT_OF_BOUNDS)
+def test_a_passage_outside_the_bounds_is_refused_with_line_and_key(tmp_path: Path, at: tuple[float, float]) -> None:
+    (x, y), ends = at, (-0.5, 0.5)
+    for passage in ([[x, y - 0.5], [x, y + 0.5]], [[x - 0.5, y], [x + 0.5, y]], [[x + a, y - a] for a in ends]):
+        text = f"{SMALL}passages:\n  d1: {{at_m: {passage}, blocked: 0.5, wait_s: 1}}\n"
+        assert_complains(tmp_path, text, "passages.d1.at_m", "outside the bounds, 0 to 6 m and 0 to 6 m")
+
+
+@pytest.mark.parametrize("at", OUT_OF_BOUNDS)
+@pytest.mark.parametrize("yaw", [0, 30, 45, 200])
+def test_a_floor_outside_the_bounds_is_refused_with_line_and_key(tmp_path: Path, at: tuple[float, float], yaw: float
+                                                                 ) -> None:
+    floor = f"    floors: [{{box: {list(at)}, size_m: [1.2, 0.4], yaw_deg: {yaw}, friction: 0.1}}]\n"
+    assert_complains(tmp_path, SMALL.replace("sites:\n", f"{floor}sites:\n", 1), "map.shapes.floors[0].box",
+                     "outside the bounds")
+
+
+@given(st.floats(-4, 10), st.floats(-4, 10), st.floats(0, math.tau), st.floats(0.1, 6), st.floats(0.1, 6))
+def test_what_has_a_point_inside_the_bounds_is_not_outside_them(x: float, y: float, yaw: float, length: float,
+                                                               width: float) -> None:
+    # A grid of points of the shape, among them its corners: if one is inside, the shape is not outside. What lies
+    # between the grid's points may be inside all the same, by less than a step of the grid.
+    steps = np.linspace(-0.5, 0.5, 41)
+    along, across = np.array([math.cos(yaw), math.sin(yaw)]), np.array([-math.sin(yaw), math.cos(yaw)])
+    points = np.array([(x, y) + a * length * along + b * width * across for a in steps for b in steps])
+    corners = points[[0, 40, -1, -41]]
+    inside = ((points > 0) & (points < 6)).all(axis=1).any()
+    nearly = ((points > -0.2) & (points < 6.2)).all(axis=1).any()
+    assert is_outside(corners, np.array([0.0, 0.0, 6.0, 6.0])) <= (not inside)
+    assert nearly or is_outside(corners, np.array([0.0, 0.0, 6.0, 6.0]))
+
+
+def test_a_passage_on_the_outer_walls_is_outside_and_one_that_reaches_in_is_not(tmp_path: Path) -> None:
+    for ends, outside in (([[6, 1], [6, 3]], True), ([[5.9, 1], [6, 1]], False), ([[-1, 5], [3, 9]], True),
+                          ([[-1, 5], [2, 7]], False)):  # 5 + (x + 1) is 6 at x = 0; 5 + 2 / 3 (x + 1) is below it
+        text = f"{SMALL}passages:\n  d1: {{at_m: {ends}, blocked: 0.5, wait_s: 1}}\n"
+        if outside:
+            assert_complains(tmp_path, text, "passages.d1.at_m", "outside the bounds")
+        else:
+            world_of(tmp_path, text)
 
 
 def assert_complains(folder: Path, text: str, key: str, says: str) -> None:

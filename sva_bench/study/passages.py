@@ -1,0 +1,46 @@
+"""Passages that are likely to be somewhere else than their author thinks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import permutations
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.execution.waits import crossings_of
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import World
+
+
+def doubtful_passages(world: World, costs: Mapping[str, FuelCosts]) -> list[str]:
+    """A sentence for each passage that no robot fits through, or that no path between sites crosses.
+
+    Args:
+        world: The world.
+        costs: Its fuel costs by robot model.
+    """
+    if not world.passages:
+        return []
+    narrowest_m = 2 * min(robot.model.radius_m for robot in world.robots)
+    paths = _planned_paths(costs)
+    rims = np.array([[*path.min(axis=0), *path.max(axis=0)] for path in paths]).reshape(-1, 4)
+    said = []
+    for passage in world.passages:
+        ends = np.reshape(passage.ends_m, (2, 2))
+        width_m = float(np.linalg.norm(ends[1] - ends[0]))
+        if width_m < narrowest_m:
+            said.append(f"passage {passage.name} is {width_m:.3g} m wide, and the narrowest robot {narrowest_m:.3g} m: "
+                        "let its at_m reach across the whole door")
+            continue
+        near = (rims[:, :2] <= ends.max(axis=0)).all(axis=1) & (rims[:, 2:] >= ends.min(axis=0)).all(axis=1)
+        if not any(crossings_of(paths[k], passage) for k in np.flatnonzero(near).tolist()):
+            said.append(f"no planned path crosses passage {passage.name}, so no robot ever waits there: let its at_m "
+                        "reach across a door that robots drive through, or remove it")
+    return said
+
+
+def _planned_paths(costs: Mapping[str, FuelCosts]) -> list[FloatArray]:
+    """The paths that routes are put together from; those dearer than a chain of others are never driven."""
+    return [cost.times.path(a, b) for cost in costs.values() for a, b in permutations(cost.times.sites, 2)
+            if cost.chain(a, b) == (a, b)]
