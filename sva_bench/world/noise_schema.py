@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from difflib import get_close_matches
+from typing import Annotated, Any, Self, get_args
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from sva_bench.choices import NoisePreset
+from sva_bench.files.complaints import shown
 from sva_bench.files.fields import Bounded, Probability, Section
 from sva_bench.world.noise import REALISTIC, LocalisationError, Noise, Passage, People
 
@@ -94,11 +96,20 @@ def spelled_out(value: object) -> object:
     """The content of ``noise:`` as a mapping: ``realistic`` is a preset alone, and nothing below the heading no noise.
 
     What is left out of an error of localisation beside the preset is the preset's too.
+
+    Raises:
+        ValueError: If it is neither, with what to write.
     """
     if value is None:
         return {}
-    if isinstance(value, str):
+    if isinstance(value, str) and value in get_args(NoisePreset):
         return {"preset": value}
+    if not isinstance(value, dict):
+        word = value[0] if isinstance(value, list) and len(value) == 1 else value
+        meant = get_close_matches(word[:200], get_args(NoisePreset), n=1) if isinstance(word, str) else []
+        hint = f", did you mean {meant[0]!r}?" if meant else ";"
+        raise ValueError(f"found {shown(value)}{hint} expected {' or '.join(map(repr, get_args(NoisePreset)))}, or a "
+                         "mapping as {capacity_sd: 0.05}; for no noise leave the key out, or write nothing behind it")
     if isinstance(value, dict) and value.get("preset") == "realistic" and isinstance(value.get("localisation"), dict):
         return {**value, "localisation": {**_content(REALISTIC.localisation), **value["localisation"]}}
     return value

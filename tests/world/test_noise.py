@@ -56,10 +56,12 @@ def test_a_key_beside_the_preset_counts_whichever_comes_first(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(("said", "key", "says"), [
-    ("noise: realistc", "noise", "'realistic'"),
+    *((f"noise: {word}", "noise", "did you mean 'realistic'? expected 'realistic', or a mapping")
+      for word in ("realistc", "Realistic", "'realistic '", "[realistic]", "[realistc]")),
+    *((f"noise: {word}", "noise", "for no noise leave the key out, or write nothing behind it")
+      for word in ("off", "none", "no", "false", "0", "[]", "calm", "[off, on]", "realistc")),
     ("noise: {preset: calm}", "noise.preset", "'realistic'"),
     ("noise: 3", "noise", "mapping"),
-    ("noise: [realistic]", "noise", "mapping"),
     ("noise: {delay_s: [0.03, 0.16]}", "noise.delay_s", "at most 0.15 s"),
     ("noise: {delay_s: [0.1, 0.05]}", "noise.delay_s", "expected [least, greatest]"),
     ("noise: {delay_s: [-0.1, 0.05]}", "noise.delay_s[0]", "expected at least 0"),
