@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.errors import SvaBenchError
+from sva_bench.files.complaints import shown
 from sva_bench.robot.body import CASTER_GAP_M, OwnBody, Solid, Vector
 from sva_bench.robot.urdf import Joint, Link, Shape, Urdf, about, rpy_of
 
@@ -19,6 +21,18 @@ _SUNK = 0.15  # of the wheel radius: how far a caster may reach below the wheels
 _TILT = math.tan(math.radians(2.0))  # how far the robot may tilt until it stands on something
 _RIM = 64  # points of a cylinder's rim to look at
 _COMPACT = 0.07, 2.0  # least and greatest radius of gyration of the hull, in half diagonals of all solids
+
+
+class WheelsExchanged(SvaBenchError):
+    """What is named as the left wheel is the right one: wrong is not the URDF, but what names them."""
+
+    def __init__(self, left: str, right: str, root: str) -> None:
+        super().__init__(left, right, root)
+        self.left, self.right, self.root = left, right, root
+
+    def __str__(self) -> str:
+        return (f"{shown(self.left)} is to the right of {shown(self.right)}, seen along the x axis of "
+                f"{shown(self.root)}, which points ahead; exchange left_wheel and right_wheel")
 
 
 Frames = dict[str, tuple[FloatArray, FloatArray]]
@@ -95,6 +109,7 @@ def derive(urdf: Urdf, left: str, right: str) -> Derived:
 
     Raises:
         BadFile: If the wheels are no pair of driven wheels, or the robot would not stand on them.
+        WheelsExchanged: If the left one is the right one.
     """
     frames = _frames(urdf)
     pair = [_wheel(urdf, frames, urdf.joints[name]) for name in (left, right)]
@@ -220,8 +235,7 @@ def _axle(urdf: Urdf, left: _Wheel, right: _Wheel) -> tuple[FloatArray, FloatArr
     if float(np.linalg.norm(np.cross(sideways, right.axis))) > _LEVEL:
         raise wrong(f"its wheel doesn't stand on the axle of {left.joint.name}; a differential drive's wheels do")
     if sideways[1] < 0:
-        raise wrong(f"it is to the left of {left.joint.name}, seen along the x axis of {urdf.root}; exchange "
-                    "left_wheel and right_wheel")
+        raise WheelsExchanged(left.joint.name, right.joint.name, urdf.root)
     if abs(sideways[0]) > _ASKEW:
         raise wrong(f"the axle must lie across the x axis of {urdf.root}, which points ahead; it is "
                     f"{math.degrees(math.asin(min(abs(sideways[0]), 1.0))):.0f} degrees off")

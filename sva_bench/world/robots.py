@@ -11,7 +11,7 @@ from sva_bench.errors import BadFile, nearest
 from sva_bench.files.complaints import Loc, of_an_option
 from sva_bench.files.documents import Document, read_bytes
 from sva_bench.robot.model import BUILT_IN, RobotModel
-from sva_bench.robot.own_body import derive
+from sva_bench.robot.own_body import WheelsExchanged, derive
 from sva_bench.robot.urdf import MAX_BYTES, read_urdf
 from sva_bench.world.maps.files import MapFile, locate, normal
 from sva_bench.world.model import Robot, UrdfSource
@@ -76,7 +76,10 @@ def _described(document: Document, loc: Loc, name: str, entry: UrdfEntry, root: 
                                  f"{nearest(joint, list(urdf.joints))}")
     if entry.left_wheel == entry.right_wheel:
         raise document.error((*loc, "right_wheel"), "it is the left wheel too; name two joints")
-    derived = derive(urdf, entry.left_wheel, entry.right_wheel)
+    try:
+        derived = derive(urdf, entry.left_wheel, entry.right_wheel)
+    except WheelsExchanged as error:
+        raise document.error((*loc, "left_wheel"), f"in {entry.urdf} {error}") from None
     figures = {"radius_m": derived.radius_m, "wheel_radius_m": derived.wheel_radius_m, "track_m": derived.track_m,
                "mass_kg": derived.body.mass_kg, **{key: getattr(entry, key) for key in _LIMITS}}
     try:

@@ -196,6 +196,16 @@ def test_a_joint_that_the_urdf_lacks_is_an_error_of_the_world_file(name: str, tm
     assert refused.value.key == f"robots.uv1.model.{name}"
 
 
+def test_exchanged_wheels_are_an_error_of_the_world_file(tmp_path: Path) -> None:
+    exchanged = URDF.replace("left_joint", "x").replace("right_joint", "left_joint").replace("x,", "right_joint,")
+    with pytest.raises(BadFile, match=r"in robot\.urdf 'right_joint' is to the right of 'left_joint', seen along the x "
+                       r"axis of '\w+', which points ahead; exchange left_wheel and right_wheel") as refused:
+        described(tmp_path, model=exchanged)
+    assert (refused.value.path, refused.value.key) == (str(tmp_path / "world.yaml"), "robots.uv1.model.left_wheel")
+    assert refused.value.line is not None
+    assert "left_wheel" in (tmp_path / "world.yaml").read_text().splitlines()[refused.value.line - 1]
+
+
 def test_one_joint_is_not_both_wheels(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="it is the left wheel too"):
         described(tmp_path, model=URDF.replace("right_joint", "left_joint"))
