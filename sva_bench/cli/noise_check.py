@@ -85,4 +85,4 @@ def _edge_told(edge: list[LegTightness]) -> str:
 def _left(margin: MarginQuantiles | None) -> str:
     if margin is None:
         return "no limit"
-    return " ".join("–" if value is None else f"{value:.1f}" for value in (margin.q01, margin.q05))
+    return " ".join("–" if value is None else f"{value:z.1f}" for value in (margin.q01, margin.q05))

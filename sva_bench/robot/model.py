@@ -84,15 +84,15 @@ class RobotModel:
             raise ValueError(
                 f"it would tip over when it accelerates or brakes at {self.acceleration_m_s2:g} m/s2: its mass is "
                 f"centred {abs(x):.3f} m {'ahead of' if x >= 0 else 'behind'} the axle at a height of "
-                f"{z + self.wheel_radius_m:.3f} m, and it stands on the floor {body.front_m:.3f} m ahead and "
-                f"{body.rear_m:.3f} m behind it; lower acceleration_m_s2, add a caster, or move the mass")
+                f"{z + self.wheel_radius_m:z.3f} m, and it stands on the floor {body.front_m:z.3f} m ahead and "
+                f"{body.rear_m:z.3f} m behind it; lower acceleration_m_s2, add a caster, or move the mass")
         _, aside, height = body.centre_of_all_m(self.track_m)
         thrown = self.followed_speed_m_s * self.max_turn_rad_s / GRAVITY_M_S2 * (height + self.wheel_radius_m)
         if abs(aside) + thrown >= self.track_m / 2:
             raise ValueError(
                 f"it would tip over sideways in a curve at {self.followed_speed_m_s:g} m/s and "
                 f"{self.max_turn_rad_s:g} rad/s: its mass is centred {abs(aside):.3f} m aside at a height of "
-                f"{height + self.wheel_radius_m:.3f} m, over a track of {self.track_m:.3f} m; lower max_turn_rad_s or "
+                f"{height + self.wheel_radius_m:z.3f} m, over a track of {self.track_m:.3f} m; lower max_turn_rad_s or "
                 "max_speed_m_s, or move the mass")
         gyration = math.sqrt(self.turn_inertia_m2)
         if self.track_m < _LEAST_TRACK * gyration:

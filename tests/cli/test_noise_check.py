@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from sva_bench.__main__ import run_command_line
+from sva_bench.analysis.tightness import MarginQuantiles
+from sva_bench.cli.noise_check import _left
 from tests.worlds_for_tests import SMALL
 
 DOOR = Path(__file__).parents[2] / "examples" / "one-door.yaml"
@@ -73,6 +75,12 @@ def test_a_passage_that_makes_no_difference_is_warned_of_once(
     found = [line for line in capsys.readouterr().err.splitlines() if line.startswith("WARNING")]
     assert len(found) == (said is not None)
     assert all(str(said) in message for message in found)
+
+
+@pytest.mark.parametrize(("left_s", "said"), [
+    (-0.0, "0.0"), (-0.04, "0.0"), (0.04, "0.0"), (-0.06, "-0.1"), (-1.25, "-1.2"), (None, "–")])
+def test_a_margin_is_never_a_negative_zero(left_s: float | None, said: str) -> None:
+    assert _left(MarginQuantiles(q01=left_s, q05=left_s)) == f"{said} {said}"
 
 
 @pytest.mark.parametrize(("options", "said"), [

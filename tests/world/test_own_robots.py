@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -216,6 +217,16 @@ def test_limits_that_the_body_cannot_keep_to_are_refused_at_the_model(limit: str
     with pytest.raises(BadFile, match=r"tip over|slip") as refused:
         described(tmp_path, model=URDF.replace("}", f", {limit}}}"))
     assert refused.value.key == "robots.uv1.model"
+
+
+@pytest.mark.parametrize(("casters", "said"), [
+    ((0.2,), r" 0\.[12]\d\d m ahead and 0\.000 m behind"), ((-0.2, 0.2), r" 0\.[12]\d\d m ahead and 0\.[12]\d\d m ")])
+def test_where_a_tipping_robot_stands_is_never_a_negative_zero(casters: tuple[float, ...], said: str, tmp_path: Path
+                                                               ) -> None:
+    with pytest.raises(BadFile, match="tip over") as refused:
+        described(tmp_path, replace(SAMPLE, casters_m=casters).text(), URDF.replace("}", ", acceleration_m_s2: 20}"))
+    assert re.search(said, str(refused.value))
+    assert "-0.0" not in str(refused.value)
 
 
 @pytest.mark.parametrize(("name", "said"), [
