@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sva_bench.analysis.tightness import LegTightness, MarginQuantiles, PlanTightness
+    from sva_bench.choices import Judgement
     from sva_bench.travel.fuel import FuelCosts
     from sva_bench.world.model import World
 
@@ -71,7 +72,7 @@ def _print_plan(told: PlanTightness, draws: int, console: Console) -> None:
                   f"{100 * told.bad:.1f} % of draws; {_edge_told(edge)}", highlight=False, markup=False)
 
 
-_JUDGED = {"safe": "", "close": "little margin", "edge": "knife's edge"}
+_JUDGED: dict[Judgement, str] = {"safe": "", "close": "little margin", "edge": "knife's edge"}
 
 
 def _edge_told(edge: list[LegTightness]) -> str:
