@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 import sva_bench as sb
 
-WORLD = Path(__file__).parents[1] / "worlds" / "three-halls.yaml"
+ROOT = Path(__file__).parents[1]
+WORLD = ROOT / "worlds" / "three-halls.yaml"
+
+
+def test_the_page_says_in_processor_time_what_it_takes() -> None:
+    # By the clock it would depend on the number of cores, and on what else they do.
+    page = " ".join((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8").split())
+    assert re.findall(r"takes [\w.]+ (?:s|seconds?|minutes?)\b( of processor time)?", page) == [" of processor time"]
 
 
 @pytest.mark.long
