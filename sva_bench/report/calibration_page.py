@@ -22,12 +22,6 @@ def calibration_lines(scenarios: Iterable[ScenarioSummary]) -> list[str]:
             if scenario.calibration is not None]
 
 
-def mark_of(scenario: object, plan: str) -> str:
-    """What is said behind the name of a plan that goes by the name of calibrated, and is not."""
-    unreached = isinstance(scenario, ScenarioSummary) and scenario.calibration and not scenario.calibration.reached
-    return " (share not reached)" if plan == "calibrated" and unreached else ""
-
-
 def _told(found: Calibration) -> str:
     wrong = f"{bad_pct(found.bad)} of missions go wrong though nobody fails"
     if found.is_nominal and found.draws == 1 and found.bad.share == 0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.report.page import heading, note, table
 
@@ -14,7 +15,7 @@ Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
 def source_rows(scenarios: Scenarios) -> list[list[str]]:
     """A row for each scenario, plan and source, the largest effect first; none without noise."""
-    return [[scenario.name, name, source, _signed(effect.incentive), _signed(effect.seconds)]
+    return [[scenario.name, shown_name(scenario, name), source, _signed(effect.incentive), _signed(effect.seconds)]
             for scenario in scenarios for name, plan in scenario.plans.items()
             for source, effect in sorted(plan.sources.items(), key=lambda item: (
                 item[0] == "interplay", -abs(item[1].incentive), -abs(item[1].seconds)))]
@@ -39,7 +40,7 @@ def source_section(scenarios: Scenarios) -> list[str]:
 
 def _sentence(scenarios: Scenarios) -> str:
     """The source that costs most, of all plans."""
-    costs = [(effect.incentive, source, name, scenario.name) for scenario in scenarios
+    costs = [(effect.incentive, source, shown_name(scenario, name), scenario.name) for scenario in scenarios
              for name, plan in scenario.plans.items() for source, effect in plan.sources.items()
              if source != "interplay"]
     if not costs or min(costs)[0] >= 0:
