@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from sva_bench.analysis.calibration import Calibration
+from sva_bench.analysis.calibration import Calibration, Tried
 from sva_bench.analysis.results import Estimate, Share
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -29,7 +29,8 @@ def _told(found: Calibration) -> str:
                "calibrated one."
     if not found.reached:
         return (f"not calibrated. No costs that were tried prove that at most {share_pct(found)} of missions go wrong; "
-                f"the plan shown in its place, made for {_costs(found)}, does so most seldom: {wrong}.")
+                f"the plan shown in its place, made for {_costs(found)}, does so most seldom{_of_those(found)}: "
+                f"{wrong}.")
     price = found.nominal.promised - found.promised
     promised = f"it promises {found.promised:.1f} as the nominal plan does"
     if price:
@@ -65,8 +66,22 @@ def curve_rows(scenarios: Iterable[ScenarioSummary]) -> list[list[str]]:
     """The rows under ``CALIBRATION_HEAD``."""
     return [[scenario.name, tried.name, f"{tried.promised:.1f}", f"{tried.executed:.1f}",
              with_interval(_in_per_cent(tried.bad)), str(tried.draws),
-             ("chosen" if found.reached else "shown, not calibrated") if tried == found.chosen else ""]
+             _remark(found, tried)]
             for scenario in scenarios if (found := scenario.calibration) is not None for tried in found.curve]
+
+
+def _of_those(found: Calibration) -> str:
+    """Among which plans the one shown goes wrong most seldom."""
+    return " of the plans in which somebody leaves the base (one in which nobody does doesn't count)" \
+        if any(tried.nobody_leaves for tried in found.curve) and not found.chosen.nobody_leaves else ""
+
+
+def _remark(found: Calibration, tried: Tried) -> str:
+    if tried == found.chosen:
+        return "chosen" if found.reached else "shown, not calibrated"
+    if not tried.nobody_leaves:
+        return ""
+    return "nobody leaves" if found.share is None else "nobody leaves: doesn't count"
 
 
 def calibration_section(scenarios: Sequence[ScenarioSummary]) -> list[str]:

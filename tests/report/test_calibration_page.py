@@ -8,16 +8,38 @@ from pathlib import Path
 
 import pytest
 
+from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
+from sva_bench.analysis.results import Share
 from sva_bench.analysis.summaries import Summary
 from sva_bench.cli.tables import print_summary
+from sva_bench.report.calibration_page import calibration_lines, curve_rows
 from sva_bench.study.options import Options
 from sva_bench.study.run import run
 from sva_bench.world.noise import Noise, People
+from tests.results_for_tests import plan_result, summary
 from tests.worlds_for_tests import SMALL, world_of
 
 MARKED = "calibrated (share not reached)"
 NAMED_PLAINLY = re.compile(r"(?<!not )(?<!half-)(?<!safe-)\bcalibrated\b(?! \(share not reached)")
 """Not of plans: that one is not calibrated, and the files of recordings."""
+
+
+def judged(promised: float, bad: float) -> PlanJudged:
+    return PlanJudged(promised=promised, executed=promised * (1 - bad),
+                      bad=Share(share=bad, ci95=(bad / 2, min(1.0, bad + 0.004))))
+
+
+def run_of(*curve: tuple[float, float], chosen: int, reached: bool, executed_bad: float = 0.0) -> Summary:
+    """A run of one scenario, for at most 1 %: what each plan of the curve promises, and how often it goes wrong."""
+    tried = [Tried(**vars(judged(*one)), quantile=0.5 + 0.01 * k if k else None, factor=1.0, draws=1000)
+             for k, one in enumerate(curve)]
+    found = Calibration(**vars(judged(*curve[chosen])), share=0.01, quantile=tried[chosen].quantile, factor=1.0,
+                        nominal=judged(*curve[0]), curve=tuple(tried), reached=reached, draws=1000)
+    whole = summary((10.0, 20.0), 100.0, rollouts=32)
+    (scenario,) = whole.scenarios
+    plan = replace(plan_result(curve[chosen][0]), bad=Share(share=executed_bad, ci95=None))
+    return replace(whole, scenarios=(replace(
+        scenario, plans={**scenario.plans, "calibrated": plan}, calibration=found),))
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +49,7 @@ def missed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
     world = replace(world_of(place, SMALL), noise=Noise(people=People(per_m=0.5, stop_s=200.0)))
     done = run(world, Options(trials=16, rollouts=4, fidelity="kinematic", calibrate=0.02), place, None,
                lambda *_: None)
+    assert isinstance(done.summary, Summary)
     return done.folder, done.summary
 
 
@@ -41,3 +64,12 @@ def test_a_plan_that_missed_its_share_is_marked_wherever_it_is_named(
     assert MARKED in (said := capsys.readouterr().out)
     # A narrow table breaks the name before its mark, so what counts here are the sentences.
     assert NAMED_PLAINLY.findall(" ".join(line.strip() for line in said.splitlines() if "│" not in line)) == []
+
+
+def test_a_plan_in_which_nobody_leaves_is_said_not_to_count() -> None:
+    found = run_of((100.0, 0.5), (80.0, 0.1), (0.0, 0.0), chosen=1, reached=False).scenarios
+    (line,) = calibration_lines(found)
+    assert "most seldom of the plans in which somebody leaves the base (one in which nobody does doesn't count)" in line
+    assert [row[-1] for row in curve_rows(found)] == ["", "shown, not calibrated", "nobody leaves: doesn't count"]
+    (without,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.1), chosen=1, reached=False).scenarios)
+    assert "somebody leaves" not in without
