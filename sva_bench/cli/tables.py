@@ -59,7 +59,7 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
     if isinstance(summary, ComparisonSummary):
         print_given_reactions(summary, console)
     else:
-        for said in calibration_lines(summary.scenarios):
+        for said in calibration_lines(summary):
             console.print(said, highlight=False, markup=False)
         print_reactions(summary, console)
         _print_assumptions(summary, console)

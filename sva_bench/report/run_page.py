@@ -68,7 +68,7 @@ def write_report(path: Path, content: Content) -> None:
              "Values in the units of the world file's incentives; 95 % intervals in brackets, over trials and noise "
              "draws."),
         *_charts(summary),
-        *(calibration_section(summary.scenarios) if isinstance(summary, Summary) else ()),
+        *(calibration_section(summary) if isinstance(summary, Summary) else ()),
         *reaction_section(summary),
         *_world(content.world),
         *_over_trials(scenarios),

@@ -67,9 +67,22 @@ def test_a_plan_that_missed_its_share_is_marked_wherever_it_is_named(
 
 
 def test_a_plan_in_which_nobody_leaves_is_said_not_to_count() -> None:
-    found = run_of((100.0, 0.5), (80.0, 0.1), (0.0, 0.0), chosen=1, reached=False).scenarios
+    found = run_of((100.0, 0.5), (80.0, 0.1), (0.0, 0.0), chosen=1, reached=False)
     (line,) = calibration_lines(found)
     assert "most seldom of the plans in which somebody leaves the base (one in which nobody does doesn't count)" in line
-    assert [row[-1] for row in curve_rows(found)] == ["", "shown, not calibrated", "nobody leaves: doesn't count"]
-    (without,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.1), chosen=1, reached=False).scenarios)
+    assert [row[-1] for row in curve_rows(found.scenarios)] == [
+        "", "shown, not calibrated", "nobody leaves: doesn't count"]
+    (without,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.1), chosen=1, reached=False))
     assert "somebody leaves" not in without
+
+
+def test_each_share_is_said_to_be_the_twins_or_executed_and_why_they_differ() -> None:
+    above = run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=1 / 32)
+    (line,) = calibration_lines(above)
+    assert "by the twin, under 1000 draws of its own, 0.0 % [0.0, 0.4] of missions go wrong" in line
+    assert "Executed, 3.1 % of missions go wrong, more than the 1 % asked for: one bad draw of 32 is 3.1 %" in line
+    assert "physics" not in line  # which these missions have none of
+    (line,) = calibration_lines(replace(above, fidelity="rollout", rollouts=1000))
+    assert "asked for: physics does what the twin doesn't see." in line
+    (line,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=0.01))
+    assert "Executed" not in line
