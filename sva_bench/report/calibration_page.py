@@ -24,6 +24,21 @@ def calibration_lines(summary: Summary) -> list[str]:
             for scenario in summary.scenarios if (found := scenario.calibration) is not None]
 
 
+def against_nominal(scenario: ScenarioSummary) -> str:
+    """In one sentence: what the calibrated plan promises and earns against the nominal one; nothing without one."""
+    found = scenario.calibration
+    if found is None:
+        return ""
+    if found.is_nominal:
+        return "The nominal plan is the calibrated one." if found.reached else \
+            f"The share asked for, {share_pct(found)}, is not reached; the plan shown in its place is the nominal one."
+    plan, nominal = scenario.plans["calibrated"].executed, scenario.stochastic.executed
+    what = "The calibrated plan promises" if found.reached else \
+        f"The share asked for, {share_pct(found)}, is not reached; the plan shown in its place promises"
+    return (f"{what} {found.promised:.1f} in place of the nominal plan's {found.nominal.promised:.1f}, and earns, "
+            f"executed, {with_interval(plan)} in place of {with_interval(nominal)}.")
+
+
 def _executed_otherwise(summary: Summary, scenario: ScenarioSummary, found: Calibration) -> str:
     """Where more missions went wrong than were asked for though the twin proves the share: how that may be."""
     bad = scenario.plans["calibrated"].bad

@@ -19,7 +19,7 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.report.calibration_page import calibration_section
+from sva_bench.report.calibration_page import against_nominal, calibration_section
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
 from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
@@ -101,8 +101,8 @@ def _answer(summary: AnySummary, world: World) -> list[str]:
 
 def _findings(summary: Summary, world: World) -> Iterator[tuple[str, str]]:
     for scenario in summary.scenarios:
-        known = reliability_told(world, scenario.name, summary)
-        yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}"
+        known, told = reliability_told(world, scenario.name, summary), against_nominal(scenario)
+        yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}{sentence(told and f'. {told}')}"
 
 
 def _rankings(summary: ComparisonSummary, world: World) -> Iterator[tuple[str, str]]:

@@ -12,7 +12,7 @@ from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
 from sva_bench.analysis.results import Share
 from sva_bench.analysis.summaries import Summary
 from sva_bench.cli.tables import print_summary
-from sva_bench.report.calibration_page import calibration_lines, curve_rows
+from sva_bench.report.calibration_page import against_nominal, calibration_lines, curve_rows
 from sva_bench.study.options import Options
 from sva_bench.study.run import run
 from sva_bench.world.noise import Noise, People
@@ -86,3 +86,24 @@ def test_each_share_is_said_to_be_the_twins_or_executed_and_why_they_differ() ->
     assert "asked for: physics does what the twin doesn't see." in line
     (line,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=0.01))
     assert "Executed" not in line
+
+
+def test_the_answer_says_what_the_calibrated_plan_promises_and_earns_against_the_nominal_one() -> None:
+    def said(*curve: tuple[float, float], chosen: int, reached: bool) -> str:
+        return against_nominal(run_of(*curve, chosen=chosen, reached=reached).scenarios[0])
+
+    assert said((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True) == (
+        "The calibrated plan promises 80.0 in place of the nominal plan's 100.0, and earns, executed, 80.0 in place of "
+        "100.0.")
+    assert said((100.0, 0.5), (80.0, 0.2), chosen=1, reached=False).startswith(
+        "The share asked for, 1 %, is not reached; the plan shown in its place promises 80.0")
+    assert said((100.0, 0.0), chosen=0, reached=True) == "The nominal plan is the calibrated one."
+    assert "is not reached" in said((100.0, 0.5), chosen=0, reached=False)
+    assert against_nominal(summary((10.0, 20.0), 100.0).scenarios[0]) == ""
+
+
+def test_the_answer_of_the_page_says_that_the_share_was_not_reached(missed: tuple[Path, Summary]) -> None:
+    folder, found = missed
+    page = (folder / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    box = page[page.index("<div class=answer>"):page.index("</div>")]
+    assert box.count("The share asked for, 2 %, is not reached") == len(found.scenarios)
