@@ -91,7 +91,10 @@ def calibration_curve(scenario: str, found: Calibration) -> str:
     def draw(axes: Axes) -> None:
         for number, (name, values) in enumerate(lines.items()):
             colour, shape = mark(number)
-            axes.plot(bad, values, color=colour, marker=shape, linewidth=1.2, markersize=6, label=name)
+            # Where both coincide the first must still be seen: thin and dashed over wide, small on large.
+            over = {"linewidth": 1.4, "linestyle": "--", "markersize": 4} if number else {
+                "linewidth": 4.0, "markersize": 9}
+            axes.plot(bad, values, color=colour, marker=shape, label=name, **over)
         axes.plot(100 * found.chosen.bad.share, found.chosen.executed, marker="o", markersize=14, fillstyle="none",
                   color="black", linestyle="none", label="chosen" if found.reached else "shown")
         if found.share is not None:

@@ -12,6 +12,7 @@ from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
 from sva_bench.analysis.results import Share
 from sva_bench.analysis.summaries import Summary
 from sva_bench.cli.tables import print_summary
+from sva_bench.report import charts
 from sva_bench.report.calibration_page import against_nominal, calibration_lines, curve_rows
 from sva_bench.study.options import Options
 from sva_bench.study.run import run
@@ -107,3 +108,21 @@ def test_the_answer_of_the_page_says_that_the_share_was_not_reached(missed: tupl
     page = (folder / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     box = page[page.index("<div class=answer>"):page.index("</div>")]
     assert box.count("The share asked for, 2 %, is not reached") == len(found.scenarios)
+
+
+def test_a_curve_shows_what_is_promised_where_the_same_is_executed() -> None:
+    # Whatever lies on top is thinner and broken, so that the line below shows beside it and through it.
+    found = run_of((100.0, 0.0), (80.0, 0.0), chosen=1, reached=True).scenarios[0].calibration
+    assert found is not None
+    lines = [style for style in re.findall(r'style="([^"]*)"', charts.calibration_curve("S", found))
+             if "fill: none" in style and ("stroke: #0072b2" in style or "stroke: #e69f00" in style)]
+    below, above = lines[0], next(style for style in lines if "#e69f00" in style)
+    assert "#0072b2" in below
+    assert width_of(below) > 2 * width_of(above)
+    assert "stroke-dasharray" in above
+    assert "stroke-dasharray" not in below
+
+
+def width_of(style: str) -> float:
+    found = re.search(r"stroke-width: ([0-9.]+)", style)
+    return 1.0 if found is None else float(found[1])
