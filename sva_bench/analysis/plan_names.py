@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from sva_bench.analysis.results import ScenarioPlans
 from sva_bench.analysis.scenarios import ScenarioSummary, UnitScenario
+from sva_bench.files.printable import counted
 
 _MISSED = "share not reached"
 
@@ -20,7 +21,7 @@ def shown_over(scenarios: Sequence[ScenarioPlans], plan: str) -> str:
     missing = [scenario.name for scenario in scenarios if _misses(scenario, plan)]
     if not missing:
         return plan
-    where = "" if len(missing) == len(scenarios) else f" in {len(missing)} of {len(scenarios)} scenarios" \
+    where = "" if len(missing) == len(scenarios) else f" in {len(missing)} of {counted(len(scenarios), 'scenario')}" \
         if len(missing) > 2 else f" in {' and '.join(missing)}"
     return f"{plan} ({_MISSED}{where})"
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
+from sva_bench.analysis.plan_names import shown_over
 from sva_bench.analysis.results import Share
 from sva_bench.analysis.summaries import Summary
 from sva_bench.cli.tables import print_summary
@@ -126,3 +127,13 @@ def test_a_curve_shows_what_is_promised_where_the_same_is_executed() -> None:
 def width_of(style: str) -> float:
     found = re.search(r"stroke-width: ([0-9.]+)", style)
     return 1.0 if found is None else float(found[1])
+
+
+def test_a_legend_says_in_which_scenarios_a_share_is_not_reached() -> None:
+    (no,), (yes,) = (run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=reached).scenarios
+                     for reached in (False, True))
+    assert shown_over([no, no], "calibrated") == MARKED
+    assert shown_over([yes, no], "calibrated") == "calibrated (share not reached in S)"
+    assert shown_over([yes, no, no, no], "calibrated") == "calibrated (share not reached in 3 of 4 scenarios)"
+    assert shown_over([yes, yes], "calibrated") == "calibrated"
+    assert shown_over([no], "stochastic") == "stochastic"
