@@ -56,6 +56,11 @@ class Tried(PlanJudged):
     draws: _Count
 
     @property
+    def nobody_leaves(self) -> bool:
+        """Whether it promises nothing, as does a plan in which all stay at the base: it doesn't count."""
+        return self.promised <= 0
+
+    @property
     def name(self) -> str:
         """For a person: the costs that it was made for."""
         if self.quantile is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sva_bench.analysis.calibration import Calibration
+from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.reaction_results import ComparedReaction, ReactionResult
 from sva_bench.analysis.results import PlanFigures, ScenarioPlans, Share, VssFigures
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -24,7 +25,7 @@ def lines_of(scenarios: Sequence[ScenarioPlans]) -> list[str]:
     """A line for each scenario: what each plan collected, and the VSS where there is one; one for each reaction."""
     lines = []
     for scenario in scenarios[:_MOST_LINES]:
-        plans = ", ".join(f"{name} {_figure(plan.executed.mean, plan.executed.ci95)}"
+        plans = ", ".join(f"{shown_name(scenario, name)} {_figure(plan.executed.mean, plan.executed.ci95)}"
                           for name, plan in scenario.plans.items())
         vss = _vss(scenario)
         lines.append(f"{scenario.name}: {plans}" + (f"; VSS {vss}" if vss else ""))
@@ -39,7 +40,7 @@ def table_of(title: str, scenarios: Sequence[ScenarioPlans]) -> str:
     compared = any(isinstance(scenario, ComparedScenario) for scenario in scenarios)
     rows = []
     for scenario in scenarios:
-        rows += [["" if number else scenario.name, name, *_cells(plan),
+        rows += [["" if number else scenario.name, shown_name(scenario, name), *_cells(plan),
                   *([] if compared else ["" if number else _vss(scenario)])]
                  for number, (name, plan) in enumerate(scenario.plans.items())]
         if found := _calibration(scenario):

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from sva_bench.analysis.catalogue import statistics
+from sva_bench.analysis.plan_names import shown_name, shown_over
 from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.scenarios import ComparedScenario
@@ -16,7 +17,7 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
-from sva_bench.report.calibration_page import calibration_lines, mark_of
+from sva_bench.report.calibration_page import calibration_lines
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
 from sva_bench.report.source_table import SOURCES_HEAD, source_rows
 from sva_bench.report.wording import (
@@ -58,7 +59,7 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
     if isinstance(summary, ComparisonSummary):
         print_given_reactions(summary, console)
     else:
-        for said in calibration_lines(summary.scenarios):
+        for said in calibration_lines(summary):
             console.print(said, highlight=False, markup=False)
         print_reactions(summary, console)
         _print_assumptions(summary, console)
@@ -100,7 +101,7 @@ def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
                 worth = [vss_verdict(scenario.vss), f"{scenario.vss.modelled:.1f}",
                          "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]
             table.add_row(
-                "" if number else scenario.name, name + mark_of(scenario, name) + proof, *((lost,) if given else ()),
+                "" if number else scenario.name, shown_name(scenario, name) + proof, *((lost,) if given else ()),
                 *(cell(entry, plan) for entry in shown), *(f"{plan.by_robot[robot]:.1f}" for robot in robots),
                 *(worth if compared else ()), end_section=number == len(scenario.plans) - 1)
     return table
@@ -116,7 +117,7 @@ def _print_unhappy(summary: AnySummary, console: Console) -> None:
         missions += ends.total()
         bad = [f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if ends[end]]
         if bad:
-            unhappy.append(f"{', '.join(bad)} ({name})")
+            unhappy.append(f"{', '.join(bad)} ({shown_over(summary.scenarios, name)})")
     if unhappy:
         console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
                       highlight=False)

@@ -18,6 +18,7 @@ from sva_bench.batch.estimates import StrandCost
 from sva_bench.batch.run import BatchProgress
 from sva_bench.cli.terminal import messages, results
 from sva_bench.files.printable import counted
+from sva_bench.report.calibration_over_maps import calibrated_over_maps
 from sva_bench.report.reactions_over_maps import reaction_table
 from sva_bench.report.wording import over_few_maps, percentage, verdict, with_interval
 
@@ -110,6 +111,8 @@ def print_batch(summary: BatchSummary, console: Console | None = None) -> None:
         console.print(reactions_over_maps(summary.reactions))
     if said := over_few_maps(summary.aggregate):
         console.print(said, highlight=False)
+    for said in calibrated_over_maps(summary.units):
+        console.print(said, highlight=False, markup=False)
     for said in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing]):
         console.print(said, highlight=False, markup=False)
     print_failed(summary.failed, console)

@@ -9,6 +9,7 @@ from sva_bench.analysis.over_maps import BatchSummary, OverMaps, labelled
 from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.report.calibration_over_maps import calibrated_over_maps
 from sva_bench.report.calibration_page import bad_pct
 from sva_bench.report.page import figure, heading, note, sentence, table, write_page
 from sva_bench.report.reaction_wording import knows_what_when
@@ -62,7 +63,7 @@ def _calibrated(summary: BatchSummary) -> list[str]:
             for unit in summary.units for s in unit.scenarios if (found := s.calibration) is not None]
     if not rows:
         return []
-    return [heading("Calibrated plans"), table(
+    return [heading("Calibrated plans"), *(note(said) for said in calibrated_over_maps(summary.units)), table(
         ["scenario", "seed", "made for costs at", "promised, nominal", "calibrated", "missions that go wrong, nominal",
          "calibrated", "executed, stochastic", "calibrated"], rows, words=(0, 2),
         sections=[unit.label for unit in summary.units for s in unit.scenarios if s.calibration is not None])]

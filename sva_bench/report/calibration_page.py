@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
-from sva_bench.analysis.calibration import Calibration
+from sva_bench.analysis.calibration import Calibration, Tried
 from sva_bench.analysis.results import Estimate, Share
 from sva_bench.analysis.scenarios import ScenarioSummary
+from sva_bench.analysis.summaries import Summary
+from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.page import figure, heading, note, table
 from sva_bench.report.wording import per_cent, with_interval
@@ -16,26 +18,51 @@ CALIBRATION_HEAD = ("scenario", "made for costs at", "promised", "executed by th
 """Of the curve: a row for each plan that was tried."""
 
 
-def calibration_lines(scenarios: Iterable[ScenarioSummary]) -> list[str]:
-    """What the calibration of each scenario comes to, in a sentence."""
-    return [f"{scenario.name}: {_told(scenario.calibration)}" for scenario in scenarios
-            if scenario.calibration is not None]
+def calibration_lines(summary: Summary) -> list[str]:
+    """What the calibration of each scenario comes to, in a sentence, and in another what was executed otherwise."""
+    return [f"{scenario.name}: {_told(found)}{_executed_otherwise(summary, scenario, found)}"
+            for scenario in summary.scenarios if (found := scenario.calibration) is not None]
 
 
-def mark_of(scenario: object, plan: str) -> str:
-    """What is said behind the name of a plan that goes by the name of calibrated, and is not."""
-    unreached = isinstance(scenario, ScenarioSummary) and scenario.calibration and not scenario.calibration.reached
-    return " (share not reached)" if plan == "calibrated" and unreached else ""
+def against_nominal(scenario: ScenarioSummary) -> str:
+    """In one sentence: what the calibrated plan promises and earns against the nominal one; nothing without one."""
+    found = scenario.calibration
+    if found is None:
+        return ""
+    if found.is_nominal:
+        return "The nominal plan is the calibrated one." if found.reached else \
+            f"The share asked for, {share_pct(found)}, is not reached; the plan shown in its place is the nominal one."
+    plan, nominal = scenario.plans["calibrated"].executed, scenario.stochastic.executed
+    what = "The calibrated plan promises" if found.reached else \
+        f"The share asked for, {share_pct(found)}, is not reached; the plan shown in its place promises"
+    return (f"{what} {found.promised:.1f} in place of the nominal plan's {found.nominal.promised:.1f}, and earns, "
+            f"executed, {with_interval(plan)} in place of {with_interval(nominal)}.")
+
+
+def _executed_otherwise(summary: Summary, scenario: ScenarioSummary, found: Calibration) -> str:
+    """Where more missions went wrong than were asked for though the twin proves the share: how that may be."""
+    bad = scenario.plans["calibrated"].bad
+    if bad is None or found.share is None or not found.reached or bad.share <= found.share:
+        return ""
+    one, reasons = 1 / summary.rollouts, []
+    if one > found.share:
+        reasons.append(f"one bad draw of {summary.rollouts} is {per_cent(100 * one)} already")
+    if summary.fidelity != "kinematic":
+        reasons.append("physics does what the twin doesn't see")
+    return (f" Executed, {per_cent(100 * bad.share)} of missions go wrong, more than the {share_pct(found)} asked for: "
+            f"{' or '.join(reasons) or 'the draws of this run are others'}.")
 
 
 def _told(found: Calibration) -> str:
-    wrong = f"{bad_pct(found.bad)} of missions go wrong though nobody fails"
+    wrong = (f"by the twin, under {counted(found.draws, 'draw')} of its own, {bad_pct(found.bad)} of missions go wrong "
+             "though nobody fails")
     if found.is_nominal and found.draws == 1 and found.bad.share == 0:
         return "nothing here differs from one mission to the next, and none goes wrong: the nominal plan is the " \
                "calibrated one."
     if not found.reached:
         return (f"not calibrated. No costs that were tried prove that at most {share_pct(found)} of missions go wrong; "
-                f"the plan shown in its place, made for {_costs(found)}, does so most seldom: {wrong}.")
+                f"the plan shown in its place, made for {_costs(found)}, does so most seldom{_of_those(found)}: "
+                f"{wrong}.")
     price = found.nominal.promised - found.promised
     promised = f"it promises {found.promised:.1f} as the nominal plan does"
     if price:
@@ -71,12 +98,27 @@ def curve_rows(scenarios: Iterable[ScenarioSummary]) -> list[list[str]]:
     """The rows under ``CALIBRATION_HEAD``."""
     return [[scenario.name, tried.name, f"{tried.promised:.1f}", f"{tried.executed:.1f}",
              with_interval(_in_per_cent(tried.bad)), str(tried.draws),
-             ("chosen" if found.reached else "shown, not calibrated") if tried == found.chosen else ""]
+             _remark(found, tried)]
             for scenario in scenarios if (found := scenario.calibration) is not None for tried in found.curve]
 
 
-def calibration_section(scenarios: Sequence[ScenarioSummary]) -> list[str]:
+def _of_those(found: Calibration) -> str:
+    """Among which plans the one shown goes wrong most seldom."""
+    return " of the plans in which somebody leaves the base (one in which nobody does doesn't count)" \
+        if any(tried.nobody_leaves for tried in found.curve) and not found.chosen.nobody_leaves else ""
+
+
+def _remark(found: Calibration, tried: Tried) -> str:
+    if tried == found.chosen:
+        return "chosen" if found.reached else "shown, not calibrated"
+    if not tried.nobody_leaves:
+        return ""
+    return "nobody leaves" if found.share is None else "nobody leaves: doesn't count"
+
+
+def calibration_section(summary: Summary) -> list[str]:
     """The section of the page; nothing where no plan was calibrated."""
+    scenarios = summary.scenarios
     if not any(scenario.calibration for scenario in scenarios):
         return []
     with holding_back_ctrl_c():
@@ -85,7 +127,7 @@ def calibration_section(scenarios: Sequence[ScenarioSummary]) -> list[str]:
     pictures = [figure(charts.calibration_curve(scenario.name, scenario.calibration),
                        f"{scenario.name}: each point is a plan; from right to left costs are raised.")
                 for scenario in scenarios if scenario.calibration and len(scenario.calibration.curve) > 1]
-    return [heading("Calibrated plans"), *(note(line) for line in calibration_lines(scenarios)),
+    return [heading("Calibrated plans"), *(note(line) for line in calibration_lines(summary)),
             *(["<div class=pair>", *pictures, "</div>"] if pictures else []),
             table(CALIBRATION_HEAD, curve_rows(scenarios), words=(0, 1, 6),
                   caption="What was tried, on the noise draws by which the plan was chosen"),

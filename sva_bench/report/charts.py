@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sva_bench.analysis.calibration import Calibration
+from sva_bench.analysis.plan_names import shown_over
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
@@ -46,9 +47,9 @@ def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence
 
 def plans_compared(scenarios: Sequence[AnyScenario]) -> str:
     """Bars with intervals: the value of each plan, scenario by scenario (Figure 8)."""
-    plans = list(scenarios[0].plans)
-    heights = {name: [s.plans[name].executed.mean for s in scenarios] for name in plans}
-    ends = {name: [s.plans[name].executed.ci95 for s in scenarios] for name in plans}
+    plans = {name: shown_over(scenarios, name) for name in scenarios[0].plans}
+    heights = {shown: [s.plans[name].executed.mean for s in scenarios] for name, shown in plans.items()}
+    ends = {shown: [s.plans[name].executed.ci95 for s in scenarios] for name, shown in plans.items()}
 
     def draw(axes: Axes) -> None:
         _bars(axes, [s.name for s in scenarios], heights, ends)
@@ -90,7 +91,10 @@ def calibration_curve(scenario: str, found: Calibration) -> str:
     def draw(axes: Axes) -> None:
         for number, (name, values) in enumerate(lines.items()):
             colour, shape = mark(number)
-            axes.plot(bad, values, color=colour, marker=shape, linewidth=1.2, markersize=6, label=name)
+            # Where both coincide the first must still be seen: thin and dashed over wide, small on large.
+            over = {"linewidth": 1.4, "linestyle": "--", "markersize": 4} if number else {
+                "linewidth": 4.0, "markersize": 9}
+            axes.plot(bad, values, color=colour, marker=shape, label=name, **over)
         axes.plot(100 * found.chosen.bad.share, found.chosen.executed, marker="o", markersize=14, fillstyle="none",
                   color="black", linestyle="none", label="chosen" if found.reached else "shown")
         if found.share is not None:
@@ -121,7 +125,8 @@ def distributions(scenarios: Sequence[AnyScenario]) -> str:
                 box.set(facecolor=_colour(number), hatch=_hatch(number))
             axes.plot(at, [d.cvar10 for d in found], linestyle="none", marker="v", color="black", markersize=5,
                       label="mean of the worst tenth" if number == 0 else None)
-            axes.bar(0, 0, facecolor=_colour(number), hatch=_hatch(number), edgecolor="black", label=name)
+            axes.bar(0, 0, facecolor=_colour(number), hatch=_hatch(number), edgecolor="black",
+                     label=shown_over(scenarios, name))
         _names(axes, [s.name for s in scenarios])
         axes.set_ylabel("value of a trial [world file's units]")
         axes.set_title("Over trials: 5, 25, 50, 75, 95 %")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.results import PlanResult
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, Summary
@@ -58,7 +59,7 @@ def upset_by_noise(summary: AnySummary) -> list[str]:
     for scenario in summary.scenarios:
         shares = {name: plan.bad.share for name, plan in scenario.plans.items() if plan.bad is not None}
         if any(shares.values()):
-            told.append(f"{scenario.name}: " + ", ".join(f"{name} {per_cent(100 * share)}"
+            told.append(f"{scenario.name}: " + ", ".join(f"{shown_name(scenario, name)} {per_cent(100 * share)}"
                                                          for name, share in shares.items()))
     if not told:
         return []

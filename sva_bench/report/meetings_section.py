@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+from sva_bench.analysis.plan_names import ShownNames
 from sva_bench.choices import MarkKind
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -27,11 +28,12 @@ def meetings_section(content: Content) -> list[str]:
                        for table in (content.contacts, content.waits))
     if not contacts and not waits:
         return []
-    parts = [heading("What robots met on their way"), *_maps(content, contacts, waits)]
+    shown = ShownNames(content.summary.scenarios)
+    parts = [heading("What robots met on their way"), *_maps(content, contacts, waits, shown)]
     if contacts:
         parts.append(table(
             ["scenario", "plan", "robot", "touched", "contacts", "noise draws", "longest [s]", "stuck there"],
-            _most(_by_cause(contacts, "solid", lambda mine: [
+            _most(_by_cause(contacts, "solid", shown, lambda mine: [
                 f"{max(row['lasts_s'] for row in mine):.1f}",
                 str(len(_draws([row for row in mine if row["stuck"]])))])),
             words=(0, 1, 2, 3), caption="What hulls touched; obstacles are numbered as in the world file"))
@@ -39,7 +41,8 @@ def meetings_section(content: Content) -> list[str]:
         draws = content.summary.rollouts
         parts.append(table(
             ["scenario", "plan", "robot", "waited for", "waits", "noise draws", "a mission [s]"],
-            _most(_by_cause(waits, "cause", lambda mine: [f"{sum(row['lasts_s'] for row in mine) / draws:.1f}"])),
+            _most(_by_cause(waits, "cause", shown, lambda mine: [
+                f"{sum(row['lasts_s'] for row in mine) / draws:.1f}"])),
             words=(0, 1, 2, 3), caption="What robots waited for; the last column is the mean over noise draws"))
     return [*parts, note("Each leg counts once under each noise draw, also one that a robot had to leave to others "
                          "since its mission had ended before.")]
@@ -50,11 +53,12 @@ class _More(Protocol):
         """Further cells of a row that sums up some."""
 
 
-def _by_cause(rows: Rows, cause: str, more: _More) -> list[tuple[int, list[str]]]:
+def _by_cause(rows: Rows, cause: str, shown: ShownNames, more: _More) -> list[tuple[int, list[str]]]:
     """Rows by scenario, plan, robot and cause, each with how many there are."""
     grouped: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
-        grouped.setdefault((row["scenario"], row["planner"], row["robot"], row[cause]), []).append(row)
+        plan = shown.of(row["scenario"], row["planner"])
+        grouped.setdefault((row["scenario"], plan, row["robot"], row[cause]), []).append(row)
     return [(len(mine), [*key, str(len(mine)), str(len(_draws(mine))), *more(mine)]) for key, mine in grouped.items()]
 
 
@@ -71,7 +75,7 @@ def _draws(rows: Rows) -> set[int]:
     return {row["rollout"] for row in rows}
 
 
-def _maps(content: Content, contacts: Rows, waits: Rows) -> list[str]:
+def _maps(content: Content, contacts: Rows, waits: Rows, shown: ShownNames) -> list[str]:
     """A map for each plan on whose way something was met; plans with the same routes share one."""
     with holding_back_ctrl_c():
         from sva_bench.report.drawing import Overlays, draw_world, for_page
@@ -86,7 +90,7 @@ def _maps(content: Content, contacts: Rows, waits: Rows) -> list[str]:
                            for rows in (contacts, waits))
         if not touched and not waited:
             continue
-        what = ", ".join(f"{scenario} {planner}" for scenario, planner in keys)
+        what = ", ".join(f"{scenario} {shown.of(scenario, planner)}" for scenario, planner in keys)
         said = " and ".join(said for rows, said in (
             (touched, counted(len(touched), "contact")), (waited, counted(len(waited), "wait"))) if rows)
         drawn = draw_world(content.world, "svg", Overlays(marks=[*marks_of(waited, "wait"),

@@ -11,6 +11,7 @@ import numpy as np
 
 from sva_bench.analysis.catalogue import Section, statistics
 from sva_bench.analysis.driving import driving_told
+from sva_bench.analysis.plan_names import ShownNames, shown_name
 from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import Estimate, Share
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -18,7 +19,7 @@ from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.report.calibration_page import calibration_section, mark_of
+from sva_bench.report.calibration_page import against_nominal, calibration_section
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
 from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
@@ -54,6 +55,7 @@ def write_report(path: Path, content: Content) -> None:
     """Write ``report.html``."""
     summary = content.summary
     scenarios = summary.scenarios
+    names = ShownNames(scenarios)
     question = "Is the stochastic plan worth it" if isinstance(summary, Summary) else "What are the plans worth"
     parts = [
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
@@ -66,7 +68,7 @@ def write_report(path: Path, content: Content) -> None:
              "Values in the units of the world file's incentives; 95 % intervals in brackets, over trials and noise "
              "draws."),
         *_charts(summary),
-        *(calibration_section(summary.scenarios) if isinstance(summary, Summary) else ()),
+        *(calibration_section(summary) if isinstance(summary, Summary) else ()),
         *reaction_section(summary),
         *_world(content.world),
         *_over_trials(scenarios),
@@ -77,9 +79,9 @@ def write_report(path: Path, content: Content) -> None:
         *_ends(scenarios),
         *_measured(scenarios),
         *meetings_section(content),
-        *_legs(content.legs.without_reaction()),
-        *_routes(content.routes),
-        *_recordings(content),
+        *_legs(content.legs.without_reaction(), names),
+        *_routes(content.routes, names),
+        *_recordings(content, names),
         *_again(summary, content.manifest),
     ]
     write_page(path, summary.world, parts)
@@ -99,8 +101,8 @@ def _answer(summary: AnySummary, world: World) -> list[str]:
 
 def _findings(summary: Summary, world: World) -> Iterator[tuple[str, str]]:
     for scenario in summary.scenarios:
-        known = reliability_told(world, scenario.name, summary)
-        yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}"
+        known, told = reliability_told(world, scenario.name, summary), against_nominal(scenario)
+        yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}{sentence(told and f'. {told}')}"
 
 
 def _rankings(summary: ComparisonSummary, world: World) -> Iterator[tuple[str, str]]:
@@ -150,7 +152,7 @@ def _charts(summary: AnySummary) -> list[str]:
     parts += ["</div>", heading("Value by robot and scenario"), "<div class=pair>", *robots, "</div>"]
     names = list(scenarios[0].availability)
     return [*parts, table(["scenario", "plan", *names], [
-        [s.name, name, *(f"{plan.by_robot[r]:.1f}" for r in names)] for s in scenarios
+        [s.name, shown_name(s, name), *(f"{plan.by_robot[r]:.1f}" for r in names)] for s in scenarios
         for name, plan in s.plans.items()], words=(0, 1))]
 
 
@@ -179,7 +181,7 @@ def _statistics(scenarios: Scenarios, section: Section) -> str:
     """A table of statistics, a row for each scenario and plan."""
     entries = statistics("page", section)
     return table(["scenario", "plan", *(entry.heading for entry in entries)],
-                 [[s.name, name + mark_of(s, name), *(cell(entry, plan) for entry in entries)] for s in scenarios
+                 [[s.name, shown_name(s, name), *(cell(entry, plan) for entry in entries)] for s in scenarios
                   for name, plan in s.plans.items()], words=(0, 1))
 
 
@@ -193,7 +195,7 @@ def _assumptions(summary: Summary) -> list[str]:
 
 
 def _ends(scenarios: Scenarios) -> list[str]:
-    rows = [[s.name, name, robot, *(_in_per_cent(shares[end]) if end in shares else "" for end in ENDS)]
+    rows = [[s.name, shown_name(s, name), robot, *(_in_per_cent(shares[end]) if end in shares else "" for end in ENDS)]
             for s in scenarios for name, plan in s.plans.items() for robot, shares in plan.end_shares.items()]
     return [heading("How the robots ended"), table(
         ["scenario", "plan", "robot", *(f"{end.replace('_', ' ')} [%]" for end in ENDS)], rows, words=(0, 1, 2)),
@@ -206,7 +208,7 @@ def _in_per_cent(found: Share) -> str:
         100 * found.ci95[0], 100 * found.ci95[1])))
 
 
-def _legs(legs: Legs) -> list[str]:
+def _legs(legs: Legs, shown: ShownNames) -> list[str]:
     with holding_back_ctrl_c():
         from sva_bench.report import charts
 
@@ -224,8 +226,9 @@ def _legs(legs: Legs) -> list[str]:
                          f"{100 * (driven[mine].sum() / planned[mine].sum() - 1):+.2f}", f"{off.min():+.2f}",
                          f"{off.max():+.2f}"])
     late = np.argsort(-(driven - planned), kind="stable")[:_WORST_LEGS]
-    worst = [[legs.scenario[k], legs.planner[k], legs.robot[k], str(legs.rollout[k]), legs.origin[k],
-              legs.destination[k], f"{planned[k]:.2f}", f"{driven[k]:.2f}", f"{driven[k] - planned[k]:+.2f}"]
+    worst = [[legs.scenario[k], shown.of(legs.scenario[k], legs.planner[k]), legs.robot[k], str(legs.rollout[k]),
+              legs.origin[k], legs.destination[k], f"{planned[k]:.2f}", f"{driven[k]:.2f}",
+              f"{driven[k] - planned[k]:+.2f}"]
              for k in late.tolist()]
     return [*parts,
             figure(charts.legs_driven(planned, driven, names), "Each point is a leg under one noise draw. Fuel is "
@@ -245,20 +248,21 @@ def _world(world: World) -> list[str]:
                                          "what each robot earns there.")]
 
 
-def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> list[str]:
-    rows = [[scenario, planner, robot, " → ".join(route) or "stays home"]
+def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]], shown: ShownNames) -> list[str]:
+    rows = [[scenario, shown.of(scenario, planner), robot, " → ".join(route) or "stays home"]
             for (scenario, planner), robots in routes.items() for robot, route in robots.items()]
     return [heading("Routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
 
 
-def _recordings(content: Content) -> list[str]:
+def _recordings(content: Content, shown: ShownNames) -> list[str]:
     lacking = content.lacking
 
     def linked(stems: Mapping[str, str]) -> list[str]:
         return [f'<a href="recordings/{quote(stem)}.rrd">{text(what)}</a>' for what, stem in stems.items()
                 if f"recordings/{stem}.rrd" not in lacking]
 
-    links = linked({f"{scenario}, {planner}": stem for (scenario, planner), stem in content.stems.items()})
+    links = linked({f"{scenario}, {shown.of(scenario, planner)}": stem
+                    for (scenario, planner), stem in content.stems.items()})
     reacting = linked({f"{scenario}, {planner}, {policy} on {news} news": stem
                        for (scenario, planner, policy, news), stem in content.reaction_stems.items()})
     parts = [heading("Recordings")]

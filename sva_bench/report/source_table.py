@@ -4,20 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
+from sva_bench.choices import SourceName
 from sva_bench.report.page import heading, note, table
+from sva_bench.report.wording import listed
 
 SOURCES_HEAD = ("scenario", "plan", "source", "value", "route times [s]")
+
+_MOST_NAMED = 3
 
 Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
 
 def source_rows(scenarios: Scenarios) -> list[list[str]]:
-    """A row for each scenario, plan and source, the largest effect first; none without noise."""
-    return [[scenario.name, name, source, _signed(effect.incentive), _signed(effect.seconds)]
-            for scenario in scenarios for name, plan in scenario.plans.items()
-            for source, effect in sorted(plan.sources.items(), key=lambda item: (
-                item[0] == "interplay", -abs(item[1].incentive), -abs(item[1].seconds)))]
+    """A row for each scenario, plan and source; none without noise.
+
+    The sources of a scenario stand in the same order under each plan: by their effects on all of them, largest first.
+    """
+    return [[scenario.name, shown_name(scenario, name), source, _signed(plan.sources[source].incentive),
+             _signed(plan.sources[source].seconds)]
+            for scenario in scenarios for order in [_largest_first(scenario)]
+            for name, plan in scenario.plans.items() for source in order if source in plan.sources]
+
+
+def _largest_first(scenario: ScenarioSummary | ComparedScenario) -> list[SourceName]:
+    """Sources by their effects over plans, as a sum of sizes: what helps one plan and harms another is no small one."""
+    sizes: dict[SourceName, tuple[float, float]] = {}
+    for plan in scenario.plans.values():
+        for source, effect in plan.sources.items():
+            incentive, seconds = sizes.get(source, (0.0, 0.0))
+            sizes[source] = incentive + abs(effect.incentive), seconds + abs(effect.seconds)
+    return sorted(sizes, key=lambda source: (source == "interplay", *(-size for size in sizes[source])))
 
 
 def _signed(figure: float) -> str:
@@ -29,7 +47,7 @@ def source_section(scenarios: Scenarios) -> list[str]:
     rows = source_rows(scenarios)
     if not rows:
         return []
-    return [heading("What each source of noise did"), note(_sentence(scenarios)),
+    return [heading("What each source of noise did"), note(costliest(scenarios)),
             table(SOURCES_HEAD, rows, words=(0, 1, 2)),
             note("Value: with the source less without it, in the same trials and noise draws, by the noisy twin; of "
                  "contact, floors and payload, executed less by the twin. Interplay: what is due to no source by "
@@ -37,12 +55,28 @@ def source_section(scenarios: Scenarios) -> list[str]:
                  "team's routes take, driven whole, waits included.")]
 
 
-def _sentence(scenarios: Scenarios) -> str:
-    """The source that costs most, of all plans."""
-    costs = [(effect.incentive, source, name, scenario.name) for scenario in scenarios
-             for name, plan in scenario.plans.items() for source, effect in plan.sources.items()
-             if source != "interplay"]
-    if not costs or min(costs)[0] >= 0:
+def costliest(scenarios: Scenarios) -> str:
+    """The source that costs most, of all plans; of those that are equal as printed, each."""
+    costs = [(effect.incentive, source, f"the {shown_name(scenario, name)} plan in {scenario.name}")
+             for scenario in scenarios for name, plan in scenario.plans.items()
+             for source, effect in plan.sources.items() if source != "interplay"]
+    most = _signed(min((cost for cost, _, _ in costs), default=0.0))
+    if not most.startswith("-"):
         return "No source of noise by itself costs any plan anything."
-    cost, source, plan, scenario = min(costs)
-    return f"By itself, {source} costs most: {-cost:.1f} of the {plan} plan in {scenario}."
+    where: dict[str, list[str]] = {}
+    for cost, source, plan in costs:
+        if _signed(cost) == most:
+            where.setdefault(source, []).append(plan)
+    if len(where) == 1:
+        ((alone, plans),) = where.items()
+        return f"By itself, {alone} costs most: {most[1:]} of {_listed(plans)}."
+    if len({tuple(plans) for plans in where.values()}) == 1:
+        plans = next(iter(where.values()))
+        return f"By themselves, {listed(list(where))} cost most, as much as each other: {most[1:]} of {_listed(plans)}."
+    told = listed([f"{source} ({_listed(plans)})" for source, plans in where.items()])
+    return f"By themselves, {told} cost most, as much as each other: {most[1:]}."
+
+
+def _listed(plans: list[str]) -> str:
+    left = len(plans) - _MOST_NAMED
+    return listed(plans if left <= 0 else [*plans[:_MOST_NAMED], f"{left} more"])

@@ -247,7 +247,7 @@ def _best_of(curve: Sequence[Tried], target: Target) -> int:
     """Of equals the first: the plan of greatest executed value, or that which goes wrong most seldom."""
     if target == "best":
         return max(range(len(curve)), key=lambda k: (curve[k].executed, -k))
-    leaving = [k for k, tried in enumerate(curve) if tried.promised > 0] or [0]
+    leaving = [k for k, tried in enumerate(curve) if not tried.nobody_leaves] or [0]
     return min(leaving, key=lambda k: (curve[k].bad.share, -curve[k].executed, k))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,13 @@ import pytest
 
 import sva_bench as sb
 from sva_bench.__main__ import run_command_line
+from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
+from sva_bench.analysis.over_maps import UnitSummary
+from sva_bench.analysis.results import Share
 from sva_bench.batch.sweep import Sweep, grid_of, sweep_of
 from sva_bench.errors import BadFile
+from sva_bench.report.calibration_over_maps import calibrated_over_maps
+from tests.results_for_tests import figures, unit
 from tests.worlds_for_tests import SMALL
 
 TIGHT = SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 30").replace("mission_limit_s: 120",
@@ -45,7 +51,7 @@ def test_a_unit_has_the_calibrated_plan_of_a_run(folder: Path) -> None:
         assert executed == pytest.approx(alone[scenario["name"]]["plans"]["calibrated"]["executed"]["mean"])
 
 
-def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path) -> None:
+def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     units = summary_in(folder / "done")["units"]
     assert [s["calibration"] for s in units[0]["scenarios"]] == [s["calibration"] for s in units[1]["scenarios"]]
     assert len(list((folder / "cache").glob("*/plans/*/*"))) == 1
@@ -53,6 +59,7 @@ def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path) -> None:
     assert run_command_line(["batch", str(folder / "world.yaml"), *QUICK, "--seed", "0-1", "--calibrate", "5%",
                              "--cache", str(folder / "cache"), "--out", str(folder / "again")]) == 0
     assert {path: path.stat().st_mtime_ns for path in (folder / "cache").glob("*/plans/*/*")} == before
+    assert "half: calibrated for at most 5 % of missions" in capsys.readouterr().out
     assert (folder / "again" / "summary.json").read_bytes() == (folder / "done" / "summary.json").read_bytes()
 
 
@@ -79,3 +86,30 @@ def test_an_option_that_is_no_share_ends_with_2(folder: Path, capsys: pytest.Cap
     for command in ("run", "batch"):
         assert run_command_line([command, str(folder / "world.yaml"), "--calibrate", "1"]) == 2
         assert "--calibrate 1: expected the share of missions" in capsys.readouterr().err
+
+
+def calibrated(world: str, promised: float, *, reached: bool = True, share: float | None = 0.01) -> UnitSummary:
+    """A map on which the nominal plan promises 100."""
+    bad = Share(share=0.0, ci95=(0.0, 0.004))
+    nominal, chosen = (PlanJudged(promised=value, executed=value, bad=bad) for value in (100.0, promised))
+    found = Calibration(
+        share=share, quantile=0.9, factor=1.0, **vars(chosen), nominal=nominal, reached=reached, draws=1000,
+        curve=(Tried(**vars(chosen), quantile=0.9, factor=1.0, draws=1000),))
+    whole = unit(world, 100.0)
+    return replace(whole, scenarios=tuple(replace(
+        scenario, calibration=found, plans={**scenario.plans, "calibrated": figures(promised)})
+        for scenario in whole.scenarios))
+
+
+def test_a_line_of_each_scenario_says_where_the_share_is_reached_and_the_price() -> None:
+    # The price is of worlds that reach the share: (20 + 10) / 2; a seed more of one counts for nothing.
+    assert calibrated_over_maps([calibrated("a", 80.0), calibrated("b", 90.0), calibrated("b", 90.0),
+                                 calibrated("c", 10.0, reached=False)]) == [
+        "S: calibrated for at most 1 % of missions that go wrong: reached in 2 of 3 worlds, where plans promise 15 % "
+        "less than nominal ones on average. Share not reached in c: the plans shown there are not calibrated."]
+    (line,) = calibrated_over_maps([calibrated("a", 80.0, reached=False)])
+    assert "reached in 0 of 1 world. Share not reached in a" in line
+    (line,) = calibrated_over_maps([calibrated("a", 100.0, share=None)])
+    assert line == ("S: calibrated for the greatest executed value in 1 world, where plans promise as much as nominal "
+                    "ones.")
+    assert calibrated_over_maps([unit("a", 100.0)]) == []

@@ -162,7 +162,7 @@ def test_a_run_has_the_calibrated_plan_beside_the_others_and_says_what_came_of_i
         assert list(scenario.plans) == ["stochastic", "deterministic", "calibrated"]
         assert scenario.calibration is not None
         assert scenario.plans["calibrated"].promised == scenario.calibration.promised
-    lines = calibration_lines(summary.scenarios)
+    lines = calibration_lines(summary)
     assert [line.split(":")[0] for line in lines] == [scenario.name for scenario in summary.scenarios]
     assert all("2 %" in line for line in lines)
     assert sum(row[-1] == "chosen" for row in curve_rows(summary.scenarios)) == len(summary.scenarios)

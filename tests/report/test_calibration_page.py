@@ -1,0 +1,139 @@
+"""What page and terminal say of calibrated plans, above all of those that are not."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
+from sva_bench.analysis.plan_names import shown_over
+from sva_bench.analysis.results import Share
+from sva_bench.analysis.summaries import Summary
+from sva_bench.cli.tables import print_summary
+from sva_bench.report import charts
+from sva_bench.report.calibration_page import against_nominal, calibration_lines, curve_rows
+from sva_bench.study.options import Options
+from sva_bench.study.run import run
+from sva_bench.world.noise import Noise, People
+from tests.results_for_tests import plan_result, summary
+from tests.worlds_for_tests import SMALL, world_of
+
+MARKED = "calibrated (share not reached)"
+NAMED_PLAINLY = re.compile(r"(?<!not )(?<!half-)(?<!safe-)\bcalibrated\b(?! \(share not reached)")
+"""Not of plans: that one is not calibrated, and the files of recordings."""
+
+
+def judged(promised: float, bad: float) -> PlanJudged:
+    return PlanJudged(promised=promised, executed=promised * (1 - bad),
+                      bad=Share(share=bad, ci95=(bad / 2, min(1.0, bad + 0.004))))
+
+
+def run_of(*curve: tuple[float, float], chosen: int, reached: bool, executed_bad: float = 0.0) -> Summary:
+    """A run of one scenario, for at most 1 %: what each plan of the curve promises, and how often it goes wrong."""
+    tried = [Tried(**vars(judged(*one)), quantile=0.5 + 0.01 * k if k else None, factor=1.0, draws=1000)
+             for k, one in enumerate(curve)]
+    found = Calibration(**vars(judged(*curve[chosen])), share=0.01, quantile=tried[chosen].quantile, factor=1.0,
+                        nominal=judged(*curve[0]), curve=tuple(tried), reached=reached, draws=1000)
+    whole = summary((10.0, 20.0), 100.0, rollouts=32)
+    (scenario,) = whole.scenarios
+    plan = replace(plan_result(curve[chosen][0]), bad=Share(share=executed_bad, ci95=None))
+    return replace(whole, scenarios=(replace(
+        scenario, plans={**scenario.plans, "calibrated": plan}, calibration=found),))
+
+
+@pytest.fixture(scope="module")
+def missed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+    """A run in which no costs reach the share: half of all metres have somebody in the way for long."""
+    place = tmp_path_factory.mktemp("missed")
+    world = replace(world_of(place, SMALL), noise=Noise(people=People(per_m=0.5, stop_s=200.0)))
+    done = run(world, Options(trials=16, rollouts=4, fidelity="kinematic", calibrate=0.02), place, None,
+               lambda *_: None)
+    assert isinstance(done.summary, Summary)
+    return done.folder, done.summary
+
+
+def test_a_plan_that_missed_its_share_is_marked_wherever_it_is_named(
+    missed: tuple[Path, Summary], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, found = missed
+    page = (folder / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    assert page.count(MARKED) > 20  # legends, answer, and a row or more in each table of plans
+    assert NAMED_PLAINLY.findall(page) == []
+    print_summary(found, wide=True)
+    assert MARKED in (said := capsys.readouterr().out)
+    # A narrow table breaks the name before its mark, so what counts here are the sentences.
+    assert NAMED_PLAINLY.findall(" ".join(line.strip() for line in said.splitlines() if "│" not in line)) == []
+
+
+def test_a_plan_in_which_nobody_leaves_is_said_not_to_count() -> None:
+    found = run_of((100.0, 0.5), (80.0, 0.1), (0.0, 0.0), chosen=1, reached=False)
+    (line,) = calibration_lines(found)
+    assert "most seldom of the plans in which somebody leaves the base (one in which nobody does doesn't count)" in line
+    assert [row[-1] for row in curve_rows(found.scenarios)] == [
+        "", "shown, not calibrated", "nobody leaves: doesn't count"]
+    (without,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.1), chosen=1, reached=False))
+    assert "somebody leaves" not in without
+
+
+def test_each_share_is_said_to_be_the_twins_or_executed_and_why_they_differ() -> None:
+    above = run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=1 / 32)
+    (line,) = calibration_lines(above)
+    assert "by the twin, under 1000 draws of its own, 0.0 % [0.0, 0.4] of missions go wrong" in line
+    assert "Executed, 3.1 % of missions go wrong, more than the 1 % asked for: one bad draw of 32 is 3.1 %" in line
+    assert "physics" not in line  # which these missions have none of
+    (line,) = calibration_lines(replace(above, fidelity="rollout", rollouts=1000))
+    assert "asked for: physics does what the twin doesn't see." in line
+    (line,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=0.01))
+    assert "Executed" not in line
+
+
+def test_the_answer_says_what_the_calibrated_plan_promises_and_earns_against_the_nominal_one() -> None:
+    def said(*curve: tuple[float, float], chosen: int, reached: bool) -> str:
+        return against_nominal(run_of(*curve, chosen=chosen, reached=reached).scenarios[0])
+
+    assert said((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True) == (
+        "The calibrated plan promises 80.0 in place of the nominal plan's 100.0, and earns, executed, 80.0 in place of "
+        "100.0.")
+    assert said((100.0, 0.5), (80.0, 0.2), chosen=1, reached=False).startswith(
+        "The share asked for, 1 %, is not reached; the plan shown in its place promises 80.0")
+    assert said((100.0, 0.0), chosen=0, reached=True) == "The nominal plan is the calibrated one."
+    assert "is not reached" in said((100.0, 0.5), chosen=0, reached=False)
+    assert against_nominal(summary((10.0, 20.0), 100.0).scenarios[0]) == ""
+
+
+def test_the_answer_of_the_page_says_that_the_share_was_not_reached(missed: tuple[Path, Summary]) -> None:
+    folder, found = missed
+    page = (folder / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    box = page[page.index("<div class=answer>"):page.index("</div>")]
+    assert box.count("The share asked for, 2 %, is not reached") == len(found.scenarios)
+
+
+def test_a_curve_shows_what_is_promised_where_the_same_is_executed() -> None:
+    # Whatever lies on top is thinner and broken, so that the line below shows beside it and through it.
+    found = run_of((100.0, 0.0), (80.0, 0.0), chosen=1, reached=True).scenarios[0].calibration
+    assert found is not None
+    lines = [style for style in re.findall(r'style="([^"]*)"', charts.calibration_curve("S", found))
+             if "fill: none" in style and ("stroke: #0072b2" in style or "stroke: #e69f00" in style)]
+    below, above = lines[0], next(style for style in lines if "#e69f00" in style)
+    assert "#0072b2" in below
+    assert width_of(below) > 2 * width_of(above)
+    assert "stroke-dasharray" in above
+    assert "stroke-dasharray" not in below
+
+
+def width_of(style: str) -> float:
+    found = re.search(r"stroke-width: ([0-9.]+)", style)
+    return 1.0 if found is None else float(found[1])
+
+
+def test_a_legend_says_in_which_scenarios_a_share_is_not_reached() -> None:
+    (no,), (yes,) = (run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=reached).scenarios
+                     for reached in (False, True))
+    assert shown_over([no, no], "calibrated") == MARKED
+    assert shown_over([yes, no], "calibrated") == "calibrated (share not reached in S)"
+    assert shown_over([yes, no, no, no], "calibrated") == "calibrated (share not reached in 3 of 4 scenarios)"
+    assert shown_over([yes, yes], "calibrated") == "calibrated"
+    assert shown_over([no], "stochastic") == "stochastic"
