@@ -119,10 +119,7 @@ class Bullet:
 
     def pose(self) -> tuple[float, float, float]:
         """x, y [m], yaw [rad]."""
-        place, turned = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
-        if self._axle is not None:  # else the base is its centre of mass
-            place, turned = pybullet.multiplyTransforms(place, turned, *self._axle)
-        (x, y, _), (qx, qy, qz, qw) = place, turned
+        (x, y, _), (qx, qy, qz, qw) = self._axle_placed()
         if not (1 - 2 * (qx * qx + qy * qy) > _UPRIGHT and math.isfinite(x + y + qz + qw)):  # NaN is not greater
             self.tipped_over = True
             return self._last
@@ -131,11 +128,15 @@ class Bullet:
 
     def tilt_rad(self) -> float:
         """Angle between the robot's upright axis and the vertical: some milliradians, unless it tips over."""
-        place, turned = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
-        if self._axle is not None:
-            place, turned = pybullet.multiplyTransforms(place, turned, *self._axle)
-        qx, qy, _, _ = turned
+        _, (qx, qy, _, _) = self._axle_placed()
         return math.acos(max(-1.0, 1 - 2 * (qx * qx + qy * qy)))
+
+    def _axle_placed(self) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+        """Place of the middle of the axle [m], and the robot's orientation as a quaternion."""
+        place, turned = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
+        if self._axle is not None:  # else the base is its centre of mass
+            place, turned = pybullet.multiplyTransforms(place, turned, *self._axle)
+        return place, turned
 
     def step(self, left_m_s: float, right_m_s: float) -> None:
         """Advance by one control step."""
