@@ -1,0 +1,1 @@
+"""Robots that share one world: the order in which they pass where only one can be."""

@@ -1,0 +1,189 @@
+"""A plan in space and time of which only the order is kept: who passes first, wherever two robots can't be at once.
+
+Robots are planned one after the other, each at its earliest among those before it, for several orders of priority. The
+order of the plan with the least robot time is kept: every constraint agrees with that plan's times, so no robots wait
+for each other in a circle, however late they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from random import Random
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.execution.shared.conflicts import Runs, Strips, runs_of, strips_of
+from sva_bench.execution.shared.earliest import plan_earliest
+from sva_bench.execution.shared.lanes import Itinerary, Lane, Order
+
+_ALL_ORDERS = 4  # robots up to which every order of priority is tried,
+_ORDERS = 24  # beyond which so many are
+_SAVED_S = 1e-6  # what a later order must save to be preferred: less is rounding
+
+
+def plan_order(itineraries: Sequence[Itinerary], gap_m: float) -> Order | None:
+    """The order of the plan with the least robot time: the sum of when the robots' last stops end.
+
+    Among plans of equal sum the first order of priority counts, by the robots' numbers. A robot holds its first cell
+    from the beginning, before it is ready too, and its last one for good; a robot without legs holds its place always.
+
+    Args:
+        itineraries: What each robot has yet to drive, at least one.
+        gap_m: Least gap between two hulls in the middle of their cells [m]; smaller by ``STILL_M`` to a robot without
+            legs.
+
+    Returns:
+        The order; ``None`` if no order of priority tried has a plan.
+    """
+    strips = strips_of(itineraries)
+    search = _Search(itineraries, strips, runs_of(itineraries, strips, gap_m))
+    plan = search.best()
+    return None if plan is None else _order_of(itineraries, search, plan)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Plan:
+    """A plan of all robots.
+
+    Attributes:
+        chosen: Which ways are driven, shape (ways,).
+        enter, leave: When each of their cells is entered and left [s], shape (cells,).
+        ends: When each robot's last stop ends [s], shape (robots,).
+    """
+
+    chosen: BoolArray
+    enter: FloatArray
+    leave: FloatArray
+    ends: FloatArray
+
+
+class _Search:
+    """The search for the best order of priority, with plans of common beginnings made once."""
+
+    def __init__(self, itineraries: Sequence[Itinerary], strips: Strips, runs: Runs) -> None:
+        self.strips, self.runs = strips, runs
+        self._ready = [itinerary.ready_s for itinerary in itineraries]
+        self._driving = [number for number, itinerary in enumerate(itineraries) if itinerary.legs]
+        self._chosen = np.zeros(len(strips.robot), dtype=np.bool_)
+        self._enter, self._leave = np.zeros(len(strips.place_m)), np.zeros(len(strips.place_m))
+        self._ends = np.array(self._ready)
+        for number, itinerary in enumerate(itineraries):
+            if not itinerary.legs:
+                way = strips.leg[strips.legs[number]]
+                self._chosen[way] = True
+                self._enter[strips.first[way]], self._leave[strips.first[way]] = -math.inf, math.inf
+
+    def best(self) -> _Plan | None:
+        """The plan of the best order of priority; ``None`` if none has one."""
+        # With nobody else driving a robot is as early as in any plan.
+        alone = {}
+        for number in self._driving:
+            alone[number] = self._plan(number)
+            self._drop(number)
+        best, least, planned = None, math.inf, list[int]()
+        for order in _orders(self._driving):
+            common = 0
+            while common < len(planned) and planned[common] == order[common]:
+                common += 1
+            for number in planned[common:]:
+                self._drop(number)
+            planned = list(order[:common])
+            for number in order[common:]:
+                total = sum(alone[n] if n not in planned else float(self._ends[n]) for n in self._driving)
+                if total >= least - _SAVED_S:
+                    break
+                if not math.isfinite(self._plan(number)):
+                    break
+                planned.append(number)
+            if len(planned) < len(order):
+                continue
+            total = sum(float(self._ends[n]) for n in self._driving)
+            if total < least - _SAVED_S:
+                least = total
+                best = _Plan(chosen=self._chosen.copy(), enter=self._enter.copy(), leave=self._leave.copy(),
+                             ends=self._ends.copy())
+        return best
+
+    def _plan(self, number: int) -> float:
+        """Plan a robot among those planned; its end [s], ``inf`` if there is no way for it."""
+        strips, runs = self.strips, self.runs
+        ways = strips.leg[strips.legs[number]:strips.legs[number + 1] + 1]
+        self._ends[number] = plan_earliest(
+            ways, strips.first, strips.lasts_s, self._ready[number], runs.start, runs.way, runs.low, runs.high,
+            self._chosen, self._enter, self._leave)
+        return float(self._ends[number])
+
+    def _drop(self, number: int) -> None:
+        """Take a robot out of those planned."""
+        legs = self.strips.legs
+        self._chosen[self.strips.leg[legs[number]]:self.strips.leg[legs[number + 1]]] = False
+
+
+def _orders(numbers: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    """Orders of priority to try: all of few robots, else a fixed choice, sorted so that neighbours begin alike."""
+    if len(numbers) <= _ALL_ORDERS:
+        yield from permutations(numbers)
+        return
+    draws, tried = Random(0), {tuple(numbers), tuple(reversed(numbers))}
+    while len(tried) < _ORDERS:
+        tried.add(tuple(draws.sample(list(numbers), len(numbers))))
+    yield from sorted(tried)
+
+
+def _order_of(itineraries: Sequence[Itinerary], search: _Search, plan: _Plan) -> Order:
+    """The lanes of a plan, and what each robot must wait for."""
+    strips, runs = search.strips, search.runs
+    # Number of each chosen cell in its robot's lane.
+    number = np.zeros(len(strips.place_m), dtype=np.int64)
+    lanes, cells = [], []
+    for robot, itinerary in enumerate(itineraries):
+        legs = range(strips.legs[robot], strips.legs[robot + 1])
+        ways = [next(way for way in range(strips.leg[leg], strips.leg[leg + 1]) if plan.chosen[way]) for leg in legs]
+        mine = np.concatenate([np.arange(strips.first[way], strips.first[way + 1]) for way in ways])
+        number[mine] = np.arange(len(mine))
+        sizes = [int(strips.first[way + 1] - strips.first[way]) for way in ways] if itinerary.legs else []
+        enter = plan.enter[mine]
+        enter[0] = itinerary.ready_s
+        cuts = tuple(itinerary.legs[k][way - strips.leg[leg]] for k, (leg, way) in enumerate(
+            zip(legs, ways, strict=True))) if itinerary.legs else ()
+        lanes.append(Lane(cuts=cuts, first_cell=np.cumsum([0, *sizes]) if cuts else np.array([1]), enter_s=enter,
+                          place_m=strips.place_m[mine]))
+        cells.append(mine)
+    needs = tuple(tuple(row) for row in (
+        _needs(mine, len(itineraries), number, strips.robot, runs.start, runs.way, runs.low, runs.high, plan.chosen,
+               plan.enter) for mine in cells))
+    return Order(lanes=tuple(lanes), needs=needs, ends_s=plan.ends)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _needs(
+    mine: IntArray, robots: int, number: IntArray, robot: IntArray, start: IntArray, way: NDArray[np.int32],
+    low: NDArray[np.int32], high: NDArray[np.int32], chosen: BoolArray, enter: FloatArray,
+) -> IntArray:
+    """The cell of each robot's lane that it must have entered before this one may enter a cell, shape (robots, cells).
+
+    Args:
+        mine: Cells of this robot's lane.
+        robots: Number of robots.
+        number: Number of each cell in its robot's lane.
+        robot: Robot of each way.
+        start, way, low, high: ``Runs``.
+        chosen: Which ways are driven.
+        enter: When each cell is entered [s].
+    """
+    needs = np.zeros((robots, len(mine)), dtype=np.int64)
+    for a in range(len(mine)):
+        if a > 0:
+            needs[:, a] = needs[:, a - 1]
+        for run in range(start[mine[a]], start[mine[a] + 1]):
+            # A run lies wholly before this robot's stay in the cell, or wholly after it.
+            if chosen[way[run]] and enter[low[run]] < enter[mine[a]]:
+                j = robot[way[run]]
+                needs[j, a] = max(needs[j, a], number[high[run]] + 1)
+    return needs
