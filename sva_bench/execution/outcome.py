@@ -321,10 +321,10 @@ def trace_of(
         time, pose = np.append(time, outcome.end_time_s), np.append(pose, pose[-1:], axis=0)
         fuel = np.append(fuel, 0.0 if outcome.end == "out_of_fuel" else fuel[-1])
     return Trace(orders=orders, outcome=replace(outcome, events=_retold(outcome.events, met)), time_s=time, pose=pose,
-                 fuel_s=fuel, planned=planned, believed=_believed(pose, waves))
+                 fuel_s=fuel, planned=planned, believed=believed(pose, waves))
 
 
-def _believed(pose: FloatArray, waves: FloatArray) -> FloatArray:
+def believed(pose: FloatArray, waves: FloatArray) -> FloatArray:
     """Where a robot believes to be, shape (n, 2); nothing without an error."""
     parts = room_for(waves)
     errors = [error_at(waves, parts, x, y)[:2] for x, y, _ in pose.tolist()] if parts.size else []

@@ -57,6 +57,7 @@ class RobotMission:
         fuel_s: Fuel burnt [s of driving].
         tank_s: Fuel left in the tank [s of driving, of a tank that holds what it should].
         end: How it ended; ``None`` as long as it goes on.
+        kept_off: Who stands in its way to a stop that it leaves out, so that it ends ``stuck`` although it comes home.
     """
 
     def __init__(self, orders: Assignment, fate: RobotFate = _SURE, *, start_s: float = 0.0) -> None:
@@ -67,6 +68,7 @@ class RobotMission:
         self.pois = self.stops = self.contacts = 0
         self.end: End | None = None
         self._late = self._lost = False
+        self.kept_off = ""
         self._events: list[Event] = []
         self.site = orders.route[0] if orders.route else ""
         self.ahead = orders.route[1:]
@@ -88,6 +90,16 @@ class RobotMission:
             if not stops:
                 self._ends("home", self.site)
 
+    @property
+    def fails_on_leaving(self) -> bool:
+        """Whether it is drawn to fail on leaving its last stop for the next."""
+        return self.end is None and self.orders.is_poi(self.ahead[0]) and self.pois + 1 == self.fate.before_poi
+
+    @property
+    def burnt_s(self) -> float:
+        """Fuel burnt since its tank was filled [s of driving]."""
+        return self.fuel_s - self._filled_at_s
+
     def depart(self) -> str | None:
         """Set off for the next stop, at an epoch: the stop, or ``None`` if the mission is over.
 
@@ -95,7 +107,7 @@ class RobotMission:
         """
         if self.end is not None:
             return None
-        if self.orders.is_poi(self.ahead[0]) and self.pois + 1 == self.fate.before_poi:
+        if self.fails_on_leaving:
             self._ends("failed", self.site, lost=True)
             return None
         return self.ahead[0]
@@ -167,7 +179,7 @@ class RobotMission:
         self._tell("arrived", site)
         if site in self.orders.stations:
             rate = self.orders.charge_rate.get(site, math.inf)
-            self.clock_s += self.orders.stop_s[site] + (self.fuel_s - self._filled_at_s) / rate
+            self.clock_s += self.orders.stop_s[site] + self.burnt_s / rate
         elif not self.ahead:
             self.clock_s += self.orders.stop_s[site]
         elif not self._idles(self.orders.stop_s[site], capacity):
@@ -182,7 +194,9 @@ class RobotMission:
             self._tell("refuelled", site)
         elif self.orders.is_poi(site):
             self._collect(site)
-        if not self.ahead:
+        if not self.ahead and self.kept_off and not self._late:
+            self._ends("stuck", site, what=self.kept_off)
+        elif not self.ahead:
             self._ends("late" if self._late else "home", site)
 
     def _collect(self, site: str) -> None:

@@ -1,0 +1,238 @@
+"""Plans of robots that share a world executed: each distinct mission once, whole teams at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass
+
+import numpy as np
+
+from sva_bench.choices import Fidelity
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.execute import Executed, LegTime, orders_of, planned_legs
+from sva_bench.execution.fate import draw_fate
+from sva_bench.execution.margins import Margins, margins_of
+from sva_bench.execution.noise import draw_noise
+from sva_bench.execution.outcome import Assignment, RobotFate, Trace
+from sva_bench.execution.shared.drive import drive_team
+from sva_bench.execution.shared.planning import first_order
+from sva_bench.execution.shared.players import TeamDriven
+from sva_bench.execution.shared.trace import leg_times, traces_of
+from sva_bench.execution.shared.truncation import cut_off
+from sva_bench.execution.shared.own_ways import Ways
+from sva_bench.execution.settling import figures_of, left_by_draws
+from sva_bench.mission.failures import NEVER, process_of
+from sva_bench.mission.plan import Route
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import World
+
+_CHUNK = 32  # missions that a worker plays at a time, of one plan and one set of robots that leave
+
+MissionKey = tuple[tuple[Route, ...], tuple[RobotFate, ...], int]
+"""Routes and fates of all robots, and the noise draw: what a mission depends on in a world."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TeamTask:
+    """Missions of one plan from which the same robots leave: all that a worker needs.
+
+    Attributes:
+        world, costs: The world and its fuel costs, by robot.
+        orders: The robots' orders.
+        keys: The missions.
+        traced: Whether poses are kept, by mission.
+        seed, fidelity: As of the settings.
+    """
+
+    world: World
+    costs: Mapping[str, FuelCosts]
+    orders: tuple[Assignment, ...]
+    keys: tuple[MissionKey, ...]
+    traced: tuple[bool, ...]
+    seed: int
+    fidelity: Fidelity
+
+
+def play_missions(task: TeamTask) -> tuple[TeamDriven, ...]:
+    """Play the missions of a task."""
+    world, ways = task.world, Ways(task.world, task.costs)
+    _, fates, _ = task.keys[0]
+    leaves = [fate.before_poi > 0 and bool(own.route) for fate, own in zip(fates, task.orders, strict=True)]
+    order = first_order(ways, task.orders, leaves) if world.interaction == "shared" else None
+    played = []
+    for (_, own, rollout), traced in zip(task.keys, task.traced, strict=True):
+        drawn = [draw_noise(world.noise, task.seed, rollout, number) for number in range(len(world.robots))]
+        played.append(drive_team(world, ways, task.orders, own, drawn, order, (task.seed, rollout), task.fidelity,
+                                 traced=traced))
+    return tuple(played)
+
+
+def execute_team(
+    world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings,
+    executor: Executor | None, progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven],
+) -> list[Executed]:
+    """Execute plans over all trials, as ``execute`` does for robots that don't meet.
+
+    A mission depends on who fails when: it is played once for each distinct set of fates and noise draw. Where it shows
+    in the mission without failures that a failure touches nobody else, the robot's own mission is cut off there.
+
+    Args:
+        world, costs, cases, settings, executor, progress: As of ``execute``.
+        known: Missions played already; what is played now is added.
+    """
+    planned, ways = planned_legs(world, costs, cases), Ways(world, costs)
+    teams = [_Team(world, ways, case, orders_of(world, case, planned), settings) for case in cases]
+    _play_all(world, costs, settings, [(team.orders, key, traced) for team in teams
+                                       for key, traced in team.unfailed().items()], executor, progress, known)
+    _play_all(world, costs, settings, [(team.orders, key, traced) for team in teams
+                                       for key, traced in team.failed(known).items()], executor, progress, known)
+    return [team.executed(costs, known) for team in teams]
+
+
+def _play_all(
+    world: World, costs: Mapping[str, FuelCosts], settings: Settings,
+    wanted: Sequence[tuple[Sequence[Assignment], MissionKey, bool]], executor: Executor | None,
+    progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven],
+) -> None:
+    """Play missions that are not known yet."""
+    groups: dict[tuple[object, ...], dict[MissionKey, bool]] = {}
+    orders_of_routes: dict[tuple[Route, ...], Sequence[Assignment]] = {}
+    for orders, key, traced in wanted:
+        if key not in known or (traced and not known[key].traced):
+            routes, fates, _ = key
+            orders_of_routes[routes] = orders
+            group = groups.setdefault((routes, tuple(fate.before_poi == 0 for fate in fates)), {})
+            group[key] = group.get(key, False) or traced
+    tasks = []
+    for (routes, _), group in groups.items():
+        keys = list(group)
+        for first in range(0, len(keys), _CHUNK):
+            mine = tuple(keys[first:first + _CHUNK])
+            tasks.append(TeamTask(world=world, costs=costs, orders=tuple(orders_of_routes[routes]), keys=mine,
+                                  traced=tuple(group[key] for key in mine), seed=settings.seed,
+                                  fidelity=settings.fidelity))
+    count, of = 0, sum(len(task.keys) for task in tasks)
+    for task, played in _played(tasks, executor):
+        known.update(zip(task.keys, played, strict=True))
+        count += len(played)
+        if progress:
+            progress(count, of)
+
+
+def _played(tasks: Sequence[TeamTask], executor: Executor | None
+            ) -> Iterator[tuple[TeamTask, tuple[TeamDriven, ...]]]:
+    """Tasks with what came of them, here or by workers, as they are done."""
+    if executor is None:
+        for task in tasks:
+            yield task, play_missions(task)
+        return
+    futures = {executor.submit(play_missions, task): task for task in tasks}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+class _Team:
+    """The trials of one case."""
+
+    def __init__(self, world: World, ways: Ways, case: Case, orders: Sequence[Assignment], settings: Settings) -> None:
+        self.orders = orders
+        self._world, self._ways, self._case, self._settings = world, ways, case, settings
+        self._routes = tuple(own.route for own in orders)
+        self._fate = draw_fate(world, case.scenario, [sum(o.is_poi(s) for s in o.route) for o in orders], settings)
+        self._fates = [tuple(self._fate.of(row, number) for number in range(len(orders)))
+                       for row in range(settings.trials)]
+
+    def unfailed(self) -> dict[MissionKey, bool]:
+        """Every trial's mission if no robot fails on its way, and whether its poses are kept."""
+        found: dict[MissionKey, bool] = {}
+        for row in range(self._settings.trials):
+            found.setdefault(self._unfailed(row), self._traced(row))
+        return found
+
+    def failed(self, known: Mapping[MissionKey, TeamDriven]) -> dict[MissionKey, bool]:
+        """Missions that failures on the way make another than they'd be without, and whether poses are kept."""
+        found: dict[MissionKey, bool] = {}
+        for row in range(self._settings.trials):
+            if self._key(row) != self._unfailed(row) and self._cut_off(row, known) is None:
+                found.setdefault(self._key(row), self._traced(row))
+        return found
+
+    def _traced(self, row: int) -> bool:
+        return self._settings.recorded and row == 0
+
+    def _key(self, row: int) -> MissionKey:
+        return self._routes, self._fates[row], int(self._fate.rollout[row])
+
+    def _unfailed(self, row: int) -> MissionKey:
+        """The mission of a trial if no robot fails on its way."""
+        return self._routes, tuple(RobotFate(0 if fate.before_poi == 0 else NEVER) for fate in self._fates[row]), \
+            int(self._fate.rollout[row])
+
+    def _cut_off(self, row: int, known: Mapping[MissionKey, TeamDriven]) -> TeamDriven | None:
+        """The mission without failures, cut off by those of a trial; ``None`` if they touch another robot."""
+        whole = known[self._unfailed(row)]
+        if row == 0 and self._settings.recorded:  # it is shown
+            return None
+        return cut_off(self._ways, self.orders, whole, self._fates[row])
+
+    def executed(self, costs: Mapping[str, FuelCosts], known: Mapping[MissionKey, TeamDriven]) -> Executed:
+        """What came of the trials."""
+        found: dict[MissionKey, tuple[int, TeamDriven]] = {}
+        kind = np.zeros(self._settings.trials, dtype=np.int64)
+        for row in range(self._settings.trials):
+            key = self._key(row)
+            if key not in found:
+                mission = known[key] if key in known else self._cut_off(row, known)
+                assert mission is not None
+                found[key] = row, mission
+            kind[row] = list(found).index(key)
+        distinct = [mission for _, mission in found.values()]
+        columns = [figures_of([mission.robots[number] for mission in distinct]) for number in range(len(self.orders))]
+        figures = {name: np.column_stack([column[name] for column in columns])[kind] for name in columns[0]}
+        fate, case, world = self._fate, self._case, self._world
+        drawn = [left_by_draws(o, fate.fails[:, k], fate.lifetime_s[:, k]) for k, o in enumerate(self.orders)]
+        robots = tuple(robot.name for robot in world.robots)
+        return Executed(
+            case=case, robots=robots, rollout=fate.rollout,
+            planned_incentive=np.array([sum(o.incentives.get(s, 0.0) for s in o.route) for o in self.orders]),
+            drawn_value=np.column_stack([value for value, _ in drawn]),
+            drawn_failed=np.column_stack([fails for _, fails in drawn]),
+            terms=process_of(world.execute_failure).terms([case.scenario.reliability(r) for r in world.robots]),
+            margins=self._margins(known),
+            available=figures["available"].astype(np.bool_), lost=figures["lost"].astype(np.bool_),
+            incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],
+            fuel_used_s=figures["fuel_used_s"], waited_s=figures["waited_s"],
+            **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
+            legs=self._legs(costs, found), traces=self._traces(found))
+
+    def _margins(self, known: Mapping[MissionKey, TeamDriven]) -> tuple[Margins, ...]:
+        """What each route left of fuel and time where nobody fails on the way, under each noise draw."""
+        whole: dict[int, TeamDriven] = {}
+        for row in range(self._settings.trials):
+            key = self._unfailed(row)
+            if all(fate.before_poi == NEVER for fate, own in zip(key[1], self.orders, strict=True) if own.route):
+                whole.setdefault(key[2], known[key])
+        return tuple(margins_of(number, own, [whole[rollout].driven[number] for rollout in sorted(whole)])
+                     for number, own in enumerate(self.orders) if own.route)
+
+    def _legs(self, costs: Mapping[str, FuelCosts], found: Mapping[MissionKey, tuple[int, TeamDriven]]
+              ) -> tuple[LegTime, ...]:
+        if not self._settings.recorded:
+            return ()
+        robots = self._world.robots
+        first = self._settings.first
+        return tuple(leg_times([costs[self._world.kind_of(robot)] for robot in robots], [r.name for r in robots], {
+            first + row: (key[2], mission) for key, (row, mission) in found.items()}))
+
+    def _traces(self, found: Mapping[MissionKey, tuple[int, TeamDriven]]) -> tuple[Trace, ...]:
+        if not self._settings.recorded:
+            return ()
+        mission = found[self._key(0)][1]
+        waves = [draw_noise(self._world.noise, self._settings.seed, int(self._fate.rollout[0]), number).disturbance.waves
+                 for number in range(len(self.orders))]
+        return traces_of(self._ways, self.orders, mission, waves)

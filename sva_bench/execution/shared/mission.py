@@ -1,0 +1,240 @@
+"""One mission of robots that share a world: each robot's mission by its rules, while all of them are in motion.
+
+A plan in space and time says in which order robots pass where their paths meet, and a gate keeps that order. Whoever
+fails, runs dry or gets stuck stands there for good. The others go on if nobody's path comes near it; else all brake,
+and what is left is planned anew from where everybody is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from sva_bench.execution.noise import NoiseDraw
+from sva_bench.execution.outcome import Assignment, RobotFate, Wait
+from sva_bench.execution.rules import LegDriven, RobotMission
+from sva_bench.execution.shared.driver import Happening, Hold, LegWait, TeamDriver
+from sva_bench.execution.shared.lanes import Order
+from sva_bench.execution.shared.own_ways import Disc, Ways
+from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
+from sva_bench.execution.shared.players import Player, TeamDriven, driven_by
+from sva_bench.execution.waits import HopWait, waits_on
+from sva_bench.world.model import World
+
+DEADLOCK = "deadlock"
+"""What held robots that wait for each other for good: never, by the order of the plan."""
+BRAKING = "replanning"
+"""The cause of waits while a team brakes and plans anew."""
+_BACK_M = 0.3  # from the hull to a passage that a robot waits before
+_BEGUN_M = 1e-3  # on its leg a robot that is nearer to its stop stands at it
+
+
+class SharedMission:
+    """One mission on its way.
+
+    Args:
+        world: The world: what its robots meet on their ways.
+        ways: The ways of its robots.
+        orders: Each robot's orders.
+        fates: When each fails.
+        drawn: How each differs from its model.
+        order: The plan in space and time; ``None`` = nobody coordinates them.
+        driver: The team in motion.
+        noise_index: Seed and number of the noise draw, for what robots meet on their ways.
+    """
+
+    def __init__(
+        self, world: World, ways: Ways, orders: Sequence[Assignment], fates: Sequence[RobotFate],
+        drawn: Sequence[NoiseDraw], order: Order | None, driver: TeamDriver, noise_index: tuple[int, int],
+    ) -> None:
+        self._world, self._ways, self._driver, self._noise_index = world, ways, driver, noise_index
+        self._coordinated = order is not None
+        self._braking = self._replanned = False
+        self._contacts = self._detours = 0
+        self._names = [own.robot for own in orders]
+        self._players = [
+            Player(number=number, mission=RobotMission(own, fate), drawn=mine, stops=list(own.route[:1]))
+            for number, (own, fate, mine) in enumerate(zip(orders, fates, drawn, strict=True))]
+        for player in self._players:
+            number, route = player.number, player.mission.orders.route
+            if not player.active:
+                driver.assign(number, None, None)
+            elif order is None:
+                player.cuts = [ways.shortest(number, a, b) for a, b in pairwise(route)]
+                driver.assign(number, uncoordinated(player.cuts), None)
+            else:
+                player.cuts = list(order.lanes[number].cuts)
+                driver.assign(number, order.lanes[number], order.needs[number])
+        self._planned = tuple(tuple(player.cuts) for player in self._players)
+        for player in self._players:
+            if player.active:
+                player.at = player.mission.site
+                self._depart(player)
+
+    def play(self) -> TeamDriven:
+        """Play it to its end."""
+        while (happening := self._driver.run()).kind != "idle":
+            self._take(happening)
+        return TeamDriven(
+            robots=tuple(player.mission.outcome() for player in self._players), contacts=self._contacts,
+            stops=tuple(tuple(player.stops) for player in self._players), detours=self._detours, cuts=self._planned,
+            driven=tuple(driven_by(player) for player in self._players),
+            replanned=self._replanned or any(player.down for player in self._players),
+            trails=tuple(tuple(player.trail) for player in self._players))
+
+    def _take(self, happening: Happening) -> None:
+        """React to what happened."""
+        player = self._players[happening.robot]
+        match happening.kind:
+            case "arrived":
+                self._arrive(player)
+            case "ended":
+                self._stop_for_good(player)
+            case "stuck":
+                self._stop_for_good(player, stuck=True)
+            case "touch":
+                self._touch(player, self._players[happening.other])
+            case "rest":
+                self._go_on()
+            case "deadlock":
+                for waiting in self._players:
+                    if waiting.active:
+                        self._stop_for_good(waiting, stuck=True, held_by=DEADLOCK)
+
+    def _depart(self, player: Player) -> None:
+        """Send a robot to its next stop, for when its present one is over."""
+        player.stops.append(player.mission.ahead[0])
+        self._set_off(player, player.mission.clock_s)
+
+    def _set_off(self, player: Player, ready_s: float) -> None:
+        """Let a robot begin its leg, or go on with it; one that is drawn to fail on leaving its stop gets no time."""
+        mission, capacity, share = player.mission, player.drawn.capacity, player.mission.orders.idle_share
+        driven_s, waited_s = player.so_far_s
+        driving_s = 0.0 if mission.fails_on_leaving else mission.fate.lifetime_s - mission.driven_s - driven_s
+        self._driver.start_leg(
+            player.number, ready_s, driving_s, self._holds(player), idle_share=share,
+            fuel_s=max(mission.tank_s * capacity - driven_s - share * waited_s, 0.0))
+
+    def _holds(self, player: Player) -> list[Hold]:
+        """What a robot meets on what is left of its leg."""
+        noise, passages = self._world.noise, self._world.passages
+        if noise.people is None and not passages:
+            return []
+        seed, rollout = self._noise_index
+        back_m = self._ways.model(player.number).radius_m + _BACK_M
+        ends = self._ways.hops(player.number, player.stops[-2], player.stops[-1])
+        left = player.cuts[0].leg  # the last of its hops; where they were planned anew, one in place of all
+        met: list[tuple[float, HopWait]] = []
+        way_m = 0.0
+        for hop, between in zip(left, ends[-len(left):], strict=True):
+            met += [(way_m + wait.along_m, wait) for wait in waits_on(
+                hop, between, noise, passages, seed, rollout, player.number, back_m)]
+            way_m += sum(float(stretch.arc[-1]) for stretch in hop)
+        served = {wait.hold for part in player.parts for wait in part.waits}
+        return [Hold(along_m=along_m, lasts_s=wait.lasts_s, cause=wait.cause) for along_m, wait in met
+                if wait.cause not in served]
+
+    def _arrive(self, player: Player) -> None:
+        """A robot is where its leg ends."""
+        self._finish(player)
+        if player.active:
+            player.at = self._ways.site_at(player.number, player.stops[-1], player.cuts[0])
+            player.cuts = player.cuts[1:]
+            self._depart(player)
+        elif player.mission.end in ("home", "late") or player.mission.kept_off:
+            player.cuts = []
+            self._driver.assign(player.number, None, None)
+        else:  # it ran dry while it stood at its stop
+            self._stands(player)
+
+    def _finish(self, player: Player, *, stuck: bool = False, over: bool = False, held_by: str = "") -> None:
+        """A robot's leg is over, by arrival or for good: its mission is told."""
+        parts = [*player.parts, self._driver.leg(player.number)]
+        number = len(player.legs)
+        waits, touches, driving_s = [], [], 0.0
+        for part in parts:
+            waits += [self._wait(wait, number, driving_s) for wait in part.waits]
+            touches += [replace(touch, leg=number, since_s=touch.since_s + driving_s) for touch in part.touches]
+            driving_s += part.driving_s
+        leg = LegDriven(driving_s, stuck, len(touches), sum(wait.lasts_s for wait in waits), player.drawn.capacity,
+                        tuple(touches), tuple(waits), held_by)
+        player.mission.drive(leg._replace(time_s=math.inf) if over else leg)
+        player.legs.append(leg)
+        player.trail.append(tuple(parts))
+        player.parts = []
+
+    def _wait(self, wait: LegWait, leg: int, before_s: float) -> Wait:
+        cause = wait.hold or (BRAKING if wait.robot is None else self._names[wait.robot])
+        return Wait(leg=leg, lasts_s=wait.lasts_s, x_m=wait.x_m, y_m=wait.y_m, cause=cause,
+                    since_s=before_s + wait.since_s)
+
+    def _stop_for_good(self, player: Player, *, stuck: bool = False, held_by: str = "") -> None:
+        """A robot's fuel or life is over on its way or on leaving its stop, or it is stuck."""
+        if player.mission.fails_on_leaving and not stuck:
+            player.stops.pop()
+            player.mission.depart()
+        elif player.active:
+            self._finish(player, stuck=stuck, over=not stuck, held_by=held_by)
+        self._stands(player)
+
+    def _touch(self, one: Player, other: Player) -> None:
+        """Two hulls touched: of robots that nobody coordinates, that is the end of both."""
+        self._contacts += 1
+        if not self._coordinated:
+            for player, met in ((one, other), (other, one)):
+                if player.active:
+                    self._stop_for_good(player, stuck=True, held_by=self._names[met.number])
+
+    def _stands(self, player: Player) -> None:
+        """A robot's mission ended away from its berth: it stands there for good, and the others go on if they can."""
+        player.down, player.cuts = True, []
+        self._driver.drop(player.number)
+        if self._coordinated and not self._braking and self._in_the_way(player):
+            self._braking = self._replanned = True
+            self._driver.brake(True)
+
+    def _in_the_way(self, down: Player) -> bool:
+        """Whether a robot stands where another still has to pass."""
+        x, y, _ = self._driver.pose(down.number)
+        disc = Disc(x_m=x, y_m=y, radius_m=self._ways.model(down.number).radius_m, name=self._names[down.number])
+        return any(self._ways.blocked(player.number, way, [disc]) is not None
+                   for player in self._players if player.active for way in player.cuts)
+
+    def _go_on(self) -> None:
+        """All stand: plan the rest anew."""
+        self._braking = False
+        self._driver.brake(False)
+        for player in self._players:
+            if player.active and self._driver.leg(player.number).clock_s > player.mission.clock_s:
+                player.parts.append(self._driver.leg(player.number))
+        onward = plan_onward(self._ways, [self._present(player) for player in self._players], self._driver.clock_s)
+        for player, then in zip(self._players, onward, strict=True):
+            if player.active:
+                self._take_up(player, then)
+
+    def _present(self, player: Player) -> Present:
+        mission, number = player.mission, player.number
+        driven_s, _ = player.so_far_s
+        arc_m = self._driver.arc_m(number) if player.parts else 0.0
+        at_stop = driven_s == 0 and arc_m < _BEGUN_M
+        return Present(
+            number=number, orders=mission.orders, pose=self._driver.pose(number), down=player.down,
+            site=player.at if at_stop else None, ahead=mission.ahead if player.active else (),
+            ready_s=mission.clock_s, burnt_s=mission.burnt_s + driven_s, cuts=tuple(player.cuts),
+            arc_m=None if at_stop else arc_m, name=self._names[number])
+
+    def _take_up(self, player: Player, then: Onward) -> None:
+        """Give a robot new orders, which it takes up where it stands."""
+        mission, driver = player.mission, self._driver
+        self._detours += then.detours
+        if then.lane is None:
+            self._stop_for_good(player, stuck=True, held_by=then.kept_off)
+            return
+        mission.kept_off = mission.kept_off or then.kept_off
+        mission.give(then.ahead)
+        player.stops[-1] = then.ahead[0]
+        player.cuts = list(then.lane.cuts)
+        driver.assign(player.number, then.lane, then.needs)
+        self._set_off(player, driver.clock_s if player.parts else mission.clock_s)

@@ -1,0 +1,189 @@
+"""Ways of robots that share a world: paths between their sites, cut into cells, and paths round robots that stand there.
+
+Each robot has sites of its own: its berth is its base, and of a station with several slots it uses one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sva_bench.arrays import FloatArray
+from sva_bench.execution.drives import Leg
+from sva_bench.execution.engines.engine import Pose
+from sva_bench.execution.shared.lanes import Cut, cut
+from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.robot.follower import Stretch, arc_lengths, stretches
+from sva_bench.robot.model import RobotModel
+from sva_bench.travel.alternatives import alternatives, way_round
+from sva_bench.travel.berths import own_world, place_berths
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import World
+
+GAP_M = 0.2
+"""Between the hulls of two robots in cells that exclude each other: a cell, what robots cut off corners, and stopping."""
+_STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goes by
+_ROUNDING_M = 0.01
+_SDS = 3.0  # of a localisation error that both robots may have
+_BESIDE = tuple((ring, k) for ring in (0.52, 0.62) for k in range(8))  # places beside a site that is taken
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Disc:
+    """A robot that stands for good.
+
+    Attributes:
+        x_m, y_m: Where [m].
+        radius_m: Radius of its hull [m].
+        name: Its name.
+    """
+
+    x_m: float
+    y_m: float
+    radius_m: float
+    name: str
+
+
+class Ways:
+    """The ways of a world's robots; what is asked for twice is made once.
+
+    Args:
+        world: The world.
+        costs: Fuel costs by robot.
+    """
+
+    def __init__(self, world: World, costs: Mapping[str, FuelCosts]) -> None:
+        self._costs = [costs[world.kind_of(robot)] for robot in world.robots]
+        berths = place_berths(world)
+        self._own = [own_world(world, berths, number) for number in range(len(world.robots))]
+        self._sites = [{site.name: site for site in own.sites} for own in self._own]
+        self._candidates: dict[tuple[int, str, str], tuple[Cut, ...]] = {}
+        located = world.noise.localisation
+        self._off_m = 0.0 if located is None else _SDS * located.sd_m
+        self.gap_m = GAP_M + math.sqrt(2.0) * self._off_m
+        self.delay_s = world.noise.delay_s[1]
+
+    def model(self, robot: int) -> RobotModel:
+        """A robot's figures."""
+        return self._costs[robot].times.model
+
+    def start(self, robot: int) -> Pose:
+        """The pose in which a robot stands at its berth."""
+        return self.pose(robot, self._own[robot].sites[0].name)
+
+    def pose(self, robot: int, site: str) -> Pose:
+        """The pose in which a robot stands at one of its sites."""
+        at = self._sites[robot][site]
+        return at.x_m, at.y_m, at.heading_rad
+
+    def hops(self, robot: int, origin: str, destination: str) -> list[tuple[str, str]]:
+        """Ends of the hops of a leg."""
+        return list(pairwise(self._costs[robot].chain(origin, destination)))
+
+    def candidates(self, robot: int, origin: str, destination: str) -> tuple[Cut, ...]:
+        """The ways of a leg, the shortest first."""
+        key = robot, origin, destination
+        if key not in self._candidates:
+            times, model = self._costs[robot].times, self.model(robot)
+            hops = self.hops(robot, origin, destination)
+            legs: list[Leg] = [tuple(times.course(a, b) for a, b in hops)]
+            if len(hops) == 1:
+                heading = self._sites[robot][destination].heading_rad
+                legs += [(stretches(path, heading),) for path in alternatives(
+                    self._own[robot].obstacles, times.path(origin, destination), times.clearance_m)]
+            self._candidates[key] = tuple(cut(model, leg, self.pose(robot, origin)) for leg in legs)
+        return self._candidates[key]
+
+    def shortest(self, robot: int, origin: str, destination: str) -> Cut:
+        """The way of a leg that a robot takes if nobody is in its way."""
+        return self.candidates(robot, origin, destination)[0]
+
+    def site_at(self, robot: int, site: str, way: Cut) -> str | None:
+        """The site at which a way ends; ``None`` if it ends beside it."""
+        x, y, _ = self.pose(robot, site)
+        end_x, end_y = way.leg[-1][-1].path[-1].tolist()
+        return site if math.hypot(end_x - x, end_y - y) < 1e-6 else None
+
+    def rest(self, robot: int, leg: Leg, arc_m: float, yaw: float) -> Cut:
+        """What is left of a leg.
+
+        Args:
+            robot: The robot's position in its team.
+            leg: The leg.
+            arc_m: How far along it the robot stands [m].
+            yaw: Its heading [rad].
+        """
+        left: list[tuple[Stretch, ...]] = []
+        for hop in leg:
+            ahead = []
+            for stretch in hop:
+                length = float(stretch.arc[-1])
+                if arc_m >= length and not ahead and not left and (stretch is not leg[-1][-1]):
+                    arc_m -= length
+                    continue
+                ahead.append(stretch if ahead or left else _from(stretch, min(arc_m, length)))
+            if ahead:
+                left.append(tuple(ahead))
+        x, y = left[0][0].path[0]
+        return cut(self.model(robot), tuple(left), (float(x), float(y), yaw))
+
+    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc]) -> Disc | None:
+        """The first of some standing robots that is in the way."""
+        for disc in discs:
+            apart = np.hypot(way.place_m[:, 0] - disc.x_m, way.place_m[:, 1] - disc.y_m)
+            if float(apart.min(initial=math.inf)) < self._passes_at(robot, disc):
+                return disc
+        return None
+
+    def round(self, robot: int, begin: Pose, destination: str, discs: Sequence[Disc]) -> Cut | None:
+        """A way round standing robots to a site, or to a place beside it if somebody stands there.
+
+        Args:
+            robot: The robot's position in its team.
+            begin: Where it stands.
+            destination: The site.
+            discs: Who stands for good.
+
+        Returns:
+            The way; ``None`` if there is none.
+        """
+        x, y, heading = self.pose(robot, destination)
+        model, clearance = self.model(robot), self._costs[robot].times.clearance_m
+        around = [(disc.x_m, disc.y_m, self._passes_at(robot, disc) - clearance + _ROUNDING_M) for disc in discs]
+        taken = self._taken(robot, (x, y), discs)
+        beside = [(x + ring * math.cos(k * math.pi / 4), y + ring * math.sin(k * math.pi / 4)) for ring, k in _BESIDE]
+        for place in beside if taken else [(x, y)]:
+            if not self._taken(robot, place, discs):
+                path = way_round(self._own[robot].obstacles, begin[:2], place, clearance, around)
+                if path is not None:
+                    return cut(model, (stretches(path, heading),), begin)
+        return None
+
+    def _taken(self, robot: int, place: tuple[float, float], discs: Sequence[Disc]) -> bool:
+        """Whether somebody stands too near to a place."""
+        return any(math.dist(place, (disc.x_m, disc.y_m)) < self._passes_at(robot, disc) + _ROUNDING_M
+                   for disc in discs)
+
+    def obstacles(self, robot: int) -> Obstacles:
+        """What a robot's paths keep clear of, other berths among them."""
+        return self._own[robot].obstacles
+
+    def _passes_at(self, robot: int, disc: Disc) -> float:
+        """How near a robot's middle may come to that of one that stands [m]."""
+        return self.model(robot).radius_m + disc.radius_m + _STANDS_OFF_M + self._off_m
+
+
+def _from(stretch: Stretch, arc_m: float) -> Stretch:
+    """A stretch from an arc length on."""
+    if arc_m <= 0:
+        return stretch
+    path, arc = stretch.path, stretch.arc
+    begin = np.array([[np.interp(arc_m, arc, path[:, axis]) for axis in (0, 1)]])
+    rest: FloatArray = np.ascontiguousarray(np.concatenate([begin, path[arc > arc_m + 1e-9]]))
+    if len(rest) < 2:
+        rest = np.repeat(begin, 2, axis=0)
+    return Stretch(rest, arc_lengths(rest), stretch.heading_rad)

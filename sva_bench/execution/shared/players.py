@@ -1,0 +1,94 @@
+"""The robots of a shared mission on their way, and what came of it: the types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sva_bench.execution.noise import NoiseDraw
+from sva_bench.execution.outcome import Driven, Outcome
+from sva_bench.execution.rules import LegDriven, RobotMission
+from sva_bench.execution.shared.driver import LegSoFar
+from sva_bench.execution.shared.lanes import Cut
+
+Trail = tuple[tuple[LegSoFar, ...], ...]
+"""A robot's legs as it drove them, each in one part, or in several where it was planned anew on its way."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TeamDriven:
+    """What came of one mission of a team.
+
+    Attributes:
+        robots: Each robot's outcome.
+        stops: The stops that each was sent to, the base first.
+        driven: What each drove.
+        trails: The same over time; without poses unless traced.
+        cuts: The ways that each was planned to drive at first.
+        contacts: How many times two robots touched each other.
+        detours: How many legs led round a robot that stood in the way.
+        replanned: Whether anything was planned anew, or a robot stands for good away from its berth.
+        in_physics: Whether physics drove it.
+        traced: Whether poses were kept.
+    """
+
+    robots: tuple[Outcome, ...]
+    stops: tuple[tuple[str, ...], ...]
+    driven: tuple[Driven, ...]
+    trails: tuple[Trail, ...]
+    cuts: tuple[tuple[Cut, ...], ...]
+    contacts: int
+    detours: int
+    replanned: bool
+    in_physics: bool = False
+    traced: bool = False
+
+
+@dataclass(eq=False, kw_only=True)
+class Player:
+    """One robot of a mission on its way.
+
+    Attributes:
+        number: Its position in its team.
+        mission: Its mission so far.
+        drawn: How it differs from its model in this mission.
+        stops: Stops that it was sent to, the base first.
+        at: The site where it made its last stop; ``None`` = beside one that was taken.
+        cuts: The ways of its legs from here on, the one that it is on first.
+        parts: What it drove of the leg that it is on before that was planned anew.
+        legs: The legs that are over.
+        trail: What it drove of each of them.
+        down: Whether it stands for good away from its berth.
+    """
+
+    number: int
+    mission: RobotMission
+    drawn: NoiseDraw
+    stops: list[str]
+    at: str | None = None
+    cuts: list[Cut] = field(default_factory=list)
+    parts: list[LegSoFar] = field(default_factory=list)
+    legs: list[LegDriven] = field(default_factory=list)
+    trail: list[tuple[LegSoFar, ...]] = field(default_factory=list)
+    down: bool = False
+
+    @property
+    def active(self) -> bool:
+        """Whether its mission goes on."""
+        return self.mission.end is None
+
+    @property
+    def so_far_s(self) -> tuple[float, float]:
+        """How long it drove and waited on its leg before that was planned anew [s]."""
+        return (sum(part.driving_s for part in self.parts),
+                sum(wait.lasts_s for part in self.parts for wait in part.waits))
+
+
+def driven_by(player: Player) -> Driven:
+    """What a robot drove, leg by leg; poses are in its trail."""
+    return Driven(
+        leg_s=np.array([leg.time_s for leg in player.legs]), stuck=bool(player.legs) and player.legs[-1].stuck,
+        leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)), capacity=player.drawn.capacity,
+        touches=tuple(touch for leg in player.legs for touch in leg.touches),
+        waits=tuple(wait for leg in player.legs for wait in leg.waits))
