@@ -6,17 +6,19 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Engine, Pose
 from sva_bench.robot.disturbance import UNDISTURBED, Disturbance, error_at, room_for
-from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, Stretch, control, new_state
+from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, NO_LINE, Stretch, control, new_state
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import delayed, patience_steps
 
-_STUCK_CHECK_S = 10.0  # a robot that hardly moves or turns for so long is stuck
+STUCK_STEPS = round(10.0 * CONTROL_HZ)
+"""Control steps after which a robot that hardly moved or turned in them is stuck."""
 _STUCK_M, _STUCK_RAD = 0.02, 0.05
-_STUCK_DRIVING = 0.5  # share of the time between two checks spent on the way from which on only progress counts
+STUCK_DRIVING = 0.5  # share of the time between two checks spent on the way from which on only progress counts
 
 
 def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: list[Pose] | None = None,
@@ -34,7 +36,6 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
         Driving time [s], and whether the robot arrived; False if it got stuck.
     """
     limits, dt, half = model.limits, 1.0 / CONTROL_HZ, 0.5 * model.track_m
-    check = round(_STUCK_CHECK_S * CONTROL_HZ)
     waves, queue = disturbance.waves, np.zeros((disturbance.delay_steps, 2))
     lost, late, parts = waves.shape[1] > 0, len(queue) > 0, room_for(waves)
     where, step = engine.pose, engine.step
@@ -48,7 +49,7 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
             if lost:
                 ex, ey, eyaw = error_at(waves, parts, x, y)
                 x, y, yaw = x + ex, y + ey, yaw + eyaw
-            speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
+            speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt, NO_LINE)
             phase = state[0]
             if phase == ARRIVED:
                 break
@@ -62,9 +63,9 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
                 poses.append(pose)
             if engine.tipped_over:
                 return total * dt, False
-            if number % check == 0:
+            if number % STUCK_STEPS == 0:
                 progress_m, turned_rad = float(state[1]) - since_s, math.remainder(yaw - since_yaw, 2 * math.pi)
-                if is_stuck(progress_m, turned_rad, phase == DRIVE and driving >= _STUCK_DRIVING * check):
+                if is_stuck(progress_m, turned_rad, phase == DRIVE and driving >= STUCK_DRIVING * STUCK_STEPS):
                     return total * dt, False
                 since_yaw, since_s, driving = yaw, float(state[1]), 0
         else:
@@ -78,6 +79,7 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
     return (total + len(queue)) * dt, not engine.tipped_over
 
 
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def is_stuck(progress_m: float, turned_rad: float, on_the_way: bool) -> bool:
     """Whether a robot is stuck, by what it did in the ten seconds since the last check.
 
@@ -89,7 +91,7 @@ def is_stuck(progress_m: float, turned_rad: float, on_the_way: bool) -> bool:
         turned_rad: How far it turned, either way round.
         on_the_way: Whether it is on its way along the path, and was for at least half of the time.
     """
-    return progress_m < _STUCK_M and (on_the_way or abs(turned_rad) < _STUCK_RAD)
+    return bool(progress_m < _STUCK_M and (on_the_way or abs(turned_rad) < _STUCK_RAD))
 
 
 def downsampled(poses: Sequence[Pose], keep_hz: float) -> tuple[FloatArray, FloatArray]:

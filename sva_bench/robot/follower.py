@@ -35,6 +35,11 @@ _REACHED_M = 0.01  # distance to the end of a stretch at which its driving is ov
 _CREEP_M_S = 0.03  # slowest approach, so that the end is reached in finite time
 _SEARCH_M = 0.6  # how far ahead along the path the nearest point is looked for
 _BRAKING = 0.9  # share of the acceleration that approach profiles use; the rest absorbs the control delay
+_LINE_BRAKING = 0.85  # the same before a stop line, which must not be crossed: what gains and slip take is left over
+BEFORE_LINE_M = 0.02
+"""From where a robot stops to its stop line [m]."""
+NO_LINE = math.inf
+"""The stop line of a robot that nothing holds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +82,9 @@ def stretches(path: FloatArray, heading_rad: float) -> tuple[Stretch, ...]:
 
 
 def new_state() -> FloatArray:
-    """State at the start of a stretch: phase, arc length travelled [m], commanded speed [m/s] and turn rate [rad/s]."""
-    return np.zeros(4)
+    """State at the start of a stretch: phase, arc length travelled [m], commanded speed [m/s] and turn rate [rad/s];
+    and whether the stop line held the robot in the last step, 1 or 0."""
+    return np.zeros(5)
 
 
 def horizon_m(limits: FloatArray, dt: float) -> float:
@@ -175,9 +181,12 @@ def _turn(error: float, rate: float, dt: float, limits: FloatArray) -> float:
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def control(
     path: FloatArray, arc: FloatArray, heading: float, limits: FloatArray, state: FloatArray,
-    x: float, y: float, yaw: float, dt: float,
+    x: float, y: float, yaw: float, dt: float, stop: float,
 ) -> tuple[float, float]:
     """One control step along one stretch.
+
+    On its way along the path the robot is never commanded faster than lets it stop before the stop line; standing
+    before it, it stands. Turning in place it stands already.
 
     Args:
         path: Vertices of the stretch [m], shape (n, 2).
@@ -187,11 +196,13 @@ def control(
         state: As ``new_state`` gives it; changed in place. ``state[0]`` is ``ARRIVED`` at the end.
         x, y, yaw: Pose [m, rad].
         dt: Time until the next control step [s].
+        stop: Arc length of the stop line [m], less the way for which commands are under way; ``NO_LINE`` = none.
+            ``state[4]`` tells whether it made the command slower than it would be without.
 
     Returns:
         Speed [m/s] and turn rate [rad/s] to command until the next step.
     """
-    phase, s, speed, rate = state[0], state[1], state[2], state[3]
+    phase, s, speed, rate, held = state[0], state[1], state[2], state[3], 0.0
     end = arc[-1]
     if phase == TURN_TO_PATH and end < _REACHED_M:
         phase = TURN_TO_HEADING
@@ -219,7 +230,12 @@ def control(
         wanted = min(limits[0], math.sqrt(2.0 * _BRAKING * limits[2] * remaining), math.sqrt(lateral / bend),
                      limits[1] / bend)
         wanted = min(max(wanted, min(_CREEP_M_S, limits[0])), left / dt)
+        free = _rate_limited(speed, wanted, limits[2] * dt)
+        room = stop - BEFORE_LINE_M - s
+        if room < _SEARCH_M + LOOKAHEAD_M:
+            wanted = min(wanted, math.sqrt(2.0 * _LINE_BRAKING * limits[2] * max(room, 0.0)))
         speed = _rate_limited(speed, wanted, limits[2] * dt)
+        held = 1.0 if speed < free else 0.0
         rate = _rate_limited(rate, speed * curvature, 2.0 * limits[3] * dt)
     if phase == TURN_TO_HEADING:
         error = wrap(heading - yaw)
@@ -228,5 +244,13 @@ def control(
             phase, rate = ARRIVED, 0.0
         else:
             rate = _turn(error, rate, dt, limits)
-    state[0], state[1], state[2], state[3] = phase, s, speed, rate
+    state[0], state[1], state[2], state[3], state[4] = phase, s, speed, rate, held
     return speed, rate
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def braked(limits: FloatArray, state: FloatArray, dt: float) -> None:
+    """One control step of a robot that was turning in place and brakes; it counts as held."""
+    state[2] = _rate_limited(state[2], 0.0, limits[2] * dt)
+    state[3] = _rate_limited(state[3], 0.0, limits[3] * dt)
+    state[4] = 1.0

@@ -11,7 +11,7 @@ from numba import njit
 
 from sva_bench.arrays import FloatArray
 from sva_bench.robot.disturbance import NO_WAVES, UNDISTURBED, Disturbance, error_at
-from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, Stretch, control, horizon_m, new_state
+from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, NO_LINE, Stretch, control, horizon_m, new_state
 from sva_bench.robot.model import RobotModel
 
 _SLOWEST = 0.05  # a stretch that takes longer than at this share of the robot's speeds counts as stuck
@@ -62,7 +62,7 @@ def _drive(
         if waves.shape[1] > 0:
             ex, ey, eyaw = error_at(waves, parts, x, y)
             x, y, yaw = x + ex, y + ey, yaw + eyaw
-        speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt)
+        speed, rate = control(path, arc, heading, limits, state, x, y, yaw, dt, NO_LINE)
         if state[0] == ARRIVED:
             return step
         speed, rate = delayed(queue, speed, rate)

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sva_bench.arrays import FloatArray
 from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
 from sva_bench.robot.disturbance import Disturbance
-from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, arc_lengths, control, new_state, stretches, wrap
+from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, NO_LINE, arc_lengths, control, new_state, stretches, wrap
 from sva_bench.robot.model import BUILT_IN, RobotModel
 from sva_bench.robot.twin import drive
 from sva_bench.travel.roadmap import plan_paths
@@ -115,7 +115,8 @@ def test_commands_stay_within_the_limits(model: RobotModel, x: float, y: float, 
     state[2], state[3] = speed, rate
     for _ in range(3):
         before = state.copy()
-        new_speed, new_rate = control(path, arc_lengths(path), 1.0, model.limits, state, x, y, yaw, STEP_S)
+        new_speed, new_rate = control(path, arc_lengths(path), 1.0, model.limits, state, x, y, yaw, STEP_S,
+                                      NO_LINE)
         assert -1e-12 <= new_speed <= max(model.max_speed_m_s, speed) + 1e-12
         assert abs(new_speed - before[2]) <= model.acceleration_m_s2 * STEP_S + 1e-12
         if state[0] != ARRIVED:
@@ -128,7 +129,8 @@ def test_control_is_a_pure_function_of_pose_and_state() -> None:
     answers = []
     for _ in range(2):
         state = new_state()
-        answers.append([control(path, arc_lengths(path), 0.0, TURTLEBOT.limits, state, 0.1 * k, 0.01, 0.0, STEP_S)
+        answers.append([control(path, arc_lengths(path), 0.0, TURTLEBOT.limits, state, 0.1 * k, 0.01, 0.0, STEP_S,
+                                NO_LINE)
                         for k in range(10)])
     assert answers[0] == answers[1]
 

@@ -11,7 +11,7 @@ from numba import njit
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.execution.drives import Leg
 from sva_bench.execution.engines.engine import Pose
-from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, control, new_state
+from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, NO_LINE, control, new_state
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import advance, patience_steps
 
@@ -175,7 +175,7 @@ def _drive_through(
         seen: Number of cells entered, and passed by half; changed in place.
     """
     for step in range(first, last):
-        speed, rate = control(path, arc, heading, limits, state, pose[0], pose[1], pose[2], dt)
+        speed, rate = control(path, arc, heading, limits, state, pose[0], pose[1], pose[2], dt, NO_LINE)
         here = before + state[1]
         while seen[0] < len(enter) and cell_at(here, len(enter)) >= seen[0]:
             enter[seen[0]] = step * dt

@@ -1,0 +1,176 @@
+"""What drives a team: its robots in one world, moved together until something happens.
+
+A driver knows no mission and no failure: whoever asks it hands out lanes and legs, and decides what a happening means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Protocol, Self
+
+from sva_bench.arrays import FloatArray, IntArray
+from sva_bench.choices import HappeningKind
+from sva_bench.execution.engines.engine import Pose
+from sva_bench.execution.shared.lanes import Lane
+from sva_bench.execution.touch import Touch
+from sva_bench.robot.disturbance import UNDISTURBED, Disturbance
+from sva_bench.robot.model import RobotModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """A robot of the team.
+
+    Attributes:
+        model: Its figures.
+        start: Where it stands at rest: x, y [m], yaw [rad]; where it is, not where it believes to be.
+        disturbance: How it differs from its model.
+    """
+
+    model: RobotModel
+    start: Pose
+    disturbance: Disturbance = UNDISTURBED
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hold:
+    """A wait on the way: for a passage that is shut, for people.
+
+    Attributes:
+        along_m: How far along the leg [m].
+        lasts_s: How long it stands there [s].
+        cause: As of ``outcome.Wait``.
+    """
+
+    along_m: float
+    lasts_s: float
+    cause: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegWait:
+    """A wait on a leg: the robot was slower than it would have been, or stood.
+
+    Attributes:
+        since_s: When it began [s of driving since the leg began].
+        lasts_s: How long [s].
+        x_m, y_m: Where it began [m].
+        robot: For whom; ``None`` = for no robot.
+        hold: Cause of the hold; empty if there was none. Without a robot and a hold, the team was braked.
+    """
+
+    since_s: float
+    lasts_s: float
+    x_m: float
+    y_m: float
+    robot: int | None = None
+    hold: str = ""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LegSoFar:
+    """A robot's present leg, or its last one until the next is started.
+
+    Attributes:
+        driving_s: Time that it drove on it [s].
+        clock_s: The mission clock when it had got so far [s]: when it was to begin, driving and waits together.
+        waits: Its waits, in order.
+        since_s: Time since the leg was to begin, of each pose [s], shape (k,).
+        pose: x, y [m], yaw [rad], shape (k, 3); only of drivers that trace.
+        touches: What its hull touched on it, in physics.
+    """
+
+    driving_s: float
+    clock_s: float
+    waits: tuple[LegWait, ...]
+    since_s: FloatArray
+    pose: FloatArray
+    touches: tuple[Touch, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Happening:
+    """What a team was stopped for.
+
+    Attributes:
+        kind: ``arrived``: a robot ended its leg; ``ended``: its driving time or its fuel is used up; ``stuck``;
+            ``touch``: two robots touch; ``rest``: all stand that were to brake; ``idle``: nobody has a leg to drive;
+            ``deadlock``: robots wait for each other for good, which is a fault of the order.
+        clock_s: When [s].
+        robot: Its number; of ``rest``, ``idle`` and ``deadlock`` -1.
+        other: The other robot of a touch.
+    """
+
+    kind: HappeningKind
+    clock_s: float
+    robot: int = -1
+    other: int = -1
+
+
+class TeamDriver(Protocol):
+    """Robots in one world. A context manager; each mission wants a fresh one, which repeats bit for bit."""
+
+    @property
+    def clock_s(self) -> float:
+        """The mission clock [s], a multiple of the control step."""
+        ...
+
+    def assign(self, robot: int, lane: Lane | None, needs: Sequence[IntArray] | None) -> None:
+        """Give a robot that stands at rest another lane; what it was driving is over.
+
+        Args:
+            robot: Its number.
+            lane: The lane; ``None`` = it stays where it is for good.
+            needs: For each robot, the cell that it must have reached before each of the lane's cells may be entered;
+                ``None`` = no gates.
+        """
+        ...
+
+    def start_leg(self, robot: int, ready_s: float, driving_s: float, holds: Sequence[Hold], *,
+                  fuel_s: float = ..., idle_share: float = ...) -> None:
+        """Let a robot drive the next leg of its lane.
+
+        Args:
+            robot: Its number.
+            ready_s: When it may set off [s on the mission clock].
+            driving_s: After so much driving on it it stops for good [s].
+            holds: Where it waits on it, in order.
+            fuel_s: It stops for good as well when driving and the idle share of waiting come to so much [s].
+            idle_share: Share of the fuel of driving that it burns while it waits.
+        """
+        ...
+
+    def drop(self, robot: int) -> None:
+        """A robot failed: it stands where it is, and nobody waits for it any more."""
+        ...
+
+    def brake(self, on: bool) -> None:
+        """Let all robots brake, or let them go on."""
+        ...
+
+    def run(self) -> Happening:
+        """Drive until something happens."""
+        ...
+
+    def leg(self, robot: int) -> LegSoFar:
+        """A robot's present leg."""
+        ...
+
+    def pose(self, robot: int) -> Pose:
+        """Where a robot is."""
+        ...
+
+    def arc_m(self, robot: int) -> float:
+        """How far a robot is on its leg [m]."""
+        ...
+
+    def cell(self, robot: int) -> int:
+        """The cell of its lane that a robot is in."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None: ...
