@@ -183,6 +183,7 @@ class _Team:
     def executed(self, costs: Mapping[str, FuelCosts], known: Mapping[MissionKey, TeamDriven]) -> Executed:
         """What came of the trials."""
         found: dict[MissionKey, tuple[int, TeamDriven]] = {}
+        number: dict[MissionKey, int] = {}
         kind = np.zeros(self._settings.trials, dtype=np.int64)
         for row in range(self._settings.trials):
             key = self._key(row)
@@ -190,9 +191,9 @@ class _Team:
                 mission = known[key] if key in known else self._cut_off(row, known)
                 assert mission is not None
                 found[key] = row, mission
-            kind[row] = list(found).index(key)
+            kind[row] = number.setdefault(key, len(number))
         distinct = [mission for _, mission in found.values()]
-        columns = [figures_of([mission.robots[number] for mission in distinct]) for number in range(len(self.orders))]
+        columns = [figures_of([mission.robots[k] for mission in distinct]) for k in range(len(self.orders))]
         figures = {name: np.column_stack([column[name] for column in columns])[kind] for name in columns[0]}
         fate, case, world = self._fate, self._case, self._world
         drawn = [left_by_draws(o, fate.fails[:, k], fate.lifetime_s[:, k]) for k, o in enumerate(self.orders)]

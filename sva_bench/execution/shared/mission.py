@@ -145,7 +145,6 @@ class SharedMission:
             self._depart(player)
         elif player.mission.end in ("home", "late") or player.mission.kept_off:
             player.cuts = []
-            self._driver.assign(player.number, None, None)
         else:  # it ran dry while it stood at its stop
             self._stands(player)
 
@@ -210,9 +209,12 @@ class SharedMission:
             if player.active and self._driver.leg(player.number).clock_s > player.mission.clock_s:
                 player.parts.append(self._driver.leg(player.number))
         onward = plan_onward(self._ways, [self._present(player) for player in self._players], self._driver.clock_s)
-        for player, then in zip(self._players, onward, strict=True):
+        moving = [(player, then) for player, then in zip(self._players, onward, strict=True) if player.active]
+        for player, then in moving:
+            self._take_up(player, then)
+        for player, _ in moving:
             if player.active:
-                self._take_up(player, then)
+                self._set_off(player, self._driver.clock_s if player.parts else player.mission.clock_s)
 
     def _present(self, player: Player) -> Present:
         mission, number = player.mission, player.number
@@ -227,7 +229,7 @@ class SharedMission:
 
     def _take_up(self, player: Player, then: Onward) -> None:
         """Give a robot new orders, which it takes up where it stands."""
-        mission, driver = player.mission, self._driver
+        mission = player.mission
         self._detours += then.detours
         if then.lane is None:
             self._stop_for_good(player, stuck=True, held_by=then.kept_off)
@@ -236,5 +238,4 @@ class SharedMission:
         mission.give(then.ahead)
         player.stops[-1] = then.ahead[0]
         player.cuts = list(then.lane.cuts)
-        driver.assign(player.number, then.lane, then.needs)
-        self._set_off(player, driver.clock_s if player.parts else mission.clock_s)
+        self._driver.assign(player.number, then.lane, then.needs)

@@ -22,6 +22,7 @@ from sva_bench.robot.model import RobotModel
 from sva_bench.travel.alternatives import alternatives, way_round
 from sva_bench.travel.berths import own_world, place_berths
 from sva_bench.travel.fuel import FuelCosts
+from sva_bench.travel.roadmap import Roadmap, connecting_roadmap
 from sva_bench.world.model import World
 
 GAP_M = 0.2
@@ -61,7 +62,8 @@ class Ways:
         berths = place_berths(world)
         self._own = [own_world(world, berths, number) for number in range(len(world.robots))]
         self._sites = [{site.name: site for site in own.sites} for own in self._own]
-        self._candidates: dict[tuple[int, str, str], tuple[Cut, ...]] = {}
+        self._shortest: dict[tuple[int, str, str], Cut] = {}
+        self._roadmaps: dict[int, Roadmap] = {}
         located = world.noise.localisation
         self._off_m = 0.0 if located is None else _SDS * located.sd_m
         self.gap_m = GAP_M + math.sqrt(2.0) * self._off_m
@@ -86,21 +88,30 @@ class Ways:
 
     def candidates(self, robot: int, origin: str, destination: str) -> tuple[Cut, ...]:
         """The ways of a leg, the shortest first."""
-        key = robot, origin, destination
-        if key not in self._candidates:
-            times, model = self._costs[robot].times, self.model(robot)
-            hops = self.hops(robot, origin, destination)
-            legs: list[Leg] = [tuple(times.course(a, b) for a, b in hops)]
-            if len(hops) == 1:
-                heading = self._sites[robot][destination].heading_rad
-                legs += [(stretches(path, heading),) for path in alternatives(
-                    self._own[robot].obstacles, times.path(origin, destination), times.clearance_m)]
-            self._candidates[key] = tuple(cut(model, leg, self.pose(robot, origin)) for leg in legs)
-        return self._candidates[key]
+        shortest, hops = self.shortest(robot, origin, destination), self.hops(robot, origin, destination)
+        if len(hops) > 1:  # a robot stops at the sites between
+            return (shortest,)
+        heading, times = self._sites[robot][destination].heading_rad, self._costs[robot].times
+        others = alternatives(self._roadmap(robot), times.path(origin, destination))[1:]
+        return (shortest, *(cut(self.model(robot), (stretches(path, heading),), self.pose(robot, origin))
+                            for path in others))
+
+    def _roadmap(self, robot: int) -> Roadmap:
+        if robot not in self._roadmaps:
+            own = self._own[robot]
+            self._roadmaps[robot] = connecting_roadmap(
+                own.obstacles, np.array([(site.x_m, site.y_m) for site in own.sites]),
+                self._costs[robot].times.clearance_m)
+        return self._roadmaps[robot]
 
     def shortest(self, robot: int, origin: str, destination: str) -> Cut:
         """The way of a leg that a robot takes if nobody is in its way."""
-        return self.candidates(robot, origin, destination)[0]
+        key = robot, origin, destination
+        if key not in self._shortest:
+            course = self._costs[robot].times.course
+            leg = tuple(course(a, b) for a, b in self.hops(robot, origin, destination))
+            self._shortest[key] = cut(self.model(robot), leg, self.pose(robot, origin))
+        return self._shortest[key]
 
     def site_at(self, robot: int, site: str, way: Cut) -> str | None:
         """The site at which a way ends; ``None`` if it ends beside it."""
@@ -153,12 +164,13 @@ class Ways:
         """
         x, y, heading = self.pose(robot, destination)
         model, clearance = self.model(robot), self._costs[robot].times.clearance_m
-        around = [(disc.x_m, disc.y_m, self._passes_at(robot, disc) - clearance + _ROUNDING_M) for disc in discs]
+        around = np.array([(disc.x_m, disc.y_m, self._passes_at(robot, disc) - clearance + _ROUNDING_M)
+                           for disc in discs]).reshape(-1, 3)
         taken = self._taken(robot, (x, y), discs)
         beside = [(x + ring * math.cos(k * math.pi / 4), y + ring * math.sin(k * math.pi / 4)) for ring, k in _BESIDE]
         for place in beside if taken else [(x, y)]:
             if not self._taken(robot, place, discs):
-                path = way_round(self._own[robot].obstacles, begin[:2], place, clearance, around)
+                path = way_round(self._own[robot].obstacles, np.array(begin[:2]), np.array(place), clearance, around)
                 if path is not None:
                     return cut(model, (stretches(path, heading),), begin)
         return None
