@@ -16,19 +16,20 @@ from scipy.ndimage import label
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.geometry.buckets import keeps_clear
-from sva_bench.geometry.cells import Cells, DistanceField, distance_field
+from sva_bench.geometry.cells import DistanceField, distance_field
+from sva_bench.geometry.obstacles import Obstacles
 
 _SURELY = 1 + 1e-6  # factor on the clearance that covers the rounding of single precision
 _AT_A_TIME = 1_000_000  # nodes between two checks for Ctrl-C
 
 
 def lattice_paths(
-    cells: Cells, checker: FloatArray, clearance_m: float, points: FloatArray, goals: Sequence[int],
+    obstacles: Obstacles, checker: FloatArray, clearance_m: float, points: FloatArray, goals: Sequence[int],
 ) -> list[FloatArray | None]:
     """A free path from the first point to each of some others, straightened greedily.
 
     Args:
-        cells: The map.
+        obstacles: The obstacles: an occupancy grid, and cylinders that stand on it.
         checker: From ``clearance_checker``, for that clearance.
         clearance_m: Distance to keep [m].
         points: The points, all of them free [m], shape (n, 2).
@@ -37,8 +38,10 @@ def lattice_paths(
     Returns:
         For each goal the path's vertices [m], shape (k, 2); ``None`` where none is found.
     """
-    field = distance_field(cells)
+    assert obstacles.cells is not None
+    field = distance_field(obstacles.cells)
     roomy = field.distance_m >= clearance_m * _SURELY
+    _close_about(field, roomy, obstacles.cylinders, clearance_m)
     parts, count = label(roomy)
     # World coordinates of a node: those of the first, and a step along a row and along a column.
     first, right, up = field.places(np.array([[0, 0], [0, 1], [1, 0]]))
@@ -71,6 +74,22 @@ def lattice_paths(
         path = np.concatenate([points[:1], field.places(index), points[goal:goal + 1]])
         paths.append(_straightened(checker, np.ascontiguousarray(path)))
     return paths
+
+
+def _close_about(
+    field: DistanceField, roomy: NDArray[np.bool_], cylinders: FloatArray, clearance_m: float,
+) -> None:
+    """Close the nodes from which a line to a neighbour may be too near to a cylinder, in place."""
+    step = field.cells.cell_m / 2
+    for x, y, radius in cylinders.tolist():
+        reach = radius + clearance_m + step / 2
+        row, column = field.index_of(np.array([[x, y]]))[0].tolist()
+        wide = math.ceil(reach / step) + 1
+        rows = np.arange(max(row - wide, 0), min(row + wide + 1, roomy.shape[0]))
+        columns = np.arange(max(column - wide, 0), min(column + wide + 1, roomy.shape[1]))
+        index = np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
+        near = np.hypot(*(field.places(index) - (x, y)).T) < reach
+        roomy[index[near, 0], index[near, 1]] = False
 
 
 def _nearest_free_place(

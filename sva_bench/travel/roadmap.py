@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.choices import PathPlanner
 from sva_bench.geometry.buckets import clearance_checker, keeps_clear, keeps_clearance
-from sva_bench.geometry.cells import Cells, distance_field
+from sva_bench.geometry.cells import distance_field
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.interrupts import deferring_ctrl_c, pressed
 from sva_bench.travel.lattice import lattice_paths, reachable_components
@@ -91,27 +91,26 @@ def plan_paths(
     Source:
         Karaman & Frazzoli (2011), "Sampling-based algorithms for optimal motion planning" (PRM*).
     """
-    ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
     if planner in PAIR_PLANNERS:
+        ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
         return _pair_by_pair(obstacles, points, clearance_m, planner)
     if len(points) < 2:
         return [[None] for _ in points]
-    return _shortest(_connecting_roadmap(obstacles, points, clearance_m), points)
+    return _shortest(connecting_roadmap(obstacles, points, clearance_m, seed), points)
 
 
 def roadmap_edges(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> FloatArray:
     """The edges of the roadmap of ``plan_paths``, for display: both ends of each [m], shape (e, 2, 2)."""
     if len(points) < 2:
         return np.empty((0, 2, 2))
-    ou.RNG.setSeed(1)
-    roadmap = _connecting_roadmap(obstacles, points, clearance_m)
+    roadmap = connecting_roadmap(obstacles, points, clearance_m)
     one, other = roadmap.graph.nonzero()
     ends: FloatArray = np.stack([roadmap.vertices[one], roadmap.vertices[other]], axis=1)
     return ends
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Roadmap:
+class Roadmap:
     """A roadmap.
 
     Attributes:
@@ -204,8 +203,9 @@ def _state(si: Any, point: Sequence[float] | FloatArray) -> Any:
     return state
 
 
-def _connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roadmap:
-    """A roadmap grown until it connects all points, or to the last of ``_GROWTH``."""
+def connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: float, seed: int = 0) -> Roadmap:
+    """The roadmap of ``plan_paths``, of two points or more: grown until it connects all, or to the last of _GROWTH."""
+    ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
     disconnected: BoolArray | None = None
     for milestones, per_corner in _GROWTH:
         roadmap = _build_roadmap(obstacles, points, clearance_m, milestones, per_corner)
@@ -215,7 +215,7 @@ def _connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: f
         if not missing.any():
             break
         if obstacles.cells is not None and len(roadmap.arcs) > _CROWD:
-            return _with_lattice_paths(roadmap, obstacles.cells, points, clearance_m, np.flatnonzero(missing[0]))
+            return _with_lattice_paths(roadmap, obstacles, points, clearance_m, np.flatnonzero(missing[0]))
         if disconnected is None:
             disconnected = surely_disconnected(obstacles, points, clearance_m)
         if disconnected[missing].all():
@@ -224,10 +224,10 @@ def _connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: f
 
 
 def _with_lattice_paths(
-    roadmap: _Roadmap, cells: Cells, points: FloatArray, clearance_m: float, goals: IntArray
-) -> _Roadmap:
+    roadmap: Roadmap, obstacles: Obstacles, points: FloatArray, clearance_m: float, goals: IntArray
+) -> Roadmap:
     """A roadmap with lattice paths from the first point to some others added, and tangents from their vertices."""
-    found = lattice_paths(cells, roadmap.checker, clearance_m, points, goals.tolist())
+    found = lattice_paths(obstacles, roadmap.checker, clearance_m, points, goals.tolist())
     paths = [path for path in found if path is not None]
     if not paths:
         return roadmap
@@ -243,7 +243,7 @@ def _with_lattice_paths(
 
 def _build_roadmap(
     obstacles: Obstacles, points: FloatArray, clearance_m: float, milestones: int, per_corner: int,
-) -> _Roadmap:
+) -> Roadmap:
     si, _ = _space(obstacles, clearance_m)
     arcs = arc_points(obstacles, clearance_m, per_corner, points)
     samples = roadmap_samples(obstacles, clearance_m, milestones, arcs)
@@ -264,10 +264,10 @@ def _build_roadmap(
     ends = np.concatenate([_isolated(points), arcs])
     vertices, graph = _with_edges(*_read_roadmap(si, planner), ends[:, :2], tangents(checker, ends))
     at = np.array([int(np.argmin(np.hypot(*(vertices - point).T))) for point in points], dtype=np.int64)
-    return _Roadmap(vertices=vertices, graph=graph, at=at, checker=checker, arcs=arcs)
+    return Roadmap(vertices=vertices, graph=graph, at=at, checker=checker, arcs=arcs)
 
 
-def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | None]]:
+def _shortest(roadmap: Roadmap, points: FloatArray) -> list[list[FloatArray | None]]:
     """Shortest paths on a roadmap, shortened by shortcuts, as ``plan_paths`` returns them."""
     at = roadmap.at.tolist()
     lengths, before = dijkstra(roadmap.graph, directed=False, indices=at, return_predecessors=True)

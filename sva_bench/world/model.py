@@ -28,6 +28,7 @@ class Site:
         stop_s: Duration of a stop [s].
         charge_rate: Of a station: seconds of driving that a second there fills into the tank, on top of ``stop_s``;
             ``None`` = a stop takes ``stop_s`` alone.
+        slots: Of a station: how many robots it serves at once, where robots meet.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Site:
     heading_rad: float
     stop_s: float = 0.0
     charge_rate: float | None = None
+    slots: int = 1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -95,7 +95,7 @@ def test_lattice_paths_keep_the_clearance_and_find_every_passage(yaw: float) -> 
     obstacles = obstacles_of(cells)
     clearance = 0.249  # of half the gaps, a millimetre less
     points = places_on(cells, 8, 0, clearance)
-    paths = lattice_paths(cells, clearance_checker(obstacles, clearance), clearance, points, range(1, len(points)))
+    paths = lattice_paths(obstacles, clearance_checker(obstacles, clearance), clearance, points, range(1, len(points)))
     for k, way in enumerate(paths, start=1):
         assert way is not None
         np.testing.assert_allclose(way[[0, -1]], points[[0, k]])
@@ -107,7 +107,7 @@ def test_no_path_leads_through_a_wall() -> None:
     occupied[:, 20] = True
     cells = cells_of(occupied, 0.1)
     points = np.array([[1.0, 1.0], [1.0, 3.0], [3.0, 1.0]])
-    paths = lattice_paths(cells, clearance_checker(obstacles_of(cells), 0.3), 0.3, points, [1, 2])
+    paths = lattice_paths(obstacles_of(cells), clearance_checker(obstacles_of(cells), 0.3), 0.3, points, [1, 2])
     assert paths[0] is not None
     assert paths[1] is None
 
