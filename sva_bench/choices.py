@@ -12,6 +12,13 @@ from typing import Literal, get_args
 SiteKind = Literal["base", "station", "poi"]
 FailureProcess = Literal["mission", "per_leg", "hazard"]
 MapMode = Literal["trinary", "scale", "raw"]
+Interaction = Literal["independent", "uncoordinated", "shared"]
+INTERACTIONS: Mapping[Interaction, str] = {
+    "independent": "robots do not meet: each drives as if it were alone",
+    "uncoordinated": "they drive in one world, and nobody coordinates them",
+    "shared": "they drive in one world, coordinated: they wait for each other and never touch",
+}
+"""What robots are to each other, in a few words each."""
 Unknown = Literal["occupied", "free"]
 """What cells of a map count as that are neither occupied nor free."""
 SolidKind = Literal["box", "cylinder", "sphere"]
@@ -76,6 +83,8 @@ DriveUnit = Literal["hops", "routes"]
 """What is driven at a time: from site to site, or from base to base."""
 MarkKind = Literal["contact", "wait"]
 """What a picture marks of what robots met."""
+StandKind = Literal["berth", "slot"]
+"""A place for one robot, at the base or at a station."""
 Judgement = Literal["safe", "close", "edge"]
 """Of a leg under noise: one with little margin is ``close``, one on which robots run dry or late is on the ``edge``."""
 NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payload", "capacity", "people", "passages",

@@ -39,6 +39,8 @@ REGISTRIES: list[tuple[str, Iterable[Any]]] = [
     ("SiteKind", drawing._KINDS),
     ("SiteKind", drawing._MARKERS),
     ("End", choices.ENDS),
+    ("Interaction", choices.INTERACTIONS),
+    ("StandKind", drawing._STANDS),
     ("PolicyName", POLICIES),
     ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"], "anticipative"]),
 ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from sva_bench.analysis.catalogue import measured
 from sva_bench.analysis.figures import bad_figure, difference_figure, end_figures, value_figure
+from sva_bench.analysis.meetings import interaction_summary
 from sva_bench.analysis.moments import Figure
 from sva_bench.analysis.results import (
     MOST_AMOUNT,
@@ -144,7 +145,8 @@ def plan_result(promise: Promise, run: Executed, *, noisy: bool) -> PlanResult:
     by_robot = {name: float(run.value[:, k].mean()) for k, name in enumerate(run.robots)}
     statistics = {key: estimate(found) for key, found in measured(run, noisy=noisy).items()}
     sums = plan_figures(promise, estimate(figure), by_robot, counts, charges(run) / len(run.end), statistics)
-    return PlanResult(**vars(sums), executed_controlled=controlled(figure, promise.expected),
+    own = vars(sums) | {"interaction": interaction_summary(run.meetings)}
+    return PlanResult(**own, executed_controlled=controlled(figure, promise.expected),
                       distribution=distribution(totals(run)), end_shares=shares,
                       bad=_share(bad_figure(run, noisy=noisy)))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from sva_bench.analysis.comparison import comparison_of, ranking
 from sva_bench.analysis.figures import mean_taken
+from sva_bench.analysis.meetings import interaction_summary
 from sva_bench.analysis.moments import Bounds, Clusters, Figure, Moments, figure_of
 from sva_bench.analysis.over_trials import percent, verdict_of
 from sva_bench.analysis.reaction_results import (
@@ -120,7 +121,7 @@ def _plan(plan: PlanReacted, *, noisy: bool) -> ReactingPlan:
             own.get(end, 0.0) for own in shares.values())))},
         end_shares=shares, ledger=_ledger(plan, executed.mean), missions=len(run.weight),
         reacted=min(float(run.weight @ run.reacted), 1.0),
-        doubled=float(run.weight @ run.doubled))
+        doubled=float(run.weight @ run.doubled), interaction=interaction_summary(run.meetings, run.weight))
 
 
 def _ledger(plan: PlanReacted, executed: float) -> ReactionLedger:

@@ -46,6 +46,7 @@ def _is_printable(name: str) -> str:
 MOST_AMOUNT = 1e15
 Amount = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MOST_AMOUNT, le=MOST_AMOUNT)]
 """A sum of incentives, or a percentage of one; bounded, since pages add, subtract and plot them."""
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=MOST_AMOUNT)]
 Interval = Annotated[tuple[Amount, Amount], BeforeValidator(low_and_high), AfterValidator(_in_order)]
 Words = Annotated[str, Field(max_length=10_000)]
 PlanName = Annotated[str, Field(pattern=r"^[^/\x00-\x1f]{1,250}$"), AfterValidator(_is_printable)]
@@ -145,6 +146,23 @@ class Promise(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class InteractionSummary(Record):
+    """What robots of one world did to each other: means over missions.
+
+    Attributes:
+        contacts: How many times two robots came to touch.
+        waited_s: How long robots waited for others, added up over the team [s].
+        detours: How many legs were driven on another path than the shortest, because of other robots.
+        exact_share: Share of missions whose ends are exact, not taken over from a mission alike.
+    """
+
+    contacts: NonNegative
+    waited_s: NonNegative
+    detours: NonNegative
+    exact_share: Probability
+
+
+@dataclass(frozen=True, kw_only=True)
 class PlanFigures(Promise):
     """The results of a plan that follow from sums over its trials.
 
@@ -154,6 +172,7 @@ class PlanFigures(Promise):
         ends: Number of robot missions with each end.
         ledger: Decomposition of executed less promised value.
         statistics: Those of ``analysis.catalogue`` that are measured trial by trial, by their keys.
+        interaction: What robots did to each other; ``None`` where they do not meet.
     """
 
     executed: Estimate
@@ -161,6 +180,7 @@ class PlanFigures(Promise):
     ends: Mapping[End, NonNegativeInt]
     ledger: Ledger
     statistics: Mapping[Name, Estimate] = field(default_factory=dict)
+    interaction: InteractionSummary | None = field(default=None, metadata=stands_after("ledger"))
 
 
 @dataclass(frozen=True, kw_only=True)

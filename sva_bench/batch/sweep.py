@@ -16,7 +16,7 @@ from pydantic import Field
 
 from sva_bench.analysis.calibration import Target, target_of
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
-from sva_bench.choices import FailureProcess, Fidelity, News, PathPlanner, PolicyName
+from sva_bench.choices import FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.complaints import shown
 from sva_bench.files.digest import digest
@@ -53,7 +53,7 @@ class Sweep:
         trials, rollouts, fidelity, unit_trials: As for ``Options`` and ``Grid``.
         planners: How paths are planned.
         scenarios: Names of the scenarios to execute.
-        margin, plan_failure, execute_failure: In place of the worlds' own.
+        margin, plan_failure, execute_failure, interaction: In place of the worlds' own.
         policies, news, anticipate, calibrate, evpi: As for ``Options``.
         time_limit_s, gap: When a solve may stop.
         vary: Values by dotted key of a world file.
@@ -72,6 +72,7 @@ class Sweep:
     margin: float | None = None
     plan_failure: FailureProcess | None = None
     execute_failure: FailureProcess | None = None
+    interaction: Interaction | None = None
     policies: tuple[PolicyName, ...] | None = None
     news: tuple[News, ...] | None = None
     anticipate: bool | None = None
@@ -103,6 +104,7 @@ class _SweepFile(Section):
     margin: Number | None = Field(default=None, ge=0, le=1)
     plan_failure: FailureProcess | None = None
     execute_failure: FailureProcess | None = None
+    interaction: Interaction | None = None
     policy: Annotated[list[str], Field(min_length=1)] | str | None = None
     news: Annotated[list[str], Field(min_length=1)] | str | None = None
     anticipate: bool | None = None
@@ -147,8 +149,8 @@ def _from_file(document: Document) -> Sweep:
         worlds=tuple(worlds), seeds=seeds, trials=file.trials, rollouts=file.rollouts, fidelity=file.fidelity,
         unit_trials=file.unit_trials, planners=tuple(file.planners) if file.planners else None,
         scenarios=tuple(file.scenarios) if file.scenarios else None, margin=file.margin,
-        plan_failure=file.plan_failure, execute_failure=file.execute_failure, policies=policies, news=news,
-        anticipate=file.anticipate, evpi=file.evpi,
+        plan_failure=file.plan_failure, execute_failure=file.execute_failure, interaction=file.interaction,
+        policies=policies, news=news, anticipate=file.anticipate, evpi=file.evpi,
         calibrate=targets[0] if targets else None, time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set,
         file=document)
 
@@ -323,8 +325,8 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
                 if name in (sweep.scenarios or ())[:number]:
                     raise sweep.wrong("scenarios", ("scenarios", number), f"--scenario {name}",
                                       "given twice; give it once")
-            yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure),
-                            from_file),
+            yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure,
+                                    sweep.interaction), from_file),
                    [f"{key}={json.dumps(value)}" for key, value in values.items()])
 
 
@@ -334,9 +336,10 @@ def _effective(world: World, options: Options) -> tuple[int, str]:
     Availabilities under ``robots:`` are those of scenarios that don't say otherwise, and of nothing else.
     """
     robots = [replace(robot, availability=1.0, urdf=None) for robot in world.robots]  # its model says all of a URDF
-    return id(world.obstacles), digest(world.name, world.sites, robots, world.scenarios, world.plan_failure,
+    sites = world.sites if world.meets else [replace(site, slots=1) for site in world.sites]
+    return id(world.obstacles), digest(world.name, sites, robots, world.scenarios, world.plan_failure,
                                        world.execute_failure, world.margin, world.noise, world.passages,
-                                       reactions_of(world, options))
+                                       world.interaction if world.meets else "", reactions_of(world, options))
 
 
 def _sharing(world: World, from_file: dict[str, World]) -> World:

@@ -17,6 +17,7 @@ from sva_bench.cli.options import (
     AsJson,
     Calibrate,
     ExecuteFailure,
+    InteractionOption,
     MarginOption,
     NewsNames,
     PlanFailure,
@@ -90,6 +91,7 @@ def over(
     news: NewsNames = None,
     anticipate: Anticipate = False,
     calibrate: Calibrate = None,
+    interaction: InteractionOption = None,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
                                                       "takes.")] = False,
     time_limit: TimeLimit = None,
@@ -131,7 +133,7 @@ def over(
     sweep = sweep_of(worlds, Sweep(
         seeds=seeds_of(seed) if seed else None, trials=trials, rollouts=rollouts, fidelity=fidelity,
         planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
-        margin=margin, plan_failure=plan_failure, execute_failure=execute_failure,
+        margin=margin, plan_failure=plan_failure, execute_failure=execute_failure, interaction=interaction,
         policies=policies_of(policy) if policy else None, news=news_of(news) if news else None,
         anticipate=anticipate or None, calibrate=None if calibrate is None else target_of(calibrate),
         evpi=evpi or None,

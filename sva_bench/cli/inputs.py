@@ -11,7 +11,16 @@ import typer
 
 from sva_bench.choices import InstanceFamily, PathPlanner, Unknown, WorldFamily
 from sva_bench.cli.loading import loading
-from sva_bench.cli.options import AsJson, Force, PlannerOption, ScenarioNames, Verbose, WorldArgument, finite
+from sva_bench.cli.options import (
+    AsJson,
+    Force,
+    InteractionOption,
+    PlannerOption,
+    ScenarioNames,
+    Verbose,
+    WorldArgument,
+    finite,
+)
 from sva_bench.cli.terminal import (
     messages,
     print_json,
@@ -52,6 +61,7 @@ def check_world(
     seed: Annotated[int | None, typer.Option(min=0, max=MOST_SEED, help="With --noise: their seed.",
                                              show_default="0")] = None,
     scenario: ScenarioNames = None,
+    interaction: InteractionOption = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="PICTURE.png|svg", help="With --noise: draw "
                                                 "the legs of the tightest plan, coloured by their margin.",
                                                 show_default="none")] = None,
@@ -75,26 +85,30 @@ def check_world(
     if output is not None:
         _kind_of(output)
         check_output(output, world)
-    loaded = load(world, scenario)
+    loaded = load(world, scenario, interaction=interaction)
     if noise:
         _check_noise(loaded, world, planner, plan, output, draws or 200, seed or 0, as_json=as_json)
         return
     with loading():
         from sva_bench.analysis.reach import NOTHING, beyond_reach
+        from sva_bench.report.stands import interaction_lines, stands_of
         from sva_bench.study.costs import plan_costs, reach_of
 
     with about(world), progress_bars() as progress:
+        stands = stands_of(loaded)
         costs = plan_costs(loaded, planner, progress)
     _warn_of_passages(loaded, costs)
     console = results()
-    for cost in costs.values():
+    for kind, cost in costs.items():
         longest = int(cost.repaired_ms.max()) / 1000
-        console.print(f"{cost.times.model.name}: {counted(cost.pairs, 'travel time')} of up to {longest:.1f} s, "
+        console.print(f"{kind}: {counted(cost.pairs, 'travel time')} of up to {longest:.1f} s, "
                       f"{cost.changed_pct:.1f} % repaired; paths keep {cost.times.clearance_m:.3f} m from obstacles",
                       highlight=False)
     if loaded.reaction.policy != "none":
         console.print(f"the team reacts to failures: policy {loaded.reaction.policy}, news {loaded.reaction.news}",
                       highlight=False)
+    for said in interaction_lines(loaded, stands):
+        console.print(said, highlight=False, markup=False)
     reach = reach_of(loaded, costs)
     for said in beyond_reach(reach):
         console.print(said, highlight=False, markup=False)

@@ -8,7 +8,16 @@ from typing import Annotated
 
 import typer
 
-from sva_bench.choices import NEWS, POLICY_NAMES, USUAL_NEWS, FailureProcess, Fidelity, PathPlanner
+from sva_bench.choices import (
+    INTERACTIONS,
+    NEWS,
+    POLICY_NAMES,
+    USUAL_NEWS,
+    FailureProcess,
+    Fidelity,
+    Interaction,
+    PathPlanner,
+)
 from sva_bench.errors import BadInput
 from sva_bench.files.streams import CLOSED, output_is_closed
 from sva_bench.study.bounds import MOST_ROLLOUTS, MOST_SEED, MOST_TRIALS
@@ -68,6 +77,9 @@ Calibrate = Annotated[str | None, typer.Option(
     "--calibrate", metavar="SHARE%|best", help="Make the planner calibrated too: on costs raised until at most this "
     "share of missions goes wrong though nobody fails, such as 1%; or until it is worth most under noise.",
     show_default="none")]
+InteractionOption = Annotated[Interaction | None, typer.Option(
+    "--interaction", help="What robots are to each other. " + "; ".join(
+        f"{name}: {said}" for name, said in INTERACTIONS.items()) + ".", show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
 

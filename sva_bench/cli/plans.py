@@ -177,7 +177,7 @@ def _instance_of_world(
 
     with about(path):
         costs = plan_costs(world, planner, progress)
-    for cost in costs.values():
-        messages.print(f"{cost.times.model.name}: {counted(cost.pairs, 'travel time')}, {cost.changed_pct:.1f} % "
+    for kind, cost in costs.items():
+        messages.print(f"{kind}: {counted(cost.pairs, 'travel time')}, {cost.changed_pct:.1f} % "
                        f"repaired, by up to {cost.max_excess_pct:.1f} %", highlight=False)
     return instance_of(world, costs, world.scenarios[0] if scenario else nominal_scenario(world))

@@ -17,6 +17,7 @@ from sva_bench.cli.options import (
     ExecuteFailure,
     FidelityOption,
     Gap,
+    InteractionOption,
     MarginOption,
     NewsNames,
     Out,
@@ -61,6 +62,7 @@ def run(
     news: NewsNames = None,
     anticipate: Anticipate = False,
     calibrate: Calibrate = None,
+    interaction: InteractionOption = None,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
@@ -97,7 +99,7 @@ def run(
     target = None if calibrate is None else target_of(calibrate)
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
-    loaded = load(world, scenario, margin, plan_failure, execute_failure)
+    loaded = load(world, scenario, margin, plan_failure, execute_failure, interaction)
     check_reactions(loaded, policies, heard, anticipate=anticipate)
     load_libraries()  # after the world is read: an error in the file is said at once
     with loading():
@@ -136,6 +138,7 @@ def execute(
     policy: PolicyNames = None,
     news: NewsNames = None,
     anticipate: Anticipate = False,
+    interaction: InteractionOption = None,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -154,7 +157,7 @@ def execute(
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
     named = by_name(plans)
-    loaded = load(world, scenario, margin, execute_failure=execute_failure)
+    loaded = load(world, scenario, margin, execute_failure=execute_failure, interaction=interaction)
     check_reactions(loaded, policies, heard, anticipate=anticipate)
     refuse_the_name(named, anticipate=anticipate)
     read = read_plans(loaded, named)

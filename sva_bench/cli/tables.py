@@ -19,6 +19,7 @@ from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_page import calibration_lines
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
+from sva_bench.report.interaction_section import INTERACTION_HEAD, interaction_table, interaction_told
 from sva_bench.report.source_table import SOURCES_HEAD, source_rows
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
@@ -47,6 +48,8 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
                   f"{travel.max_excess_pct:.1f} %; {assumed(summary)}.", highlight=False)
     _print_unhappy(summary, console)
+    if told := interaction_told(summary.scenarios):
+        console.print(told, highlight=False)
     if isinstance(summary, ComparisonSummary):
         for scenario in summary.scenarios:
             if scenario.comparisons:
@@ -65,6 +68,7 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
         _print_assumptions(summary, console)
     if wide:
         _print_sources(summary, console)
+        _print_interaction(summary, console)
     if not summary.reproducible:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
 
@@ -128,6 +132,16 @@ def _print_sources(summary: AnySummary, console: Console) -> None:
         table = Table(title="What each source of noise did", title_justify="left")
         for number, heading in enumerate(SOURCES_HEAD):
             table.add_column(heading, justify="left" if number < 3 else "right")
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+
+
+def _print_interaction(summary: AnySummary, console: Console) -> None:
+    if rows := interaction_table(summary.scenarios):
+        table = Table(title="What robots did to each other, a mission", title_justify="left")
+        for number, heading in enumerate(INTERACTION_HEAD):
+            table.add_column(heading, justify="left" if number < 2 else "right")
         for row in rows:
             table.add_row(*row)
         console.print(table)

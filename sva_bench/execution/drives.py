@@ -1,8 +1,8 @@
 """Drives: what robots drive, made once for all trials that share it, here or by workers, and put together to routes.
 
-Under ``rollout`` the unit is a hop from site to site: driven once for each model, disturbance and pair of sites, from
-rest in the origin's own pose, and composed into the routes of all plans. A robot stops at each site that it comes
-through, also at those between the ends of a repaired leg, so a hop is what begins and ends alike wherever it stands.
+Under ``rollout`` the unit is a hop from site to site: driven once for each kind of robot, disturbance and pair of
+sites, from rest in the origin's own pose, and composed into the routes of all plans. A robot stops at each site that it
+comes through, also at those between the ends of a repaired leg, so a hop begins and ends alike wherever it stands.
 Under ``kinematic`` and ``physics`` the unit is a whole route: by the twin, and for each trial by itself in physics, as
 the check of what is composed.
 """
@@ -34,7 +34,7 @@ from sva_bench.robot.follower import Stretch
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import drive as drive_twin
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import Site, World
+from sva_bench.world.model import World
 
 TRACE_HZ = 20.0
 _BACK_M = 0.3  # from the hull to a passage that a robot waits before
@@ -49,7 +49,7 @@ RouteKey = tuple[str, Route, int, int]
 """Robot, stops driven, rollout, and the trial under ``physics``, else 0: what a driven route depends on in a world."""
 
 HopKey = tuple[str, Disturbance, str, str]
-"""Robot model, disturbance, origin and destination: what a hop depends on in one world."""
+"""Kind of robot, disturbance, origin and destination: what a hop depends on in one world."""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -212,7 +212,6 @@ class Courses:
     def __init__(self, world: World, costs: Mapping[str, FuelCosts], settings: Settings) -> None:
         self._world, self._costs, self._settings = world, costs, settings
         self._numbers = {robot.name: number for number, robot in enumerate(world.robots)}
-        self._sites = {site.name: site for site in world.sites}
         # A worker needs the boxes alone; the twin drives through everything.
         self._solids = _NOWHERE if settings.fidelity == "kinematic" else replace(world.obstacles, cells=None)
         self._hops: dict[tuple[str, str, str], Hop] = {}
@@ -230,15 +229,15 @@ class Courses:
         groups: dict[tuple[object, ...], list[tuple[RouteKey | HopKey, DriveTask]]] = {}
         if self._settings.fidelity == "rollout":
             for hop, (rollout, traced) in self._lacking(wanted, known).items():
-                model, disturbance, origin, destination = hop
-                task = self._task(model, origin, ((self._hop(model, origin, destination),),), disturbance, traced)
-                groups.setdefault((model, origin, destination, rollout // size), []).append((hop, task))
+                kind, disturbance, origin, destination = hop
+                task = self._task(kind, origin, ((self._hop(kind, origin, destination),),), disturbance, traced)
+                groups.setdefault((kind, origin, destination, rollout // size), []).append((hop, task))
         else:
             for key, traced in wanted.items():
                 if key not in known.routes and key not in known.whole:
                     robot, route, rollout, trial = key
-                    model = self._model(robot)
-                    task = self._task(model, route[0], self._legs(model, route), self._drawn(key).disturbance, traced)
+                    kind = self._kind(robot)
+                    task = self._task(kind, route[0], self._legs(kind, route), self._drawn(key).disturbance, traced)
                     groups.setdefault((robot, route, rollout // size, trial), []).append((key, task))
         return [Chunk(keys=tuple(key for key, _ in group), tasks=tuple(task for _, task in group),
                       what=_what(group[0][0])) for group in groups.values()]
@@ -247,10 +246,10 @@ class Courses:
         """Put routes together from their hops, where they were not driven whole; ``drives`` receives them."""
         for key in wanted:
             if key not in drives.routes:
-                drawn, model = self._drawn(key), self._model(key[0])
+                drawn, kind = self._drawn(key), self._kind(key[0])
                 driven = drives.whole[key] if key in drives.whole else composed(
-                    [[drives.hops[model, drawn.disturbance, a, b] for a, b in leg]
-                     for leg in self._hops_of(model, key[1])])
+                    [[drives.hops[kind, drawn.disturbance, a, b] for a, b in leg]
+                     for leg in self._hops_of(kind, key[1])])
                 drives.routes[key] = replace(driven, capacity=drawn.capacity, waits=self._waits(key, driven.leg_s))
 
     def _lacking(self, wanted: Mapping[RouteKey, bool], known: Drives) -> dict[HopKey, tuple[int, bool]]:
@@ -259,23 +258,23 @@ class Courses:
         for key, traced in wanted.items():
             if key in known.routes:
                 continue
-            disturbance, model = self._drawn(key).disturbance, self._model(key[0])
-            for leg in self._hops_of(model, key[1]):
+            disturbance, kind = self._drawn(key).disturbance, self._kind(key[0])
+            for leg in self._hops_of(kind, key[1]):
                 for origin, destination in leg:
-                    hop = model, disturbance, origin, destination
+                    hop = kind, disturbance, origin, destination
                     rollout, before = lacking.get(hop, (key[2], False))
                     if hop not in known.hops or (traced and not len(known.hops[hop].pose)):
                         lacking[hop] = rollout, before or traced
         return lacking
 
-    def _task(self, model: str, origin: str, legs: tuple[Leg, ...], disturbance: Disturbance, traced: bool
+    def _task(self, kind: str, origin: str, legs: tuple[Leg, ...], disturbance: Disturbance, traced: bool
               ) -> DriveTask:
-        site = self._sites[origin]
-        return DriveTask(obstacles=self._solids, model=self._costs[model].times.model, start=_pose(site), legs=legs,
+        return DriveTask(obstacles=self._solids, model=self._costs[kind].times.model, legs=legs,
+                         start=pose_at(self._world, self._costs[kind], origin),
                          fidelity=self._settings.fidelity, traced=traced, disturbance=disturbance)
 
-    def _model(self, robot: str) -> str:
-        return self._world.robots[self._numbers[robot]].model.name
+    def _kind(self, robot: str) -> str:
+        return self._world.kind_of(self._world.robots[self._numbers[robot]])
 
     def _drawn(self, key: RouteKey) -> NoiseDraw:
         return draw_noise(self._world.noise, self._settings.seed, key[2], self._numbers[key[0]])
@@ -285,44 +284,50 @@ class Courses:
         if not self._may_wait:
             return ()
         robot, route, rollout, _ = key
-        waits, model = [], self._model(robot)
-        for leg, hops in enumerate(self._hops_of(model, route)):
+        waits, kind = [], self._kind(robot)
+        for leg, hops in enumerate(self._hops_of(kind, route)):
             met, way_m = [], 0.0
             for a, b in hops:
                 met += [(way_m + wait.along_m, wait) for wait in self._hop_waits(robot, rollout, a, b)]
-                way_m += sum(float(stretch.arc[-1]) for stretch in self._hop(model, a, b))
+                way_m += sum(float(stretch.arc[-1]) for stretch in self._hop(kind, a, b))
             lasts_s = float(leg_s[leg]) if leg < len(leg_s) else 0.0
             waits += [Wait(leg=leg, lasts_s=wait.lasts_s, x_m=wait.x_m, y_m=wait.y_m, cause=wait.cause,
                            since_s=lasts_s * along_m / way_m) for along_m, wait in met]
         return tuple(waits)
 
     def _hop_waits(self, robot: str, rollout: int, origin: str, destination: str) -> tuple[HopWait, ...]:
-        key, model = (robot, rollout, origin, destination), self._model(robot)
+        key, kind = (robot, rollout, origin, destination), self._kind(robot)
         if key not in self._waited:
             self._waited[key] = waits_on(
-                self._hop(model, origin, destination), (origin, destination), self._world.noise, self._world.passages,
-                self._settings.seed, rollout, self._numbers[robot], self._costs[model].times.model.radius_m + _BACK_M)
+                self._hop(kind, origin, destination), (origin, destination), self._world.noise, self._world.passages,
+                self._settings.seed, rollout, self._numbers[robot], self._costs[kind].times.model.radius_m + _BACK_M)
         return self._waited[key]
 
-    def _hops_of(self, model: str, route: Route) -> list[list[tuple[str, str]]]:
+    def _hops_of(self, kind: str, route: Route) -> list[list[tuple[str, str]]]:
         """Ends of each hop of each leg."""
-        return [list(pairwise(self._costs[model].chain(*leg))) for leg in pairwise(route)]
+        return [list(pairwise(self._costs[kind].chain(*leg))) for leg in pairwise(route)]
 
-    def _legs(self, model: str, route: Route) -> tuple[Leg, ...]:
-        return tuple(tuple(self._hop(model, a, b) for a, b in leg) for leg in self._hops_of(model, route))
+    def _legs(self, kind: str, route: Route) -> tuple[Leg, ...]:
+        return tuple(tuple(self._hop(kind, a, b) for a, b in leg) for leg in self._hops_of(kind, route))
 
-    def _hop(self, model: str, origin: str, destination: str) -> Hop:
-        key = model, origin, destination
+    def _hop(self, kind: str, origin: str, destination: str) -> Hop:
+        key = kind, origin, destination
         if key not in self._hops:
-            self._hops[key] = self._costs[model].times.course(origin, destination)
+            self._hops[key] = self._costs[kind].times.course(origin, destination)
         return self._hops[key]
 
 
 _NOWHERE = Obstacles(bounds_m=np.zeros(4), boxes=np.empty((0, 5)), cylinders=np.empty((0, 3)))
 
 
-def _pose(site: Site) -> Pose:
-    return site.x_m, site.y_m, site.heading_rad
+def pose_at(world: World, costs: FuelCosts, site: str) -> Pose:
+    """How a robot of these costs stands at a site; where robots meet, at its own berth or slot there."""
+    number = costs.times.number_of(site)
+    place = world.sites[number]
+    own = next((path[0] for path in costs.times.paths[number] if path is not None), None) if world.meets else None
+    if own is None:
+        return place.x_m, place.y_m, place.heading_rad
+    return float(own[0]), float(own[1]), costs.times.headings_rad[number]
 
 
 def _what(key: RouteKey | HopKey) -> str:

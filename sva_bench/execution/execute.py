@@ -12,9 +12,10 @@ import numpy as np
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.execution.case import Case as Case
 from sva_bench.execution.case import Settings as Settings
-from sva_bench.execution.drives import Chunk, Courses, Drives, RouteKey, drive_all, receive
+from sva_bench.execution.drives import Chunk, Courses, Drives, RouteKey, drive_all, pose_at, receive
 from sva_bench.execution.fate import Fate, draw_fate
 from sva_bench.execution.margins import Margins, margins_of_team
+from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.noise import draw_noise
 from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, Wait, trace_of
 from sva_bench.execution.rules import legs_of, settle
@@ -78,6 +79,7 @@ class Executed:
         margins: What fuel and time each route left under the draws that were driven; none of robots that stay home.
         legs: Every leg that was driven; none unless recorded.
         traces: The first trial over time, a trace for each robot; none unless recorded.
+        meetings: What robots did to each other; ``None`` where they do not meet.
     """
 
     case: Case
@@ -101,6 +103,7 @@ class Executed:
     margins: tuple[Margins, ...]
     legs: tuple[LegTime, ...]
     traces: tuple[Trace, ...]
+    meetings: Meetings | None = None
 
 
 def execute(
@@ -112,7 +115,7 @@ def execute(
 
     Args:
         world: The world.
-        costs: Fuel costs by the name of the robot model.
+        costs: Fuel costs by what ``World.kind_of`` says of a robot.
         cases: Plans with their scenarios; drives that several of them share are made once.
         settings: Seed, trials, rollouts, fidelity.
         executor: Where drives run; ``None`` = here.
@@ -184,7 +187,7 @@ def planned_legs(world: World, costs: Mapping[str, FuelCosts], cases: Sequence[C
     """Planned driving times of every route of some cases."""
     planned: dict[tuple[str, Route], tuple[float, ...]] = {}
     for robot in world.robots:
-        fuel = costs[robot.model.name]
+        fuel = costs[world.kind_of(robot)]
         number = {site: k for k, site in enumerate(fuel.times.sites)}
         for route in {case.plan.route(robot.name) for case in cases}:
             planned[robot.name, route] = tuple(
@@ -276,7 +279,7 @@ def _settle_all(
         if settings.recorded:
             driven = _drive_of(drives, _key(settings, order, settings.first, int(failed[0])))
             noise = draw_noise(world.noise, settings.seed, settings.first % settings.rollouts, number)
-            traces.append(_trace(world, costs[world.robots[number].model.name], order, driven,
+            traces.append(_trace(world, costs[world.kind_of(world.robots[number])], order, driven,
                                  settle(order, driven, fate.of(0, number)), noise.disturbance.waves))
     figures = {name: np.column_stack([column[name] for column in columns]) for name in columns[0]}
     drawn = [left_by_draws(o, fate.fails[:, k], fate.lifetime_s[:, k]) for k, o in enumerate(orders)]
@@ -291,7 +294,7 @@ def _settle_all(
         incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],
         fuel_used_s=figures["fuel_used_s"], waited_s=figures["waited_s"],
         **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
-        legs=tuple(_leg_times(world, costs, mine)) if settings.recorded else (), traces=tuple(traces))
+        legs=tuple(_leg_times(world, costs, mine)) if settings.recorded else (), traces=tuple(traces), meetings=None)
 
 
 NOTHING = Driven(leg_s=np.empty(0), stuck=False, leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)))
@@ -305,19 +308,18 @@ def _drive_of(drives: Mapping[RouteKey, Driven], key: RouteKey | None) -> Driven
 
 def _trace(world: World, costs: FuelCosts, order: Assignment, driven: Driven, outcome: Outcome, waves: FloatArray
            ) -> Trace:
-    base = world.sites[0]
     planned = [costs.times.path(a, b) for leg in pairwise(order.route) for a, b in pairwise(costs.chain(*leg))]
-    return trace_of(order, driven, outcome, (base.x_m, base.y_m, base.heading_rad),
+    return trace_of(order, driven, outcome, pose_at(world, costs, world.sites[0].name),
                     np.concatenate(planned) if planned else np.empty((0, 2)), waves=waves)
 
 
 def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[RouteKey, tuple[int, Driven]]
                ) -> list[LegTime]:
     """Every leg of the drives given, each with its first trial; of trials that share a drive, once."""
-    models = {robot.name: robot.model.name for robot in world.robots}
+    kinds = {robot.name: world.kind_of(robot) for robot in world.robots}
     rows = []
     for (robot, route, rollout, _), (trial, driven) in drives.items():
-        fuel = costs[models[robot]]
+        fuel = costs[kinds[robot]]
         for leg, (done, (origin, destination)) in enumerate(zip(legs_of(driven), pairwise(route), strict=False)):
             # a stuck robot drives fewer
             planned_ms = fuel.repaired_ms[fuel.times.sites.index(origin), fuel.times.sites.index(destination)]

@@ -23,11 +23,11 @@ class KnownLegs:
 
     def __init__(self, world: World, costs: Mapping[str, FuelCosts], settings: Settings) -> None:
         self._world, self._composed = world, settings.fidelity == "rollout"
-        self._models = [robot.model.name for robot in world.robots]
+        self._kinds = [world.kind_of(robot) for robot in world.robots]
         self._names = [robot.name for robot in world.robots]
         self._number = {site.name: k for k, site in enumerate(world.sites)}
-        self._planned = {model: (cost.repaired_ms / 1000).tolist() for model, cost in costs.items()}
-        self._scheduled = {model: cost.cost_s.tolist() for model, cost in costs.items()}
+        self._planned = {kind: (cost.repaired_ms / 1000).tolist() for kind, cost in costs.items()}
+        self._scheduled = {kind: cost.cost_s.tolist() for kind, cost in costs.items()}
         self._driven: dict[tuple[int, int, Stops], LegDriven] = {}
         # A typical mission is mostly one of the first noise draw: so its hops needn't be driven twice.
         self._traced = self._composed and settings.recorded
@@ -36,12 +36,12 @@ class KnownLegs:
 
     def scheduled_s(self, robot: int, origin: str, destination: str) -> float:
         """What the plan reckons with, margin included [s]."""
-        cost_s: float = self._scheduled[self._models[robot]][self._number[origin]][self._number[destination]]
+        cost_s: float = self._scheduled[self._kinds[robot]][self._number[origin]][self._number[destination]]
         return cost_s
 
     def planned(self, robot: int, stops: Stops) -> LegDriven:
         """The last leg as planned, without margin."""
-        row = self._planned[self._models[robot]][self._number[stops[-2]]]
+        row = self._planned[self._kinds[robot]][self._number[stops[-2]]]
         return LegDriven(row[self._number[stops[-1]]])
 
     def noting(self, used: dict[tuple[int, Stops], None]) -> Callable[[int, Stops], LegDriven]:

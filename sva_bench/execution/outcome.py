@@ -25,7 +25,7 @@ class Wait:
         leg: The leg of the route.
         lasts_s: How long [s].
         x_m, y_m: Where the robot has to stop [m].
-        cause: Name of the passage that was shut, or ``people``.
+        cause: Name of the passage that was shut, or of the robot that was in the way; or ``people``.
         since_s: After how much driving since the leg began [s]; by its place along the path, so about.
     """
 

@@ -10,6 +10,7 @@ import numpy as np
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.execution.case import Case
 from sva_bench.execution.execute import LegTime
+from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.team_outcome import TeamOutcome
 from sva_bench.execution.team_trace import TeamTrace
 
@@ -38,6 +39,7 @@ class Reacted:
         legs: Every leg that was driven, once under each noise draw; none unless recorded.
         whole: Whether a typical mission ends alike if it is driven whole in physics; ``None`` where none was.
         shown: A typical mission with changed orders, over time; ``None`` without any, or unless recorded.
+        meetings: What robots did to each other, by row; ``None`` where they do not meet.
     """
 
     case: Case
@@ -67,6 +69,7 @@ class Reacted:
     legs: tuple[LegTime, ...] = ()
     whole: bool | None = None
     shown: TeamTrace | None = None
+    meetings: Meetings | None = None
 
     def row(self, number: int) -> Reacted:
         """What came of one row alone.
@@ -79,7 +82,9 @@ class Reacted:
         alone: dict[str, Any] = {
             field.name: value[number:number + 1] for field in fields(self)
             if isinstance(value := getattr(self, field.name), np.ndarray) and value.ndim}
-        return replace(self, **alone, played=self.played[number:number + 1], legs=(), whole=None, shown=None)
+        met = None if self.meetings is None else self.meetings.rows(slice(number, number + 1))
+        return replace(self, **alone, played=self.played[number:number + 1], legs=(), whole=None, shown=None,
+                       meetings=met)
 
     def __repr__(self) -> str:
         """In a line: the arrays would fill many screens."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all
+from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all, pose_at
 from sva_bench.execution.execute import NOTHING, LegTime, orders_of, planned_legs
 from sva_bench.execution.known_legs import KnownLegs
 from sva_bench.execution.noise import draw_noise
@@ -102,7 +102,6 @@ def trace_teams(
 
 
 def _trace_team(world: World, costs: Mapping[str, FuelCosts], mission: Played, drives: Drives, seed: int) -> TeamTrace:
-    base = world.sites[0]
     traces = []
     for number, (robot, orders, stops, outcome) in enumerate(zip(
             world.robots, orders_of(world, mission.case, planned_legs(world, costs, [mission.case])),
@@ -111,7 +110,8 @@ def _trace_team(world: World, costs: Mapping[str, FuelCosts], mission: Played, d
         traces.append(trace_of(
             replace(orders, route=stops, planned_s=()) if left else orders,
             drives.routes[robot.name, stops, mission.rollout, 0] if left else NOTHING,
-            outcome, (base.x_m, base.y_m, base.heading_rad), path_of(costs[robot.model.name], orders.route),
+            outcome, pose_at(world, costs[world.kind_of(robot)], world.sites[0].name),
+            path_of(costs[world.kind_of(robot)], orders.route),
             start_s=_departure_s(outcome),
             waves=draw_noise(world.noise, seed, mission.rollout, number).disturbance.waves))
     news = tuple(_heard(world, costs, reaction) for reaction in mission.outcome.reactions)
@@ -124,10 +124,10 @@ def _departure_s(outcome: Outcome) -> float:
 
 
 def _heard(world: World, costs: Mapping[str, FuelCosts], reaction: Reaction) -> NewsHeard:
-    pois, models = {site.name for site in world.pois}, {robot.name: robot.model.name for robot in world.robots}
+    pois, kinds = {site.name for site in world.pois}, {robot.name: world.kind_of(robot) for robot in world.robots}
     rerouted = []
     for robot, new in reaction.after.items():
-        old, since, fuel = reaction.before[robot], reaction.since[robot], costs[models[robot]]
+        old, since, fuel = reaction.before[robot], reaction.since[robot], costs[kinds[robot]]
         rerouted.append(Rerouted(
             robot=robot, taken=tuple(site for site in new if site in pois and site not in old),
             dropped=tuple(site for site in old if site in pois and site not in new),

@@ -30,7 +30,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import MultipleLocator
 
 from sva_bench.arrays import FloatArray
-from sva_bench.choices import Judgement, MarkKind, SiteKind
+from sva_bench.choices import Judgement, MarkKind, SiteKind, StandKind
 from sva_bench.files.printable import counted
 from sva_bench.recording.meetings import Floor, floors_of
 from sva_bench.report.ground import (
@@ -49,6 +49,7 @@ from sva_bench.report.ground import (
     within,
 )
 from sva_bench.report.labels import place_labels
+from sva_bench.report.stands import Stand
 from sva_bench.world.model import World
 
 Kind = Literal["png", "svg"]
@@ -66,6 +67,8 @@ _ROUTES: tuple[tuple[str, Any, float], ...] = (  # colour, style, width [pt]; la
 _PASSAGE = "#0B6E4F"
 _MARKS: dict[MarkKind, tuple[str, str, str]] = {  # shape, colour, what it is
     "contact": ("X", "#D00000", "contact"), "wait": ("D", "#7B3294", "wait")}
+_STANDS: dict[StandKind, tuple[str, str]] = {  # colour, what it is
+    "berth": ("#000000", "berth of a robot"), "slot": ("#0072B2", "slot of a station")}
 _MARK_PT, _MOST_MARK_PT = 5.0, 14.0
 _MARK_WEIGHT = 8  # points of a line that a mark counts as where labels look for room
 _JUDGED: dict[Judgement, tuple[str, Any, float]] = {  # colour, style, width [pt]
@@ -121,6 +124,7 @@ class Overlays:
         routes: Legs of each robot's route.
         marks: What robots met where.
         judged: Legs by how safe they are, the worst to be seen last.
+        stands: Berths, and slots of stations.
     """
 
     roadmap: FloatArray | None = None
@@ -128,6 +132,7 @@ class Overlays:
     routes: Mapping[str, Sequence[Leg]] = field(default_factory=dict)
     marks: Sequence[Mark] = ()
     judged: Sequence[JudgedLeg] = ()
+    stands: Sequence[Stand] = ()
 
 
 def draw_world(world: World, kind: Kind, overlays: Overlays) -> bytes:
@@ -139,6 +144,7 @@ def draw_world(world: World, kind: Kind, overlays: Overlays) -> bytes:
         figure = Figure(figsize=(frame.width_in, frame.height_in), dpi=DPI, facecolor="white")
         FigureCanvasAgg(figure)
         axes = _map(figure, frame, world)
+        _stands(axes, overlays)
         _planned(axes, overlays)
         _routes(axes, overlays)
         _judged(axes, overlays)
@@ -193,6 +199,17 @@ def _map(figure: Figure, frame: Frame, world: World) -> Axes:
 def _floor_style(floor: Floor) -> dict[str, Any]:
     return {"facecolor": tuple(channel / 255 for channel in floor.color), "edgecolor": "#7fb6d3", "hatch": "////",
             "linewidth": 0.6}
+
+
+def _stands(axes: Axes, overlays: Overlays) -> None:
+    """Berths with the names of their robots, and slots, as wide as who stands there."""
+    for stand in overlays.stands:
+        colour, _ = _STANDS[stand.kind]
+        axes.add_patch(Circle((stand.x_m, stand.y_m), stand.radius_m, facecolor="none", edgecolor=colour,
+                              linestyle=(0, (2, 1.2)), linewidth=0.9, zorder=3.6))
+        if stand.kind == "berth":
+            axes.annotate(stand.name, (stand.x_m, stand.y_m), fontsize=6, color=colour, ha="center", va="center",
+                          zorder=6, path_effects=[_HALO])
 
 
 def _planned(axes: Axes, overlays: Overlays) -> None:
@@ -258,6 +275,7 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
         axes.plot(site.x_m, site.y_m, marker=marker, markersize=size, color=colour, markeredgecolor="black",
                   markeredgewidth=0.8, zorder=7)
         earned = _earned(world, site.name) if site.kind == "poi" else []
+        earned += [f"{site.slots} slots"] if site.slots > 1 else []
         labels.append((Text(text=site.name, fontsize=8, weight="bold"),
                        *(Text(text=line, fontsize=7) for line in earned)))
     for label in labels:
@@ -272,6 +290,7 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
     drawn += [every(to_pixels(leg.path)) for leg in overlays.judged]
     drawn += [every(to_pixels(np.reshape(passage.ends_m, (2, 2))), 4.0) for passage in world.passages]
     drawn += [to_pixels(np.array([[mark.x_m, mark.y_m]] * _MARK_WEIGHT)) for mark in overlays.marks]
+    drawn += [to_pixels(stand.outline(4 * _MARK_WEIGHT)) for stand in overlays.stands]
     if len(overlays.paths) <= _MOST_MINDED:
         drawn += [every(to_pixels(path), 16.0) for path in overlays.paths]
     x0, y0, x1, y1 = shown_of(world).tolist()
@@ -344,6 +363,9 @@ def _legend_of_meetings(world: World, overlays: Overlays) -> list[Any]:
     if world.passages:
         handles.append(Line2D([], [], color=_PASSAGE, linestyle=(0, (2.2, 1.2)), linewidth=2.4,
                               label="passage that may be shut"))
+    handles += [Line2D([], [], linestyle="none", marker="o", color="none", markersize=9, markeredgecolor=colour,
+                       label=what) for kind, (colour, what) in _STANDS.items()
+                if any(stand.kind == kind for stand in overlays.stands)]
     for judged in _JUDGED:
         if any(leg.judged == judged for leg in overlays.judged):
             colour, style, width = _JUDGED[judged]

@@ -38,14 +38,23 @@ def meetings_section(content: Content) -> list[str]:
                 str(len(_draws([row for row in mine if row["stuck"]])))])),
             words=(0, 1, 2, 3), caption="What hulls touched; obstacles are numbered as in the world file"))
     if waits:
-        draws = content.summary.rollouts
-        parts.append(table(
-            ["scenario", "plan", "robot", "waited for", "waits", "noise draws", "a mission [s]"],
-            _most(_by_cause(waits, "cause", shown, lambda mine: [
-                f"{sum(row['lasts_s'] for row in mine) / draws:.1f}"])),
-            words=(0, 1, 2, 3), caption="What robots waited for; the last column is the mean over noise draws"))
-    return [*parts, note("Each leg counts once under each noise draw, also one that a robot had to leave to others "
+        parts.append(_waits_table(waits, shown, None if content.world.meets else content.summary.rollouts))
+    # Where robots meet, a leg depends on the whole mission that it is of.
+    return [*parts, note("Each leg counts once in each mission that was played; missions alike are played once."
+                         if content.world.meets else
+                         "Each leg counts once under each noise draw, also one that a robot had to leave to others "
                          "since its mission had ended before.")]
+
+
+def _waits_table(waits: Rows, shown: ShownNames, draws: int | None) -> str:
+    """What robots waited for; in all, or a mission where each leg is driven once under each of so many draws."""
+    return table(
+        ["scenario", "plan", "robot", "waited for", "waits", "noise draws",
+         "in all [s]" if draws is None else "a mission [s]"],
+        _most(_by_cause(waits, "cause", shown, lambda mine: [
+            f"{sum(row['lasts_s'] for row in mine) / (draws or 1):.1f}"])),
+        words=(0, 1, 2, 3), caption="What robots waited for" + (
+            "" if draws is None else "; the last column is the mean over noise draws"))
 
 
 class _More(Protocol):

@@ -21,10 +21,12 @@ from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.calibration_page import against_nominal, calibration_section
 from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
+from sva_bench.report.interaction_section import interaction_section
 from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.source_table import source_section
+from sva_bench.report.stands import stands_of
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
@@ -78,6 +80,7 @@ def write_report(path: Path, content: Content) -> None:
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios),
         *_measured(scenarios),
+        *interaction_section(scenarios, content.world),
         *meetings_section(content),
         *_legs(content.legs.without_reaction(), names),
         *_routes(content.routes, names),
@@ -242,7 +245,8 @@ def _world(world: World) -> list[str]:
     with holding_back_ctrl_c():
         from sva_bench.report.drawing import Overlays, draw_world, for_page
 
-    picture = for_page(draw_world(world, "svg", Overlays()).decode(), "world", f"The world {world.name} from above")
+    drawn = draw_world(world, "svg", Overlays(stands=stands_of(world))).decode()
+    picture = for_page(drawn, "world", f"The world {world.name} from above")
     return [heading("The world"), figure(picture, f"{world.name}: {counted(len(world.stations), 'station')}, "
                                          f"{counted(len(world.pois), 'point of interest', 'points of interest')} with "
                                          "what each robot earns there.")]

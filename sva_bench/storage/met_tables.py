@@ -71,8 +71,9 @@ def read_met(folder: Path, world: World, legs: Legs, words: Mapping[str, frozens
     solids = ["wall", *(f"box {k + 1}" for k in range(len(world.obstacles.boxes))),
               *(f"cylinder {k + 1}" for k in range(len(world.obstacles.cylinders)))]
     sites = frozenset(site.name for site in world.sites)
-    known = {**words, "origin": sites, "destination": sites, "solid": frozenset(solids),
-             "cause": frozenset((PEOPLE, *(passage.name for passage in world.passages)))}
+    others = [robot.name for robot in world.robots] if world.meets else []
+    known = {**words, "origin": sites, "destination": sites, "solid": frozenset((*solids, *others)),
+             "cause": frozenset((PEOPLE, *(passage.name for passage in world.passages), *others))}
     contacts, waits = (_read(folder / f"{name}.parquet", schema, legs, known) for name, schema in FILES.items())
     return contacts, waits
 

@@ -108,10 +108,10 @@ def write_map(folder: Path, files: Iterable[MapFile]) -> None:
         path.write_bytes(file.content)
 
 
-def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
-    """Write ``travel_times.parquet``: a row per robot model and directed pair."""
+def write_travel_times(path: Path, costs: Mapping[str, FuelCosts]) -> None:
+    """Write ``travel_times.parquet``: a row per directed pair and robot model, or robot where robots meet."""
     rows: dict[str, list[Any]] = {key: [] for key in ("origin", "destination", "model", "raw_s", "repaired_s", "via")}
-    for cost in costs:
+    for kind, cost in costs.items():
         sites = cost.times.sites
         for i, origin in enumerate(sites):
             for j, destination in enumerate(sites):
@@ -119,7 +119,7 @@ def write_travel_times(path: Path, costs: Sequence[FuelCosts]) -> None:
                     continue
                 rows["origin"].append(origin)
                 rows["destination"].append(destination)
-                rows["model"].append(cost.times.model.name)
+                rows["model"].append(kind)
                 rows["raw_s"].append(int(cost.times.time_ms[i, j]) / 1000)
                 rows["repaired_s"].append(int(cost.repaired_ms[i, j]) / 1000)
                 rows["via"].append(sites[int(cost.via[i, j])])

@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 
 from sva_bench.analysis.calibration_table import CALIBRATION_COLUMNS, calibration_rows
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
+from sva_bench.analysis.meetings import INTERACTION_COLUMNS, interaction_rows
 from sva_bench.analysis.reaction_table import reaction_columns, reaction_rows
 from sva_bench.analysis.results import SUMMARY, SUMMARY_OF_REACTIONS
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -155,6 +156,10 @@ def write_csv(folder: Path) -> list[Path]:
         written.append(_write_rows(folder / "calibration.csv", CALIBRATION_COLUMNS, curves))
     if reactions := reaction_rows(summary):
         written.append(_write_rows(folder / "reactions.csv", reaction_columns(summary), reactions))
+    if met_others := [row for scenario in summary.scenarios for policy, news, held in (
+            ("none", "never", scenario.plans), *((r.policy, r.news, r.plans) for r in scenario.reactions or ()))
+            for row in interaction_rows(scenario.name, policy, news, held)]:
+        written.append(_write_rows(folder / "interaction.csv", INTERACTION_COLUMNS, met_others))
     return written
 
 

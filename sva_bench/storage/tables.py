@@ -65,15 +65,16 @@ _MET = {"scenario": (_WORD, ""), "planner": (_WORD, ""), "policy": (_WORD, ""), 
         "lasts_s": (_FIGURE, "s"), "x_m": (_FIGURE, "m"), "y_m": (_FIGURE, "m")}
 
 CONTACTS = _schema({**_MET, "solid": (_WORD, ""), "stuck": (pa.bool_(), "")})
-"""A row each time that a hull came to touch an obstacle on a leg of ``LEGS``; written where there is any."""
+"""A row each time that a hull came to touch an obstacle, or another robot, on a leg of ``LEGS``; written where there is
+any."""
 
 WAITS = _schema({**_MET, "cause": (_WORD, "")})
-"""A row for each wait on a leg of ``LEGS``; written where there is any."""
+"""A row for each wait on a leg of ``LEGS``, for a passage, people or another robot; written where there is any."""
 
 TRAVEL_TIMES = _schema({
     "origin": (_WORD, ""), "destination": (_WORD, ""), "model": (_WORD, ""), "raw_s": (_FIGURE, "s"),
     "repaired_s": (_FIGURE, "s"), "via": (_WORD, "")})
-"""A row per robot model and directed pair of sites."""
+"""A row per robot model, or per robot where robots meet, and directed pair of sites."""
 
 
 def write_table(target: Path | pa.BufferOutputStream, schema: pa.Schema, pieces: Iterable[pa.Table]) -> None:

@@ -188,11 +188,11 @@ def _ladder_of(
     if as_planned(world):
         return _Ladder(world=world, limits=limits, rungs=[NOMINAL_RUNG], costs=[{}], known={})
     draws = TwinDraws(world, costs, _FOR_COSTS, executor)
-    first = {robot.model.name: robot.name for robot in reversed(world.robots)}
+    first = {world.kind_of(robot): robot.name for robot in reversed(world.robots)}
     samples: dict[str, LegSamples] = {}
-    for number, (model, robot) in enumerate(first.items()):
+    for number, (kind, robot) in enumerate(first.items()):
         progress("sampling legs", number, len(first))
-        samples[model] = draws.legs(robot, tuple(site.name for site in world.sites),
+        samples[kind] = draws.legs(robot, tuple(site.name for site in world.sites),
                                     _LEG_DRAWS if world.noisy else 1)
         progress("sampling legs", number + 1, len(first))
     rungs = [Rung(quantile=quantile) for quantile in QUANTILES]
@@ -201,7 +201,7 @@ def _ladder_of(
         rungs += [Rung(quantile=MEDIAN, factor=factor) for factor in _FACTORS if factor > beyond]
     return _Ladder(
         world=world, limits=limits, rungs=[NOMINAL_RUNG, *rungs], known={},
-        costs=[{}, *({robot.name: costs_at(samples[robot.model.name], rung, world.margin, robot.idle_share)
+        costs=[{}, *({robot.name: costs_at(samples[world.kind_of(robot)], rung, world.margin, robot.idle_share)
                       for robot in world.robots} for rung in rungs)])
 
 

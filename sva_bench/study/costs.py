@@ -6,6 +6,7 @@ Apart from ``planning``, since a check of a world needs neither solvers nor phys
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,27 +15,52 @@ from sva_bench.analysis.summaries import Reach
 from sva_bench.choices import FailureProcess, PathPlanner
 from sva_bench.mission.failures import Reliability, fails_by_driving, mtbf_s
 from sva_bench.mission.instance import Instance, Vehicle
+from sva_bench.robot.model import RobotModel
 from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.study.given_plans import instance_name
+from sva_bench.travel.berths import own_world, place_berths
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.travel.times import TravelTimes, plan_travel_times
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import NOMINAL, Scenario, World, nominal_of
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ground:
+    """What the travel times of a kind of robot depend on: its model, and the world as it is to it."""
+
+    world: World
+    model: RobotModel
+
+
+def grounds_of(world: World) -> dict[str, Ground]:
+    """The ground of each kind of robot, by ``World.kind_of``.
+
+    Robots that meet leave from berths of their own, and the berths of the others stand in their way.
+
+    Raises:
+        NoRoomForBerths, NoRoomForSlots: If they don't fit about the base, or about a station.
+    """
+    if not world.meets:
+        return {robot.model.name: Ground(world=world, model=robot.model) for robot in world.robots}
+    berths = place_berths(world)
+    return {robot.name: Ground(world=own_world(world, berths, number), model=robot.model)
+            for number, robot in enumerate(world.robots)}
+
+
 def plan_times(world: World, planner: PathPlanner, progress: OnProgress) -> dict[str, TravelTimes]:
-    """Travel times of each robot model in the world, by its name."""
-    models = {robot.model.name: robot.model for robot in world.robots}
+    """Travel times of each kind of robot in the world, by ``World.kind_of``."""
+    grounds = grounds_of(world)
     times = {}
-    for number, (name, model) in enumerate(models.items()):
-        progress("planning paths", number, len(models))
-        times[name] = plan_travel_times(world, model, planner)
-        progress("planning paths", number + 1, len(models))
+    for number, (kind, ground) in enumerate(grounds.items()):
+        progress("planning paths", number, len(grounds))
+        times[kind] = plan_travel_times(ground.world, ground.model, planner)
+        progress("planning paths", number + 1, len(grounds))
     return times
 
 
 def plan_costs(world: World, planner: PathPlanner, progress: OnProgress) -> dict[str, FuelCosts]:
-    """Fuel costs of each robot model in the world, by its name."""
+    """Fuel costs of each kind of robot in the world, by ``World.kind_of``."""
     return {name: fuel_costs(times, world.margin) for name, times in plan_times(world, planner, progress).items()}
 
 
@@ -60,7 +86,7 @@ def instance_of(
         vehicles=tuple(Vehicle(
             name=robot.name, fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s,
             availability=scenario.availability[robot.name], loss_cost=robot.loss_cost,
-            idle_share=robot.idle_share, fuel_s=costs[robot.model.name].cost_s,
+            idle_share=robot.idle_share, fuel_s=costs[world.kind_of(robot)].cost_s,
             mtbf_s=_planning_mtbf_s(world, scenario.reliability(robot), wanted),
             incentives=np.array([robot.incentives.get(site, 0.0) for site in sites])) for robot in world.robots),
     )

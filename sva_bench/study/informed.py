@@ -8,6 +8,7 @@ import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.execution.execute import Case, Executed
+from sva_bench.execution.meetings import combined_meetings
 from sva_bench.study.planning import InformedPlans
 from sva_bench.world.model import Scenario
 
@@ -52,4 +53,4 @@ def combined_trials(parts: Mapping[frozenset[str], Executed]) -> Executed:
         drawn_failed=pick("drawn_failed").astype(np.bool_), terms=first_run.terms, value=pick("value"),
         margins=tuple({(margin.robot, margin.route): margin for part in runs for margin in part.margins}.values()),
         legs=tuple(dict.fromkeys(leg for k in sorted(set(chosen.tolist())) for leg in runs[k].legs)),
-        traces=first.traces)
+        traces=first.traces, meetings=combined_meetings([part.meetings for part in runs], chosen))

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from sva_bench.choices import FailureProcess
+from sva_bench.choices import FailureProcess, Interaction
 from sva_bench.errors import BadInput
 from sva_bench.files.documents import YAML_SUFFIXES, read_yaml
 from sva_bench.files.mistaken import what_it_is
@@ -26,19 +26,25 @@ _LONGEST_NAME = 120
 def load(
     path: Path, scenarios: Sequence[str] | None = None, margin: float | None = None,
     plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
+    interaction: Interaction | None = None,
 ) -> World:
     """The world, as the command line changes it."""
-    return adapted(load_world(path), scenarios, margin, plan_failure, execute_failure)
+    return adapted(load_world(path), scenarios, margin, plan_failure, execute_failure, interaction)
 
 
 @contextmanager
 def about(path: Path) -> Iterator[None]:
     """What travel says of sites and robots, said of the file and line where they stand."""
     with holding_back_ctrl_c():
+        from sva_bench.travel.berths import NoRoomForBerths, NoRoomForSlots
         from sva_bench.travel.times import UnreachableSite
 
     try:
         yield
+    except NoRoomForBerths as error:
+        raise read_yaml(path).error(("sites", "base"), str(error)) from None
+    except NoRoomForSlots as error:
+        raise read_yaml(path).error(("sites", "stations", error.station), str(error)) from None
     except UnreachableSite as error:
         document = read_yaml(path)
         # Where nothing at all is reached, it is the base that stands badly.

@@ -10,7 +10,8 @@ import numpy as np
 
 from sva_bench.mission.plan import Plan
 from sva_bench.report.drawing import Kind, Leg, Overlays, draw_world
-from sva_bench.study.costs import plan_costs
+from sva_bench.report.stands import stands_of
+from sva_bench.study.costs import grounds_of, plan_costs
 from sva_bench.study.planning import check_plans
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import roadmap_edges
@@ -27,36 +28,40 @@ def picture_of(
     Args:
         world: The world.
         kind: ``png`` or ``svg``.
-        roadmap, paths: Whether to show them; those of the widest robot where there are several models.
+        roadmap, paths: Whether to show them; those of the widest robot where there are several kinds.
         progress: Progress callback.
         plan, plan_file: A plan whose routes to show, and its file; one that breaks fuel or limit is shown too, with a
             warning.
 
     Raises:
         InfeasiblePlan: If the plan can't be driven with any fuel.
+        NoRoomForBerths, NoRoomForSlots: If robots that meet don't fit about the base, or about a station.
         UnreachableSite: If paths are needed, and a site can't be reached.
     """
+    stands = stands_of(world)
     if not (roadmap or paths or plan):
-        return draw_world(world, kind, Overlays())
+        return draw_world(world, kind, Overlays(stands=stands))
     costs = plan_costs(world, "prmstar", progress)
-    widest = max((cost.times for cost in costs.values()), key=lambda times: times.model.radius_m)
+    kind_of_widest, widest = max(((kind_of, cost.times) for kind_of, cost in costs.items()),
+                                 key=lambda item: item[1].model.radius_m)
     edges = None
     if roadmap:
-        points = np.array([(site.x_m, site.y_m) for site in world.sites])
-        edges = roadmap_edges(world.obstacles, points, widest.clearance_m)
+        ground = grounds_of(world)[kind_of_widest].world
+        points = np.array([(site.x_m, site.y_m) for site in ground.sites])
+        edges = roadmap_edges(ground.obstacles, points, widest.clearance_m)
     drawn = [path for i, row in enumerate(widest.paths) for path in row[i + 1:] if path is not None] if paths else []
     routes: dict[str, list[Leg]] = {}
     if plan is not None and plan_file is not None:
         check_plans(world, costs, {"plan": plan}, {"plan": plan_file}, allow_infeasible=True)
         routes = routes_of(world, costs, plan)
-    return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(drawn), routes=routes))
+    return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(drawn), routes=routes, stands=stands))
 
 
 def routes_of(world: World, costs: Mapping[str, FuelCosts], plan: Plan) -> dict[str, list[Leg]]:
     """The legs of each robot's route, along the chains of paths that they stand for."""
     routes = {}
     for robot in world.robots:
-        cost = costs[robot.model.name]
+        cost = costs[world.kind_of(robot)]
         routes[robot.name] = [
             Leg(destination=end, path=np.concatenate([
                 cost.times.path(a, b) for a, b in itertools.pairwise(cost.chain(start, end))]))

@@ -83,7 +83,7 @@ def publish(
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
         write_map(folder, world.files)
-        write_travel_times(folder / "travel_times.parquet", list(costs.values()))
+        write_travel_times(folder / "travel_times.parquet", costs)
         for scenario, instance in instances.items():
             write_instance(folder / f"instance-{scenario}.json", instance)
         with clock.phase("recording"):

@@ -42,6 +42,8 @@ from sva_bench.world.schema import (
 )
 from sva_bench.world.within import refuse_outside
 
+AMBIGUOUS = ("robots that meet wait for each other by name, and this one is that of a passage or of people in the way; "
+             "rename the robot")
 _Entry = tuple[SiteKind, str, SiteEntry, tuple[str, ...]]  # a site, and its location in the file
 
 
@@ -83,13 +85,16 @@ def world_of(
         raise document.error(("scenarios", correlated[0], "joint"), f"under {other} robots fail independently; give "
                              "their availabilities, or choose another failure process")
     _refuse_unknown_failures(document, file, robots, scenarios, (plan, execute))
-    return World(
+    world = World(
         name=file.name, obstacles=obstacles, sites=sites, robots=robots, scenarios=scenarios,
         plan_failure=plan, execute_failure=execute, margin=file.margin,
         noise=file.noise.noise(), map_source=source,
         reaction=_reaction(document, file.reaction, stations=any(site.kind == "station" for site in sites)),
-        passages=tuple(entry.passage(name) for name, entry in file.passages.items()),
+        passages=tuple(entry.passage(name) for name, entry in file.passages.items()), interaction=file.interaction,
     )
+    if (name := world.ambiguous_robot) is not None:
+        raise document.error(("robots", name), AMBIGUOUS)
+    return world
 
 
 def _map(document: Document, section: Map, root: Path) -> tuple[Obstacles, MapSource | None]:
@@ -149,7 +154,8 @@ def _sites(document: Document, file: WorldFile, obstacles: Obstacles, widest_m: 
         heading = (_radians(math.degrees(longest_view_heading(obstacles, x, y, sight))) if entry.heading_deg is None
                    else _radians(entry.heading_deg))
         sites.append(Site(name=name, kind=kind, x_m=x, y_m=y, heading_rad=heading, stop_s=entry.stop_s,
-                          charge_rate=entry.charge_rate if isinstance(entry, StationEntry) else None))
+                          charge_rate=entry.charge_rate if isinstance(entry, StationEntry) else None,
+                          slots=entry.slots if isinstance(entry, StationEntry) else 1))
     for k, site in enumerate(sites):
         for other in sites[:k]:
             if math.hypot(site.x_m - other.x_m, site.y_m - other.y_m) < 0.01:
@@ -193,9 +199,9 @@ def _stations_and_pois(document: Document, sites: Sites, obstacles: Obstacles, w
         otherwise = "a smaller min_spacing_m" if error.kind == "pois" else "a base with more free ground about it"
         raise document.error(("sites", error.kind), f"{error}; choose fewer, or {otherwise}") from None
     if spread is not None:
-        rate = spread.charge_rate
-        stations = [("station", f"r{k}", StationEntry(at_m=list(at), stop_s=spread.stop_s, charge_rate=rate),
-                     ("sites", "stations")) for k, at in enumerate(places.stations, start=1)]
+        stations = [("station", f"r{k}", StationEntry(at_m=list(at), stop_s=spread.stop_s, slots=spread.slots,
+                                                      charge_rate=spread.charge_rate), ("sites", "stations"))
+                    for k, at in enumerate(places.stations, start=1)]
     if drawn is not None:
         pois = [("poi", f"p{k}", SiteEntry(at_m=list(at), stop_s=drawn.stop_s), ("sites", "pois"))
                 for k, at in enumerate(places.pois, start=1)]
@@ -302,7 +308,8 @@ def world_as_dict(world: World) -> dict[str, Any]:
     """The resolved world as the content of a world file, from which the same world is loaded."""
     def entry(site: Site) -> dict[str, Any]:
         return {"at_m": [site.x_m, site.y_m], "heading_deg": _degrees(site.heading_rad),
-                "stop_s": site.stop_s, **({} if site.charge_rate is None else {"charge_rate": site.charge_rate})}
+                "stop_s": site.stop_s, **({} if site.charge_rate is None else {"charge_rate": site.charge_rate}),
+                **({} if site.slots == 1 else {"slots": site.slots})}
 
     def limit(seconds: float) -> float | None:
         return seconds if math.isfinite(seconds) else None
@@ -338,7 +345,9 @@ def world_as_dict(world: World) -> dict[str, Any]:
             {"probability": j.probability, "available": sorted(j.available)} for j in s.joint]}
             for s in world.scenarios},
         "failure": {"plan": world.plan_failure, "execute": world.execute_failure},
-        **({"reaction": asdict(world.reaction)} if reacts else {}),  # else absent: names of runs depend on it
+        # What is as usual is absent: names of runs depend on it.
+        **({"reaction": asdict(world.reaction)} if reacts else {}),
+        **({} if world.interaction == "independent" else {"interaction": world.interaction}),
         "margin": world.margin, "noise": noise_as_dict(world.noise),
         **({"passages": {p.name: {"at_m": [list(p.ends_m[:2]), list(p.ends_m[2:])], "blocked": p.blocked,
                                   "wait_s": p.wait_s} for p in world.passages}} if world.passages else {}),

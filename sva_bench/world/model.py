@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sva_bench.choices import FailureProcess, News, PolicyName, SiteKind
+from sva_bench.choices import FailureProcess, Interaction, News, PolicyName, SiteKind
 from sva_bench.errors import UnknownName, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
@@ -158,6 +158,7 @@ class World:
         map_source: Origin of the occupancy grid; ``None`` if the obstacles are shapes.
         reaction: What the team does about failures, unless a run asks for something else.
         passages: Doors and gates that may be shut.
+        interaction: What the robots are to each other.
     """
 
     name: str
@@ -172,6 +173,7 @@ class World:
     map_source: MapSource | None = None
     reaction: WorldReaction = WorldReaction()
     passages: tuple[Passage, ...] = ()
+    interaction: Interaction = "independent"
 
     def __repr__(self) -> str:
         counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))
@@ -181,6 +183,15 @@ class World:
     def noisy(self) -> bool:
         """Whether rollouts differ."""
         return not self.noise.silent or any(p.wait_s > 0 and 0 < p.blocked < 1 for p in self.passages)
+
+    @property
+    def meets(self) -> bool:
+        """Whether robots meet: each then leaves from a berth of its own, and so has travel times of its own."""
+        return self.interaction != "independent" and len(self.robots) > 1
+
+    def kind_of(self, robot: Robot) -> str:
+        """The key of a robot's travel times and costs: its model's name, and its own where robots meet."""
+        return robot.name if self.meets else robot.model.name
 
     @property
     def files(self) -> tuple[MapFile, ...]:
@@ -202,6 +213,12 @@ class World:
     def pois(self) -> tuple[Site, ...]:
         """The points of interest."""
         return tuple(site for site in self.sites if site.kind == "poi")
+
+    @property
+    def ambiguous_robot(self) -> str | None:
+        """A robot that goes by the name of something else that robots wait for; ``None`` where they tell them apart."""
+        others = {"people", *(passage.name for passage in self.passages)} if self.meets else set()
+        return next((robot.name for robot in self.robots if robot.name in others), None)
 
     def scenario(self, name: str) -> Scenario:
         """The scenario of that name.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
-from sva_bench.choices import FailureProcess, News, PolicyName
+from sva_bench.choices import FailureProcess, Interaction, News, PolicyName
 from sva_bench.files.fields import (
     Bounded,
     MeanTime,
@@ -115,9 +115,22 @@ class SiteEntry(Section):
     heading_deg: Angle | None = None
     stop_s: Bounded = 0.0
 
+    @model_validator(mode="before")
+    @classmethod
+    def _has_no_slots(cls, data: object) -> object:
+        if cls is SiteEntry and isinstance(data, dict) and "slots" in data:
+            raise ValueError("only stations have 'slots': a base has a berth for each robot, and a POI serves one at a "
+                             "time; take them away")
+        return data
+
+
+MOST_SLOTS = 20
+Slots = Annotated[int, Field(strict=True, ge=1, le=MOST_SLOTS)]
+
 
 class StationEntry(SiteEntry):
     charge_rate: Rate | None = None
+    slots: Slots = 1
 
 
 class SpreadStations(Section):
@@ -126,6 +139,7 @@ class SpreadStations(Section):
     spread: Annotated[NonNegativeInt, Field(ge=1, le=100)]
     stop_s: Bounded = 0.0
     charge_rate: Rate | None = None
+    slots: Slots = 1
 
 
 class RandomPois(Section):
@@ -210,14 +224,7 @@ class WorldFile(Section):
     scenarios: Annotated[dict[Name, dict[Name, Probability] | Joint], Field(min_length=1)] | None = None
     failure: FailureProcess | FailureEntry = "mission"
     reaction: Annotated[ReactionEntry, _EMPTY_IS_NONE] = Field(default_factory=ReactionEntry)
-    interaction: Literal["independent"] = "independent"
+    interaction: Interaction = "independent"
     margin: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] = 0.01
     noise: NoiseSection = Field(default_factory=NoiseEntry)
     passages: Annotated[dict[Name, PassageEntry], Field(max_length=1000), _EMPTY_IS_NONE] = Field(default_factory=dict)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_shared_interaction(cls, data: object) -> object:
-        if isinstance(data, dict) and data.get("interaction") == "shared":
-            raise ValueError("this version knows only 'interaction: independent'")
-        return data

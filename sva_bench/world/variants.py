@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from sva_bench.choices import FailureProcess
+from sva_bench.choices import FailureProcess, Interaction
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.documents import Document, Loc
 from sva_bench.mission.failures import undefined_under, without_joint
-from sva_bench.world.load import world_of
+from sva_bench.world.load import AMBIGUOUS, world_of
 from sva_bench.world.model import World, nominal_of
 from sva_bench.world.noise_schema import spelled_out
 
@@ -85,13 +85,14 @@ def option_of(key: str, values: Mapping[str, Any]) -> str:
 def adapted(
     world: World, scenarios: Sequence[str] | None = None, margin: float | None = None,
     plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
+    interaction: Interaction | None = None,
 ) -> World:
     """A world with some of its settings replaced.
 
     Args:
         world: The world.
         scenarios: Names of the scenarios to keep; ``None`` = all.
-        margin, plan_failure, execute_failure: In place of the world's own; ``None`` = unchanged.
+        margin, plan_failure, execute_failure, interaction: In place of the world's own; ``None`` = unchanged.
 
     Raises:
         BadInput: If a scenario is unknown or listed twice, or a process doesn't support its joint distribution.
@@ -102,7 +103,10 @@ def adapted(
     world = replace(
         world, margin=world.margin if margin is None else margin,
         plan_failure=world.plan_failure if plan_failure is None else plan_failure,
-        execute_failure=world.execute_failure if execute_failure is None else execute_failure)
+        execute_failure=world.execute_failure if execute_failure is None else execute_failure,
+        interaction=world.interaction if interaction is None else interaction)
+    if (called := world.ambiguous_robot) is not None:
+        raise BadInput(f"robots.{called}: {AMBIGUOUS}")
     correlated = [scenario.name for scenario in world.scenarios if scenario.joint is not None]
     if correlated and (other := without_joint([world.plan_failure, world.execute_failure])):
         raise BadInput(f"scenario {correlated[0]}: under {other} robots fail independently, and this scenario has a "

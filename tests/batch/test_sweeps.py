@@ -14,7 +14,7 @@ from sva_bench.batch.estimates import estimates
 from sva_bench.batch.folder import begin, settings_in
 from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
-from sva_bench.choices import News, PathPlanner, PolicyName
+from sva_bench.choices import INTERACTIONS, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.records import as_dict
 from tests.cli.test_commands import sva_bench
@@ -286,6 +286,54 @@ def test_varied_reactions_have_an_effect_unless_an_option_says_otherwise(
     assert "reaction.policy=\"resolve\" changes nothing" in caplog.text
     with pytest.raises(BadInput, match=r'^--set reaction.news="soon": input should be'):
         grid_of(Sweep(worlds=(path,), vary={"reaction.policy": ["resolve"], "reaction.news": ["soon"]}))
+
+
+@pytest.mark.parametrize("interaction", INTERACTIONS)
+def test_what_robots_are_to_each_other_stands_in_a_sweep_file_and_is_overridden_by_options(
+    interaction: Interaction, tmp_path: Path
+) -> None:
+    world(tmp_path)
+    path = tmp_path / "sweep.yaml"
+    path.write_text(f"{SWEEP}interaction: {interaction}\n", encoding="utf-8")
+    grid = grid_of(sweep_of([path], Sweep()))
+    assert {point.world.interaction for point in grid.points} == {interaction}
+    (tmp_path / "out").mkdir()
+    begin(tmp_path / "out", grid.settings(), resume=False)
+    again = grid_from(*settings_in(tmp_path / "out"))
+    assert again.settings() == grid.settings()
+    assert {point.world.interaction for point in again.points} == {interaction}
+    other = grid_of(sweep_of([path], Sweep(interaction="shared")))
+    assert {point.world.interaction for point in other.points} == {"shared"}
+
+
+def test_an_unknown_interaction_is_an_error_of_its_line_or_option(tmp_path: Path) -> None:
+    path = world(tmp_path)
+    sweep = tmp_path / "sweep.yaml"
+    sweep.write_text(f"{SWEEP}interaction: joint\n", encoding="utf-8")
+    with pytest.raises(BadFile, match=r"sweep\.yaml:10: interaction: .*'uncoordinated' or 'shared', found 'joint'"):
+        sweep_of([sweep], Sweep())
+    with pytest.raises(BadInput, match=r'^--set interaction="joint": input should be'):
+        grid_of(Sweep(worlds=(path,), vary={"interaction": ["joint"]}))
+
+
+def test_interaction_is_varied_and_an_option_that_says_otherwise_takes_its_effect(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path, vary = world(tmp_path), {"interaction": list(INTERACTIONS)}
+    grid = grid_of(Sweep(worlds=(path,), vary=vary))
+    assert [point.world.interaction for point in grid.points] == list(INTERACTIONS)
+    assert caplog.messages == []
+    grid_of(Sweep(worlds=(path,), vary=vary, interaction="independent"))
+    assert "interaction=\"uncoordinated\" changes nothing" in caplog.text
+
+
+def test_slots_are_varied_to_an_effect_where_robots_meet(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path, vary = world(tmp_path), {"sites.stations.r1.slots": [1, 2]}
+    grid = grid_of(Sweep(worlds=(path,), vary=vary, interaction="shared"))
+    assert [point.world.stations[0].slots for point in grid.points] == [1, 2]
+    assert caplog.messages == []
+    grid_of(Sweep(worlds=(path,), vary=vary))
+    assert "sites.stations.r1.slots=2 changes nothing" in caplog.text
 
 
 @pytest.mark.parametrize("key", ["noise.payload_kg", "noise.hull_friction"])

@@ -113,7 +113,7 @@ def test_a_world_file_gives_its_world(tmp_path: Path) -> None:
      "expected at least 0"),
     ("    availability: 0.75\n", "    availability: 0.75\n    loss_cost: -1\n", "robots.uv2.loss_cost",
      "expected at least 0"),
-    ("name: small\n", "name: small\ninteraction: shared\n", None, "this version knows only"),
+    ("name: small\n", "name: small\ninteraction: joint\n", "interaction", "'uncoordinated' or 'shared'"),
     ("name: small\n", "name: small\nreaction: {policy: resolv}\n", "reaction.policy", "'none' or 'resolve'"),
     ("name: small\n", "name: small\nreaction: {policy: resolve, news: soon}\n", "reaction.news",
      "'report' or 'instant'"),
@@ -405,6 +405,7 @@ VARIANTS = {
                            "incentives: {uniform: [0, 150], zero_share: 0.5, seed: 1}"),
     "joint": SMALL.replace("half: {uv2: 0.5}", "half: {joint: [{probability: 0.6, available: [uv1, uv2]}, "
                                                "{probability: 0.4, available: [uv1]}]}"),
+    "meeting": SMALL.replace("stop_s: 4}", "stop_s: 4, slots: 2}") + "interaction: shared\n",
     "reacting": SMALL + "reaction: {policy: resolve, news: station}\n",
     "no limits": SMALL.replace("fuel_capacity_s: 60\n    mission_limit_s: 120\n    incentives", "incentives"),
 }

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import numpy as np
 
+from sva_bench.choices import Interaction
 from sva_bench.errors import BadInput, SvaBenchError, nearest
 from sva_bench.interrupts import as_ctrl_c
 from sva_bench.study.inputs import load
@@ -173,19 +174,23 @@ def is_a(name: str, value: object, form: type[T], what: str) -> T:
 
 
 def by_model(name: str, value: object, form: type[T], world: World, what: str) -> dict[str, T]:
-    """A value for each robot model of the world.
+    """A value for each kind of robot in the world: for each model, and where robots meet for each of them.
 
     Raises:
         ValueError: If these are none.
         BadInput: If one is missing.
     """
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name}: expected {what} by the name of the robot model, found {_shown(value)}")
-    models = [robot.model.name for robot in world.robots]
-    for model in models:
-        if model not in value:
-            raise BadInput(f"{name}: nothing for the robot model {model} of {world.name}; make them for this world")
-    return {model: is_a(f"{name}[{model!r}]", value[model], form, what) for model in models}
+        raise ValueError(f"{name}: expected {what} by the name of the {_kind(world)}, found {_shown(value)}")
+    kinds = [world.kind_of(robot) for robot in world.robots]
+    for kind in kinds:
+        if kind not in value:
+            raise BadInput(f"{name}: nothing for the {_kind(world)} {kind} of {world.name}; make them for this world")
+    return {kind: is_a(f"{name}[{kind!r}]", value[kind], form, what) for kind in kinds}
+
+
+def _kind(world: World) -> str:
+    return "robot" if world.meets else "robot model"
 
 
 def refuse_other_world(name: str, times: TravelTimes, world: World) -> None:
@@ -204,7 +209,7 @@ def refuse_other_world(name: str, times: TravelTimes, world: World) -> None:
 
 def world_given(
     value: object, scenario: object = None, margin: object = None, plan_failure: Any = None,
-    execute_failure: Any = None,
+    execute_failure: Any = None, interaction: Any = None,
 ) -> tuple[World, Path | None]:
     """The world, with these settings in place of its own, and its file if it was read from one here.
 
@@ -214,10 +219,11 @@ def world_given(
     """
     names = names_of("scenario", scenario)
     share = None if margin is None else number("margin", margin, 0, 1)
+    meeting = optional(chosen(Interaction), "interaction", interaction)
     if isinstance(value, World):
-        return adapted(value, names, share, plan_failure, execute_failure), None
+        return adapted(value, names, share, plan_failure, execute_failure, meeting), None
     path = path_of("world", value, "a world or the path of its file")
-    return load(path, names, share, plan_failure, execute_failure), path
+    return load(path, names, share, plan_failure, execute_failure, meeting), path
 
 
 def progress_of(progress: OnProgress | None) -> OnProgress:

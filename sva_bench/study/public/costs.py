@@ -10,7 +10,7 @@ from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_result
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.instance_file import instance_text
-from sva_bench.study.costs import instance_of, nominal_scenario, plan_costs, plan_times
+from sva_bench.study.costs import grounds_of, instance_of, nominal_scenario, plan_costs, plan_times
 from sva_bench.study.inputs import about
 from sva_bench.study.public.arguments import (
     PathLike,
@@ -42,7 +42,8 @@ def travel_times(
         progress: Called with what is being done, how much of it is done, and how much there is.
 
     Returns:
-        By the name of the robot model: times [ms], shape (n, n) for n sites, directed, and the paths [m] behind them.
+        By the name of the robot model, or of the robot where robots meet: times [ms], shape (n, n) for n sites,
+        directed, and the paths [m] behind them.
 
     Raises:
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
@@ -73,8 +74,8 @@ def fuel_costs(
         planner, progress: As for ``travel_times``, where they are not given.
 
     Returns:
-        By the name of the robot model: costs [s of driving], shape (n, n) for n sites, and the chain of legs behind
-        each.
+        By the name of the robot model, or of the robot where robots meet: costs [s of driving], shape (n, n) for n
+        sites, and the chain of legs behind each.
 
     Raises:
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
@@ -92,9 +93,9 @@ def fuel_costs(
         with nullcontext() if path is None else about(path):
             return plan_costs(read, planner, progress_of(progress))
     given = by_model("times", times, TravelTimes, read, "travel times")
-    for model, time in given.items():
-        refuse_other_world(f"times[{model!r}]", time, read)
-    return {model: repaired(time, read.margin) for model, time in given.items()}
+    for kind, ground in grounds_of(read).items():
+        refuse_other_world(f"times[{kind!r}]", given[kind], ground.world)
+    return {kind: repaired(time, read.margin) for kind, time in given.items()}
 
 
 @called_from_python()
@@ -133,8 +134,8 @@ def make_instance(
         if margin is not None:
             raise BadInput("margin: the given costs have theirs already; leave out one of the two")
         known = by_model("costs", costs, FuelCosts, read, "fuel costs")
-        for model, cost in known.items():
-            refuse_other_world(f"costs[{model!r}]", cost.times, read)
+        for kind, ground in grounds_of(read).items():
+            refuse_other_world(f"costs[{kind!r}]", known[kind].times, ground.world)
     instance = instance_of(read, known, read.scenarios[0] if scenario else nominal_scenario(read))
     if target is not None:
         write_result(target, instance_text(instance))
