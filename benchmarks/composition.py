@@ -13,7 +13,8 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios

@@ -21,7 +21,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.outcome import Event, Trace
 from sva_bench.mission.plan import Plan
 from sva_bench.report.ground import corners

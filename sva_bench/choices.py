@@ -79,8 +79,8 @@ EventKind = Literal["departed", "waits", "touches", "arrived", "collected", "ref
                     "late", "stuck", "home"]
 HappeningKind = Literal["arrived", "ended", "stuck", "touch", "rest", "idle", "deadlock"]
 """What a team that shares a world is stopped for."""
-DriveUnit = Literal["hops", "routes"]
-"""What is driven at a time: from site to site, or from base to base."""
+DriveUnit = Literal["hops", "routes", "missions"]
+"""What is driven at a time: from site to site, from base to base, or all robots of a world together."""
 MarkKind = Literal["contact", "wait"]
 """What a picture marks of what robots met."""
 StandKind = Literal["berth", "slot"]

@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 
 from sva_bench.analysis.moments import Figure
 from sva_bench.analysis.results import Distribution, Estimate, Ledger, PlanFigures, PlanResult
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 
 Place = Literal["terminal", "page", "csv"]
 Section = Literal["over trials", "promise", "measured"]

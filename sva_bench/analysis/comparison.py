@@ -13,7 +13,7 @@ from sva_bench.analysis.over_trials import Judged, plan_result, totals, verdict_
 from sva_bench.analysis.results import Comparison, GivenPlanResult, Ranked
 from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.statistics import estimate
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 
 
 def comparison_summary(plans: Sequence[Judged], robots: Sequence[str], *, noisy: bool) -> ComparedScenario:

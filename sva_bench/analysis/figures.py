@@ -11,7 +11,7 @@ from sva_bench.analysis.shifts import home_shift, value_shift
 from sva_bench.analysis.unseen import EXECUTION_LOSSES, exposure_of
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.margins import Margins
 
 

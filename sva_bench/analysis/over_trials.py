@@ -29,7 +29,7 @@ from sva_bench.analysis.statistics import controlled, distribution, estimate
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 from sva_bench.mission.plan import Plan
 
 

@@ -27,7 +27,7 @@ from sva_bench.analysis.results import Distribution, Promise, VssFigures
 from sva_bench.analysis.statistics import estimate, weighted_distribution
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.choices import ENDS
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.react import Reacted
 
 

@@ -14,7 +14,8 @@ from sva_bench.batch.shards import Reactions, Shard, shard_of
 from sva_bench.choices import PathPlanner
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import DriveTask, RouteKey, drive_tasks
-from sva_bench.execution.execute import PlannedLegs, execute, settle_trials
+from sva_bench.execution.execute import execute, settle_trials
+from sva_bench.execution.orders import PlannedLegs
 from sva_bench.execution.outcome import Driven
 from sva_bench.files.digest import digest
 from sva_bench.mission.certify import certify
@@ -200,7 +201,7 @@ class TrialsJob:
     def run(self) -> Shard:
         """Settle them."""
         settings = replace(self.settings, first=self.first, trials=self.trials, recorded=False)
-        if settings.fidelity == "physics":
+        if settings.fidelity == "physics" or self.world.meets:
             executed = execute(self.world, self.costs, self.cases, settings)
         else:
             executed = settle_trials(self.world, self.cases, settings, self.drives, self.planned)

@@ -18,7 +18,8 @@ from sva_bench.batch.schema import StoredNote
 from sva_bench.batch.tallies import Tally, stored_tally, tally_from, tally_of
 from sva_bench.choices import OWN_PLANS
 from sva_bench.errors import BadFile
-from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.case import Settings
+from sva_bench.execution.executed import Executed
 from sva_bench.files.complaints import dotted, first_complaint
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.storage.outcome_table import constant, outcome_table

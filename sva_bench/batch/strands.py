@@ -11,7 +11,8 @@ from sva_bench.batch.jobs import DriveJob, PlansJob, TravelTimesJob, TrialsJob
 from sva_bench.batch.reactions import ReactionsJob
 from sva_bench.batch.shards import Reactions
 from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import drives_ahead, planned_legs
+from sva_bench.execution.execute import drives_ahead
+from sva_bench.execution.orders import planned_legs
 from sva_bench.study.costs import grounds_of, reach_of
 from sva_bench.study.options import Options, reactions_of, settings_of
 from sva_bench.study.planning import Planned, own_cases
@@ -38,7 +39,7 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     cases = tuple(case for scenario in world.scenarios for case in own_cases(scenario, planned[scenario.name]))
     settings = settings_of(world, options)
     drives = Drives()
-    if settings.fidelity != "physics":
+    if settings.fidelity != "physics" and not world.meets:
         ahead = drives_ahead(world, costs, cases, settings)
         driven = yield [DriveJob(tasks=chunk.tasks, what=chunk.what) for chunk in ahead.chunks]
         drives = ahead.drives(driven)
@@ -52,7 +53,7 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     yield [TrialsJob(
         unit=grid.unit_name(point, seed, first), world=world, variant=point.variant, cases=cases, facts=facts,
         drives=drives.routes, planned=legs, reactions=reactions if first == 0 else {},
-        costs=costs if settings.fidelity == "physics" else {}, first=first, trials=count,
+        costs=costs if settings.fidelity == "physics" or world.meets else {}, first=first, trials=count,
         settings=settings) for first, count in left]
 
 

@@ -19,7 +19,7 @@ from sva_bench.analysis.statistics import estimate
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.batch.schema import StoredFigure, StoredPlan, StoredTally
 from sva_bench.choices import ENDS, OwnPlan
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

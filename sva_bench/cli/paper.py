@@ -53,7 +53,7 @@ def simulation(
     set_up_logging(verbose)
     check_output(output)
     with loading():
-        from sva_bench.execution.execute import Settings
+        from sva_bench.execution.case import Settings
         from sva_bench.generate.examples import example_world
         from sva_bench.paper import simulation as paper
         from sva_bench.study.inputs import load
@@ -84,7 +84,7 @@ def reaction(
     set_up_logging(verbose)
     check_output(output)
     with loading():
-        from sva_bench.execution.execute import Settings
+        from sva_bench.execution.case import Settings
         from sva_bench.generate.examples import example_world
         from sva_bench.paper import reaction as paper
         from sva_bench.study.inputs import load

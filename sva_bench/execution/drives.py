@@ -22,15 +22,16 @@ from sva_bench.execution.case import Settings
 from sva_bench.execution.corridor import solids_near, strayed
 from sva_bench.execution.engines.engine import ENGINE_OF, ENGINES, Pose
 from sva_bench.execution.following import downsampled, follow
+from sva_bench.execution.legs import Hop, Leg
 from sva_bench.execution.noise import NoiseDraw, draw_noise
 from sva_bench.execution.outcome import Driven, Wait
 from sva_bench.execution.screening import checked, wants_physics
+from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.touch import Touch, solid_at
 from sva_bench.execution.waits import HopWait, waits_on
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
 from sva_bench.robot.disturbance import UNDISTURBED, Disturbance
-from sva_bench.robot.follower import Stretch
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import drive as drive_twin
 from sva_bench.travel.fuel import FuelCosts
@@ -40,10 +41,6 @@ TRACE_HZ = 20.0
 _BACK_M = 0.3  # from the hull to a passage that a robot waits before
 _CHUNK: Mapping[Fidelity, int] = {"kinematic": 16, "rollout": 8, "physics": 1}
 """Noise draws under which a worker drives a course at a time: a tenth of a second's work; handing it out is small."""
-
-Hop = tuple[Stretch, ...]
-Leg = tuple[Hop, ...]
-"""A leg of a route: the hops of the chain that its repaired cost stands for."""
 
 RouteKey = tuple[str, Route, int, int]
 """Robot, stops driven, rollout, and the trial under ``physics``, else 0: what a driven route depends on in a world."""
@@ -60,11 +57,13 @@ class Drives:
         hops: Hops, by what they depend on.
         whole: Routes as they were driven whole.
         routes: Routes, driven whole or composed, with what the robot's tank holds and where it has to wait.
+        missions: Missions of robots that share a world.
     """
 
     hops: dict[HopKey, Driven] = field(default_factory=dict)
     whole: dict[RouteKey, Driven] = field(default_factory=dict)
     routes: dict[RouteKey, Driven] = field(default_factory=dict)
+    missions: dict[MissionKey, TeamDriven] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

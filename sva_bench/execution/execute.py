@@ -9,101 +9,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.execution.case import Case as Case
 from sva_bench.execution.case import Settings as Settings
 from sva_bench.execution.drives import Chunk, Courses, Drives, RouteKey, drive_all, pose_at, receive
+from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.fate import Fate, draw_fate
-from sva_bench.execution.margins import Margins, margins_of_team
-from sva_bench.execution.meetings import Meetings
+from sva_bench.execution.margins import margins_of_team
 from sva_bench.execution.noise import draw_noise
-from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, Wait, trace_of
+from sva_bench.execution.orders import PlannedLegs, orders_of, planned_legs
+from sva_bench.execution.outcome import Assignment, Driven, Outcome, Trace, trace_of
 from sva_bench.execution.rules import legs_of, settle
 from sva_bench.execution.settling import left_by_draws, settle_alike
-from sva_bench.execution.touch import Touch
-from sva_bench.mission.failures import PlanningTerms, process_of
-from sva_bench.mission.plan import Route
+from sva_bench.execution.shared.execute import execute_team
+from sva_bench.mission.failures import process_of
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import Robot, World
-
-PlannedLegs = Mapping[tuple[str, Route], tuple[float, ...]]
-"""Driving time of each leg as planned [s], without margin, by robot and route."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LegTime:
-    """A leg as planned (the repaired twin time, without margin) and as driven [s]; waits on the way are apart.
-
-    Attributes:
-        trial: The first trial that it belongs to.
-        leg: Its place on the robot's route in that trial.
-        touches, waits: What the robot touched on it, and where it waited.
-        held_by: What it got stuck by on it, where that is known.
-    """
-
-    trial: int
-    rollout: int
-    robot: str
-    leg: int
-    origin: str
-    destination: str
-    planned_s: float
-    driven_s: float
-    waited_s: float = 0.0
-    touches: tuple[Touch, ...] = ()
-    waits: tuple[Wait, ...] = ()
-    held_by: str = ""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Executed:
-    """What came of one case, trial by trial. Arrays have shape (trials, robots) unless said otherwise.
-
-    Attributes:
-        case: Plan and scenario.
-        robots: Names of the robots, in order.
-        rollout: Noise draw of each trial, shape (trials,).
-        available: Whether the robot was never drawn to fail; of lifetimes, whether its own outlasted what it drove.
-        incentive: What it collected.
-        lost: Whether it failed on its way, ran out of fuel or got stuck.
-        value: What it collected, less the cost of its loss.
-        pois_reached, stops_reached: How far it got.
-        end: Index into ``ENDS``.
-        end_time_s, fuel_used_s: When it ended, and on how much.
-        waited_s: How long it waited beside its stops [s].
-        contacts: How many times its hull came to touch an obstacle.
-        planned_incentive: What each robot's route holds, shape (robots,).
-        drawn_value: What its value had been under the failures drawn alone, with each leg driven as planned.
-        drawn_failed: Whether it had failed then.
-        terms: The expected rewards under the failure process executed, by robot.
-        margins: What fuel and time each route left under the draws that were driven; none of robots that stay home.
-        legs: Every leg that was driven; none unless recorded.
-        traces: The first trial over time, a trace for each robot; none unless recorded.
-        meetings: What robots did to each other; ``None`` where they do not meet.
-    """
-
-    case: Case
-    robots: tuple[str, ...]
-    rollout: IntArray
-    available: BoolArray
-    incentive: FloatArray
-    lost: BoolArray
-    value: FloatArray
-    pois_reached: IntArray
-    stops_reached: IntArray
-    end: IntArray
-    end_time_s: FloatArray
-    fuel_used_s: FloatArray
-    waited_s: FloatArray
-    contacts: IntArray
-    planned_incentive: FloatArray
-    drawn_value: FloatArray
-    drawn_failed: BoolArray
-    terms: PlanningTerms
-    margins: tuple[Margins, ...]
-    legs: tuple[LegTime, ...]
-    traces: tuple[Trace, ...]
-    meetings: Meetings | None = None
+from sva_bench.world.model import World
 
 
 def execute(
@@ -123,6 +44,8 @@ def execute(
         drives: What was driven already; what is driven now is added.
     """
     drives = Drives() if drives is None else drives
+    if world.meets:
+        return execute_team(world, costs, cases, settings, executor, progress, drives.missions)
     planned = planned_legs(world, costs, cases)
     orders = [orders_of(world, case, planned) for case in cases]
     fates = [_fate(world, case, own, settings) for case, own in zip(cases, orders, strict=True)]
@@ -181,33 +104,6 @@ def settle_trials(
         orders = orders_of(world, case, planned)
         settled.append(_settle_all(world, {}, case, orders, _fate(world, case, orders, settings), settings, drives))
     return settled
-
-
-def planned_legs(world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case]) -> PlannedLegs:
-    """Planned driving times of every route of some cases."""
-    planned: dict[tuple[str, Route], tuple[float, ...]] = {}
-    for robot in world.robots:
-        fuel = costs[world.kind_of(robot)]
-        number = {site: k for k, site in enumerate(fuel.times.sites)}
-        for route in {case.plan.route(robot.name) for case in cases}:
-            planned[robot.name, route] = tuple(
-                int(fuel.repaired_ms[number[a], number[b]]) / 1000 for a, b in pairwise(route))
-    return planned
-
-
-def orders_of(world: World, case: Case, planned: PlannedLegs) -> list[Assignment]:
-    """What each robot is told to do, and the rules it drives under."""
-    routes = [(robot, case.plan.route(robot.name)) for robot in world.robots]
-    return [_orders(world, robot, route, planned[robot.name, route]) for robot, route in routes]
-
-
-def _orders(world: World, robot: Robot, route: Route, planned_s: tuple[float, ...]) -> Assignment:
-    return Assignment(
-        loss_cost=robot.loss_cost, planned_s=planned_s, idle_share=robot.idle_share,
-        charge_rate={s.name: s.charge_rate for s in world.stations if s.charge_rate is not None},
-        robot=robot.name, route=route, stations=frozenset(s.name for s in world.stations),
-        incentives=robot.incentives, stop_s={s.name: s.stop_s for s in world.sites},
-        fuel_capacity_s=robot.fuel_capacity_s, mission_limit_s=robot.mission_limit_s)
 
 
 def _fate(world: World, case: Case, orders: Sequence[Assignment], settings: Settings) -> Fate:

@@ -15,8 +15,8 @@ import numpy as np
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Courses, Drives, drive_all
-from sva_bench.execution.execute import orders_of, planned_legs
 from sva_bench.execution.known_legs import KnownLegs, longest
+from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.plays import Enumerated, Rows, Sampled
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.reacted import Reacted as Reacted

@@ -9,7 +9,7 @@ import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.execution.case import Case
-from sva_bench.execution.execute import LegTime
+from sva_bench.execution.executed import LegTime
 from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.team_outcome import TeamOutcome
 from sva_bench.execution.team_trace import TeamTrace

@@ -12,9 +12,11 @@ import numpy as np
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all, pose_at
-from sva_bench.execution.execute import NOTHING, LegTime, orders_of, planned_legs
+from sva_bench.execution.execute import NOTHING
+from sva_bench.execution.executed import LegTime
 from sva_bench.execution.known_legs import KnownLegs
 from sva_bench.execution.noise import draw_noise
+from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.outcome import Outcome, Trace, trace_of
 from sva_bench.execution.team_outcome import Reaction, TeamOutcome
 from sva_bench.travel.fuel import FuelCosts

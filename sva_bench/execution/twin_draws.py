@@ -11,9 +11,9 @@ import numpy as np
 from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all
-from sva_bench.execution.execute import orders_of, planned_legs
 from sva_bench.execution.judging import judge_route
 from sva_bench.execution.margins import margins_of
+from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.mission.failures import process_of
 from sva_bench.mission.plan import Plan
 from sva_bench.seeds import Stream, seed_for

@@ -14,7 +14,8 @@ from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Settings
 from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.files.printable import counted
 from sva_bench.report.wording import verdict, with_interval
 from sva_bench.study.costs import plan_costs

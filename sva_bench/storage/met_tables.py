@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from sva_bench.errors import BadFile
-from sva_bench.execution.execute import Executed, LegTime
+from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.waits import PEOPLE
 from sva_bench.storage.run_folder import Legs

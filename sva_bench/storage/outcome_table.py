@@ -10,7 +10,8 @@ import pyarrow as pa
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.choices import ENDS
-from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.case import Settings
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.reacted import Reacted
 from sva_bench.storage.tables import OUTCOMES
 

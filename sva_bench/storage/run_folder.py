@@ -16,7 +16,8 @@ import pyarrow as pa
 
 from sva_bench import __version__
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.case import Settings
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.reacted import Reacted
 from sva_bench.files.atomic import draft_folder, remove_left_behind
 from sva_bench.files.pretty import pretty_json

@@ -12,7 +12,8 @@ from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import FailureProcess
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import PROCESSES
 from sva_bench.mission.plan import Plan

@@ -11,8 +11,10 @@ from sva_bench.analysis.comparison import comparison_summary
 from sva_bench.analysis.over_trials import Judged
 from sva_bench.analysis.reactions import compared_reaction
 from sva_bench.analysis.summaries import ComparisonSummary
+from sva_bench.execution.case import Case
 from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import Case, Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.react import Reacted
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance

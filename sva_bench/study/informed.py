@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
-from sva_bench.execution.execute import Case, Executed
+from sva_bench.execution.case import Case
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.meetings import combined_meetings
 from sva_bench.study.planning import InformedPlans
 from sva_bench.world.model import Scenario

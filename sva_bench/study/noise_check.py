@@ -9,8 +9,9 @@ from sva_bench.analysis.tightness import NoiseCheck, PlanTightness, tightness_of
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives, drive_all
-from sva_bench.execution.execute import drives_ahead, orders_of, planned_legs
+from sva_bench.execution.execute import drives_ahead
 from sva_bench.execution.margins import margins_of_team
+from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.report.drawing import JudgedLeg, Kind, Overlays, draw_world
 from sva_bench.solver.two_stage import Knowledge, knowledge_of, plan_stochastic

@@ -9,7 +9,7 @@ from typing import Any
 from sva_bench.analysis.calibration import Target, target_of, target_text
 from sva_bench.analysis.precision import Precision
 from sva_bench.choices import Fidelity, News, PathPlanner, PolicyName
-from sva_bench.execution.execute import Settings
+from sva_bench.execution.case import Settings
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.reacting import Reaction, pairs_of
 from sva_bench.world.model import World

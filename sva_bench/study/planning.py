@@ -12,7 +12,8 @@ import numpy as np
 
 from sva_bench.choices import FailureProcess, OwnPlan
 from sva_bench.errors import BadInput
-from sva_bench.execution.execute import Case, Executed
+from sva_bench.execution.case import Case
+from sva_bench.execution.executed import Executed
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.failures import MODEL, PROCESSES, undefined_under, without_joint
 from sva_bench.mission.instance import Instance

@@ -13,7 +13,7 @@ from typing import Any
 
 from sva_bench.analysis.summaries import AnySummary
 from sva_bench.execution.case import Case
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.team_trace import TeamTrace
 from sva_bench.files.atomic import draft_file

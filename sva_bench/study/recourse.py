@@ -14,7 +14,9 @@ from sva_bench.analysis.results import Promise
 from sva_bench.choices import PolicyName
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives, drive_all
-from sva_bench.execution.execute import Executed, drives_ahead, execute, planned_legs, settle_trials
+from sva_bench.execution.execute import drives_ahead, execute, settle_trials
+from sva_bench.execution.executed import Executed
+from sva_bench.execution.orders import planned_legs
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import Reacted, modelled_values, react
@@ -179,7 +181,7 @@ def observed(
         drives: What was driven already; what is driven now is added.
     """
     few = replace(settings, trials=min(settings.trials, settings.rollouts), recorded=False)
-    if settings.fidelity == "physics":  # each trial has its own drives
+    if settings.fidelity == "physics" or world.meets:  # each trial, or mission, has its own drives
         return execute(world, costs, cases, few, executor, None, drives)
     ahead = drives_ahead(world, costs, cases, settings)
     wanted = dict.fromkeys(ahead.wanted, False)

@@ -13,7 +13,8 @@ from sva_bench.analysis.summaries import ComparisonSummary
 from sva_bench.choices import News, PolicyName
 from sva_bench.errors import BadInput, nearest
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import react_again
 from sva_bench.execution.reacted import Reacted

@@ -12,7 +12,8 @@ from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case
 from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.react import Reacted
 from sva_bench.files.printable import counted
 from sva_bench.study.assumptions import cross_table

@@ -21,7 +21,9 @@ from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import NoiseName, SourceName
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives, RouteKey
-from sva_bench.execution.execute import Executed, execute, planned_legs
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
+from sva_bench.execution.orders import planned_legs
 from sva_bench.execution.outcome import Driven
 from sva_bench.execution.sources import OF_PHYSICS, ON_CLOCK_OR_TANK, sources_on, without
 from sva_bench.mission.plan import Route

@@ -12,8 +12,10 @@ from sva_bench.analysis.over_trials import Judged, ScenarioTrials, promise_of, s
 from sva_bench.analysis.results import Promise, ScenarioFacts
 from sva_bench.analysis.summaries import ComparisonSummary, Failures, Head, Reach, Summary, Travel
 from sva_bench.choices import Role
+from sva_bench.execution.case import Settings
 from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.executed import Executed
+from sva_bench.execution.shared.players import TeamDriven
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.plan import Plan
 from sva_bench.study.options import Options
@@ -96,6 +98,8 @@ def with_drives(summary: SummaryT, drives: Drives) -> SummaryT:
 
 def drives_made(drives: Drives) -> DrivesMade:
     """The figures of what was driven."""
+    if drives.missions:
+        return _missions_made(list(drives.missions.values()))
     made = [*drives.hops.values(), *drives.whole.values()]
     times = [float(one.leg_s.sum()) for one in made]
     total_s, physics_s = sum(times), sum(one.in_physics * time_s for one, time_s in zip(made, times, strict=True))
@@ -104,6 +108,20 @@ def drives_made(drives: Drives) -> DrivesMade:
         unit="hops" if drives.hops else "routes", count=len(made),
         in_physics_pct=min(round(100 * physics_s / total_s, 6), 100.0) if total_s > 0 else 0.0, checked=len(checks),
         worst_check_pct=round(max(checks), 6) if checks else None, tipped_over=sum(one.tipped_over for one in made))
+
+
+def _missions_made(missions: Sequence[TeamDriven]) -> DrivesMade:
+    """The figures of missions of robots that share a world, which are driven as a whole."""
+    times = [sum(float(driven.leg_s.sum()) for driven in mission.driven) for mission in missions]
+    physics_s = sum(time_s for mission, time_s in zip(missions, times, strict=True) if mission.in_physics)
+    checks = [100 * abs(time_s / mission.twin_s - 1) for mission, time_s in zip(missions, times, strict=True)
+              if mission.twin_s]
+    total_s = sum(times)
+    return DrivesMade(
+        unit="missions", count=len(missions), checked=len(checks),
+        in_physics_pct=min(round(100 * physics_s / total_s, 6), 100.0) if total_s > 0 else 0.0,
+        worst_check_pct=round(max(checks), 6) if checks else None,
+        tipped_over=sum(driven.tipped_over for mission in missions for driven in mission.driven))
 
 
 def by_case(executed: Sequence[Executed]) -> dict[tuple[str, str], Executed]:

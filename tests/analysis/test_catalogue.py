@@ -18,7 +18,7 @@ from sva_bench.analysis.results import Distribution, Estimate, Ledger
 from sva_bench.batch.tallies import figure_from, join, stored_tally, tally_from, tally_of
 from sva_bench.choices import ENDS
 from sva_bench.cli.tables import print_summary
-from sva_bench.execution.execute import Executed
+from sva_bench.execution.executed import Executed
 from sva_bench.files.records import as_dict
 from sva_bench.report.wording import with_interval
 from sva_bench.storage.stored_run import write_csv

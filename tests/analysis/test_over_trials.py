@@ -26,7 +26,8 @@ from sva_bench.analysis.results import Estimate, PlanResult, Ranked, ScenarioFac
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.statistics import bounded_mean, estimate
 from sva_bench.choices import ENDS, End
-from sva_bench.execution.execute import Case, Executed
+from sva_bench.execution.case import Case
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.margins import Margins
 from sva_bench.files.records import as_dict
 from sva_bench.mission.failures import Reliability, process_of

@@ -13,7 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sva_bench.choices import Fidelity
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Courses, Drives, RouteKey, composed, drive_all
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.noise import draw_noise
 from sva_bench.execution.outcome import Driven
 from sva_bench.execution.touch import Touch

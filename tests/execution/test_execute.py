@@ -16,7 +16,8 @@ from sva_bench.analysis.figures import value_figure
 from sva_bench.analysis.statistics import estimate
 from sva_bench.choices import ENDS, FailureProcess, Fidelity
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.noise import draw_noise
 from sva_bench.mission.certify import expected_value
 from sva_bench.mission.failures import JointState, route_value

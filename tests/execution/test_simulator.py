@@ -13,8 +13,9 @@ from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import Fidelity
-from sva_bench.execution.drives import DriveTask, Leg, drive_route
+from sva_bench.execution.drives import DriveTask, drive_route
 from sva_bench.execution.following import downsampled
+from sva_bench.execution.legs import Leg
 from sva_bench.execution.outcome import Driven
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.disturbance import Disturbance

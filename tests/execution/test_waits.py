@@ -13,7 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sva_bench.choices import Fidelity
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
-from sva_bench.execution.execute import Executed, execute
+from sva_bench.execution.execute import execute
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.waits import PEOPLE, HopWait, crossings_of, waits_on
 from sva_bench.mission.plan import Plan
 from sva_bench.robot.follower import stretches

@@ -9,8 +9,8 @@ import pytest
 
 import sva_bench as sb
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.execute import orders_of, planned_legs
 from sva_bench.execution.known_legs import KnownLegs
+from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import Reacted, react
 from sva_bench.execution.team import Team

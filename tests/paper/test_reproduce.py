@@ -10,7 +10,7 @@ import pytest
 from sva_bench.__main__ import run_command_line
 from sva_bench.choices import NEWS
 from sva_bench.errors import BadInput
-from sva_bench.execution.execute import Settings
+from sva_bench.execution.case import Settings
 from sva_bench.mission.failures import PROCESSES
 from sva_bench.paper.reaction import reaction, reaction_page
 from sva_bench.paper.rewards import rewards, rewards_page, three_vehicles

@@ -20,7 +20,7 @@ from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.strands import strand
 from sva_bench.choices import Interaction
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.execution.execute import Executed, LegTime
+from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.outcome import Wait
 from sva_bench.execution.touch import Touch

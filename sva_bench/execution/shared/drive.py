@@ -8,7 +8,7 @@ from dataclasses import replace
 from sva_bench.choices import Fidelity
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import Assignment, RobotFate
-from sva_bench.execution.shared.driver import Member, TeamDriver
+from sva_bench.execution.shared.driver import Member
 from sva_bench.execution.shared.lanes import Order
 from sva_bench.execution.shared.mission import SharedMission
 from sva_bench.execution.shared.own_ways import Ways

@@ -10,27 +10,26 @@ import numpy as np
 
 from sva_bench.choices import Fidelity
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.execute import Executed, LegTime, orders_of, planned_legs
+from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.fate import draw_fate
 from sva_bench.execution.margins import Margins, margins_of
+from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.noise import draw_noise
+from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.outcome import Assignment, RobotFate, Trace
+from sva_bench.execution.settling import figures_of, left_by_draws
 from sva_bench.execution.shared.drive import drive_team
+from sva_bench.execution.shared.own_ways import Ways
 from sva_bench.execution.shared.planning import first_order
-from sva_bench.execution.shared.players import TeamDriven
+from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.trace import leg_times, traces_of
 from sva_bench.execution.shared.truncation import cut_off
-from sva_bench.execution.shared.own_ways import Ways
-from sva_bench.execution.settling import figures_of, left_by_draws
 from sva_bench.mission.failures import NEVER, process_of
 from sva_bench.mission.plan import Route
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
 _CHUNK = 32  # missions that a worker plays at a time, of one plan and one set of robots that leave
-
-MissionKey = tuple[tuple[Route, ...], tuple[RobotFate, ...], int]
-"""Routes and fates of all robots, and the noise draw: what a mission depends on in a world."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -96,7 +95,7 @@ def _play_all(
     progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven],
 ) -> None:
     """Play missions that are not known yet."""
-    groups: dict[tuple[object, ...], dict[MissionKey, bool]] = {}
+    groups: dict[tuple[tuple[Route, ...], tuple[bool, ...]], dict[MissionKey, bool]] = {}
     orders_of_routes: dict[tuple[Route, ...], Sequence[Assignment]] = {}
     for orders, key, traced in wanted:
         if key not in known or (traced and not known[key].traced):
@@ -209,7 +208,7 @@ class _Team:
             incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],
             fuel_used_s=figures["fuel_used_s"], waited_s=figures["waited_s"],
             **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
-            legs=self._legs(costs, found), traces=self._traces(found))
+            legs=self._legs(costs, found), traces=self._traces(found), meetings=_meetings(distinct).rows(kind))
 
     def _margins(self, known: Mapping[MissionKey, TeamDriven]) -> tuple[Margins, ...]:
         """What each route left of fuel and time where nobody fails on the way, under each noise draw."""
@@ -234,6 +233,14 @@ class _Team:
         if not self._settings.recorded:
             return ()
         mission = found[self._key(0)][1]
-        waves = [draw_noise(self._world.noise, self._settings.seed, int(self._fate.rollout[0]), number).disturbance.waves
+        drawn = [draw_noise(self._world.noise, self._settings.seed, int(self._fate.rollout[0]), number)
                  for number in range(len(self.orders))]
-        return traces_of(self._ways, self.orders, mission, waves)
+        return traces_of(self._ways, self.orders, mission, [mine.disturbance.waves for mine in drawn])
+
+
+def _meetings(missions: Sequence[TeamDriven]) -> Meetings:
+    """What robots did to each other in some missions, each of which was played or is provably one that was."""
+    return Meetings(
+        contacts=np.array([mission.contacts for mission in missions], dtype=np.int64),
+        waited_s=np.array([mission.waited_s for mission in missions]), exact=np.ones(len(missions), dtype=np.bool_),
+        detours=np.array([mission.detours for mission in missions], dtype=np.int64))

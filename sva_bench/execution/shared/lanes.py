@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
-from sva_bench.execution.drives import Leg
 from sva_bench.execution.engines.engine import Pose
+from sva_bench.execution.legs import Leg
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, NO_LINE, control, new_state
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import advance, patience_steps

@@ -19,14 +19,12 @@ from sva_bench.execution.shared.driver import Happening, Hold, LegWait, TeamDriv
 from sva_bench.execution.shared.lanes import Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
-from sva_bench.execution.shared.players import Player, TeamDriven, driven_by
+from sva_bench.execution.shared.players import BRAKING, Player, TeamDriven, driven_by
 from sva_bench.execution.waits import HopWait, waits_on
 from sva_bench.world.model import World
 
 DEADLOCK = "deadlock"
 """What held robots that wait for each other for good: never, by the order of the plan."""
-BRAKING = "replanning"
-"""The cause of waits while a team brakes and plans anew."""
 _BACK_M = 0.3  # from the hull to a passage that a robot waits before
 _BEGUN_M = 1e-3  # on its leg a robot that is nearer to its stop stands at it
 
@@ -78,7 +76,8 @@ class SharedMission:
         while (happening := self._driver.run()).kind != "idle":
             self._take(happening)
         return TeamDriven(
-            robots=tuple(player.mission.outcome() for player in self._players), contacts=self._contacts,
+            names=tuple(self._names), contacts=self._contacts,
+            robots=tuple(player.mission.outcome() for player in self._players),
             stops=tuple(tuple(player.stops) for player in self._players), detours=self._detours, cuts=self._planned,
             driven=tuple(driven_by(player) for player in self._players),
             replanned=self._replanned or any(player.down for player in self._players),

@@ -1,4 +1,4 @@
-"""Ways of robots that share a world: paths between their sites, cut into cells, and paths round robots that stand there.
+"""Ways of robots that share a world: between their sites, cut into cells, and round robots that stand in the way.
 
 Each robot has sites of its own: its berth is its base, and of a station with several slots it uses one.
 """
@@ -13,20 +13,18 @@ from itertools import pairwise
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.drives import Leg
 from sva_bench.execution.engines.engine import Pose
+from sva_bench.execution.legs import Leg
 from sva_bench.execution.shared.lanes import Cut, cut
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.follower import Stretch, arc_lengths, stretches
 from sva_bench.robot.model import RobotModel
 from sva_bench.travel.alternatives import alternatives, way_round
-from sva_bench.travel.berths import own_world, place_berths
+from sva_bench.travel.berths import gap_of, own_world, place_berths
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.travel.roadmap import Roadmap, connecting_roadmap
 from sva_bench.world.model import World
 
-GAP_M = 0.2
-"""Between the hulls of two robots in cells that exclude each other: a cell, what robots cut off corners, and stopping."""
 _STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goes by
 _ROUNDING_M = 0.01
 _SDS = 3.0  # of a localisation error that both robots may have
@@ -66,8 +64,7 @@ class Ways:
         self._roadmaps: dict[int, Roadmap] = {}
         located = world.noise.localisation
         self._off_m = 0.0 if located is None else _SDS * located.sd_m
-        self.gap_m = GAP_M + math.sqrt(2.0) * self._off_m
-        self.delay_s = world.noise.delay_s[1]
+        self.gap_m = gap_of(world)
 
     def model(self, robot: int) -> RobotModel:
         """A robot's figures."""
@@ -130,7 +127,7 @@ class Ways:
         """
         left: list[tuple[Stretch, ...]] = []
         for hop in leg:
-            ahead = []
+            ahead: list[Stretch] = []
             for stretch in hop:
                 length = float(stretch.arc[-1])
                 if arc_m >= length and not ahead and not left and (stretch is not leg[-1][-1]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -13,8 +13,8 @@ from sva_bench.arrays import IntArray
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.outcome import Assignment
 from sva_bench.execution.shared.lanes import Cut, Itinerary, Lane, Order
-from sva_bench.execution.shared.space_time import plan_order
 from sva_bench.execution.shared.own_ways import Disc, Ways
+from sva_bench.execution.shared.space_time import plan_order
 
 
 def first_order(ways: Ways, orders: Sequence[Assignment], leaves: Sequence[bool]) -> Order | None:
@@ -39,7 +39,8 @@ def first_order(ways: Ways, orders: Sequence[Assignment], leaves: Sequence[bool]
 
 def _itinerary(ways: Ways, number: int, stands: Pose, ready_s: float, legs: tuple[tuple[Cut, ...], ...],
                stop_s: tuple[float, ...]) -> Itinerary:
-    return Itinerary(radius_m=ways.model(number).radius_m, ready_s=ready_s, place_m=stands[:2], legs=legs, stop_s=stop_s)
+    return Itinerary(radius_m=ways.model(number).radius_m, ready_s=ready_s, legs=legs, stop_s=stop_s,
+                     place_m=stands[:2])
 
 
 def _stops_s(orders: Assignment, stops: Sequence[str], burnt_s: float, lasts_s: Sequence[float]) -> tuple[float, ...]:

@@ -7,10 +7,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sva_bench.execution.noise import NoiseDraw
-from sva_bench.execution.outcome import Driven, Outcome
+from sva_bench.execution.outcome import Driven, Outcome, RobotFate
 from sva_bench.execution.rules import LegDriven, RobotMission
 from sva_bench.execution.shared.driver import LegSoFar
 from sva_bench.execution.shared.lanes import Cut
+from sva_bench.mission.plan import Route
+
+MissionKey = tuple[tuple[Route, ...], tuple[RobotFate, ...], int]
+"""Routes and fates of all robots, and the noise draw: what a mission depends on in a world."""
+
+BRAKING = "replanning"
+"""The cause of waits while a team brakes and plans anew."""
 
 Trail = tuple[tuple[LegSoFar, ...], ...]
 """A robot's legs as it drove them, each in one part, or in several where it was planned anew on its way."""
@@ -21,6 +28,7 @@ class TeamDriven:
     """What came of one mission of a team.
 
     Attributes:
+        names: The robots.
         robots: Each robot's outcome.
         stops: The stops that each was sent to, the base first.
         driven: What each drove.
@@ -30,9 +38,11 @@ class TeamDriven:
         detours: How many legs led round a robot that stood in the way.
         replanned: Whether anything was planned anew, or a robot stands for good away from its berth.
         in_physics: Whether physics drove it.
+        twin_s: Driving time by the twin [s], where physics drove to check it; else ``None``.
         traced: Whether poses were kept.
     """
 
+    names: tuple[str, ...]
     robots: tuple[Outcome, ...]
     stops: tuple[tuple[str, ...], ...]
     driven: tuple[Driven, ...]
@@ -42,7 +52,14 @@ class TeamDriven:
     detours: int
     replanned: bool
     in_physics: bool = False
+    twin_s: float | None = None
     traced: bool = False
+
+    @property
+    def waited_s(self) -> float:
+        """How long robots waited for others, or until all had braked, added up over the team [s]."""
+        others = {*self.names, BRAKING}
+        return sum(wait.lasts_s for driven in self.driven for wait in driven.waits if wait.cause in others)
 
 
 @dataclass(eq=False, kw_only=True)

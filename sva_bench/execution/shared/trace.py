@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.execute import LegTime
+from sva_bench.execution.executed import LegTime
 from sva_bench.execution.outcome import Assignment, Trace, believed
 from sva_bench.execution.rules import legs_of
 from sva_bench.execution.shared.driver import LegSoFar

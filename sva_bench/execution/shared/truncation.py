@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
 from sva_bench.execution.rules import settle
-from sva_bench.execution.shared.players import TeamDriven
 from sva_bench.execution.shared.own_ways import Disc, Ways
+from sva_bench.execution.shared.players import TeamDriven
 
 
 def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: Sequence[RobotFate]

@@ -10,7 +10,8 @@ from typing import Any, Generic, TypeVar
 import pyarrow as pa
 
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
-from sva_bench.execution.execute import Executed, Settings
+from sva_bench.execution.case import Settings
+from sva_bench.execution.executed import Executed
 from sva_bench.execution.reacted import Reacted
 from sva_bench.files.records import as_dict
 from sva_bench.mission.plan import Plan
