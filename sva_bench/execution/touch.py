@@ -12,7 +12,7 @@ from sva_bench.geometry.obstacles import Obstacles
 
 @dataclass(frozen=True, kw_only=True)
 class Touch:
-    """One time that a hull touched an obstacle, until it was free again.
+    """One time that a hull touched an obstacle or another robot, until it was free again.
 
     Attributes:
         since_s: When it came to touch [s of driving since the leg began; in an engine, since it was opened].
@@ -21,6 +21,7 @@ class Touch:
         solid: What: ``wall`` (of the bounds), ``box 3``, ``cylinder 1``, numbered in the order of the world; engines
             leave it open, for they don't know all.
         leg: The leg of the route on which it happened; engines know of one only.
+        robot: Number of the robot that it touched; ``None`` = it was an obstacle.
     """
 
     since_s: float
@@ -29,6 +30,7 @@ class Touch:
     y_m: float
     solid: str = ""
     leg: int = 0
+    robot: int | None = None
 
 
 def solid_at(obstacles: Obstacles, x: float, y: float) -> str:

@@ -160,9 +160,9 @@ def test_wants_physics_by_cases() -> None:
 
 def fallen(monkeypatch: pytest.MonkeyPatch, *, heavy: float = 0.0, tall: float = 0.0) -> Driven:
     """A robot whose load is heavier, or sits higher, than any that drives."""
-    build = bullet.Bullet._build_robot
+    build = bullet._Robot._build
 
-    def loaded(self: bullet.Bullet, pose: Pose) -> int:
+    def loaded(self: bullet._Robot, pose: Pose) -> int:
         body = build(self, pose)
         if heavy:
             PYBULLET.changeDynamics(body, -1, mass=heavy, physicsClientId=self._client)
@@ -172,7 +172,7 @@ def fallen(monkeypatch: pytest.MonkeyPatch, *, heavy: float = 0.0, tall: float =
                 physicsClientId=self._client)
         return body
 
-    monkeypatch.setattr(bullet.Bullet, "_build_robot", loaded)
+    monkeypatch.setattr(bullet._Robot, "_build", loaded)
     return tour("physics")
 
 

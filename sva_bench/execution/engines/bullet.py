@@ -8,11 +8,13 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
+from sva_bench.arrays import FloatArray
+from sva_bench.execution.engines.accuracy import accuracy, fastest_wheel_rad_s, finest, motor_torque
 from sva_bench.execution.engines.bodies import (
     HEIGHT_M,
     RoundBody,
@@ -54,112 +56,122 @@ def _quiet() -> Iterator[None]:
 with _quiet():  # prints a banner on import
     import pybullet
 
-PHYSICS_HZ, _FINE_HZ = 60.0, 120.0  # 960 Hz and a residual of 1e-7 give leg times within 0.2 % of these
-_ITERATIONS, _FINE_ITERATIONS = 50, 200  # at most: at the usual residual, and at a finer one
-_RESIDUAL = 1e-4  # ends the iterations early
-_OWN_RESIDUAL = 1e-5  # of bodies that were not made for the solver, as round ones are
-_WHEEL_RAD_S, _WHEEL_RAD_S2 = 5.0, 7.0  # slower or more slowly accelerated wheels don't bear that residual [rad2/s2]
-_FAST_RAD_S = 30.0  # wheels that turn faster don't bear 60 Hz: up to 1.5 % of a leg's time
 _CONTACT_STEPS = 3  # control steps from one look at contacts to the next: 50 ms
 _PLACE, _DISTANCE = 5, 8  # where a contact point of PyBullet has its place on the robot, and its distance
 _UPRIGHT = 0.7  # cosine of the tilt at which a robot has tipped over
 _CASTER_FRICTION = 0.01  # of the hull in PyBullet, with the casters, which slide; obstacles make up for it
 _WHEEL_FRICTION = 1.0  # rubber on a hard floor
 _USUAL_RAD_S = 100.0  # to which PyBullet holds joints, unless told otherwise: small wheels of a fast robot turn faster
-_MOTOR_G = 3.0  # motor torque, in multiples of what accelerates the robot as its limits allow
 _ROBOT, _STATIC, _FLOOR = 1, 2, 64  # groups of bodies: Bullet's own for moving and fixed ones, and one of ours
+_NEAR_M = 0.05  # gap between hulls, by their radii, from which on contact is looked for
+_Pose = tuple[float, float, float]  # x, y [m], yaw [rad]
 _free: list[int] = []  # clients of this process that no engine uses
 
 
-class Bullet:
-    """A world of obstacles with one robot in it, in PyBullet.
+class _Client:
+    """A client of PyBullet with a world of obstacles in it.
 
-    Robots that don't meet have a client each; filtering collisions between them would not be the same. The world is
-    built anew for each engine, for only that is reproducible bit by bit; clients are used again, for a client that was
-    reset is as good as a new one, which takes five times as long.
+    The world is built anew for each drive, for only that is reproducible bit by bit; clients are used again, for a
+    client that was reset is as good as a new one, which takes five times as long.
     """
 
-    def __init__(self, obstacles: Obstacles, model: RobotModel, pose: tuple[float, float, float],
-                 disturbance: Disturbance) -> None:
-        self._model = model
-        self._left = disturbance.wheel_gains[0] / model.wheel_radius_m
-        self._right = disturbance.wheel_gains[1] / model.wheel_radius_m
-        self._steps, self._touched = 0, False
-        self.touches: list[Touch] = []
-        self.tipped_over = False
-        self._disturbance, self._floors = disturbance, obstacles.floors.tolist()
-        self._grips = [1.0, 1.0]
-        self._last = pose
-        torque = motor_torque(model)
-        self._forces = (torque, torque)
-        self._client = _free.pop() if _free else pybullet.connect(pybullet.DIRECT)
-        if self._client < 0:
+    def __init__(self, obstacles: Obstacles, models: Sequence[RobotModel]) -> None:
+        self.number = _free.pop() if _free else pybullet.connect(pybullet.DIRECT)
+        if self.number < 0:
             raise RuntimeError("PyBullet gave no physics client")
-        try:
-            pybullet.setPhysicsEngineParameter(**_accuracy(model), physicsClientId=self._client)
-            pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
+        with self.closed_on_error():
+            pybullet.setPhysicsEngineParameter(**finest([accuracy(model) for model in models]),
+                                               physicsClientId=self.number)
+            pybullet.setGravity(0, 0, -9.81, physicsClientId=self.number)
             with deferring_ctrl_c(), _quiet():  # or it might come while both outputs lead nowhere
-                self._solids = self._build_world(obstacles)
-            self._body = self._build_robot(pose)
-            self._axle = None if model.body is None else _axle_in_base(self._body, self._client)
+                self.solids = _build_world(obstacles, max(HEIGHT_M, *map(height_of, models)), self.number)
+
+    @contextlib.contextmanager
+    def closed_on_error(self) -> Iterator[None]:
+        """Gives the client up if anything goes wrong: whatever state it is in."""
+        try:
+            yield
         except BaseException:
-            pybullet.disconnect(physicsClientId=self._client)
+            pybullet.disconnect(physicsClientId=self.number)
             raise
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        if error is not None:  # whatever state it is in
-            pybullet.disconnect(physicsClientId=self._client)
+    def close(self, error: BaseException | None) -> None:
+        """Keep the client for others, unless something went wrong."""
+        if error is not None:
+            pybullet.disconnect(physicsClientId=self.number)
             return
-        pybullet.resetSimulation(physicsClientId=self._client)
-        _free.append(self._client)
+        pybullet.resetSimulation(physicsClientId=self.number)
+        _free.append(self.number)
 
-    def pose(self) -> tuple[float, float, float]:
-        """x, y [m], yaw [rad]."""
-        (x, y, _), (qx, qy, qz, qw) = self._axle_placed()
+    def advance(self) -> None:
+        """Move all for one control step."""
+        pybullet.stepSimulation(physicsClientId=self.number)
+
+
+class _Robot:
+    """A robot in the world of a client."""
+
+    def __init__(self, client: _Client, model: RobotModel, pose: _Pose, disturbance: Disturbance,
+                 floors: list[list[float]]) -> None:
+        self._client, self._solids, self._floors = client.number, client.solids, floors
+        self._model, self._disturbance = model, disturbance
+        self._left = disturbance.wheel_gains[0] / model.wheel_radius_m
+        self._right = disturbance.wheel_gains[1] / model.wheel_radius_m
+        self._grips, self._last = [1.0, 1.0], pose
+        torque = motor_torque(model)
+        self._forces = (torque, torque)
+        self._touching: set[int | None] = set()
+        self.touches: list[Touch] = []
+        self.tipped_over = False
+        self.body = self._build(pose)
+        self._axle = None if model.body is None else _axle_in_base(self.body, self._client)
+
+    def pose(self) -> _Pose:
+        """x, y [m], yaw [rad]; the last that was known of a robot that tipped over."""
+        (x, y, _), (qx, qy, qz, qw) = self.axle_placed()
         if not (1 - 2 * (qx * qx + qy * qy) > _UPRIGHT and math.isfinite(x + y + qz + qw)):  # NaN is not greater
             self.tipped_over = True
             return self._last
         self._last = x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
         return self._last
 
-    def tilt_rad(self) -> float:
-        """Angle between the robot's upright axis and the vertical: some milliradians, unless it tips over."""
-        _, (qx, qy, _, _) = self._axle_placed()
-        return math.acos(max(-1.0, 1 - 2 * (qx * qx + qy * qy)))
-
-    def _axle_placed(self) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    def axle_placed(self) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
         """Place of the middle of the axle [m], and the robot's orientation as a quaternion."""
-        place, turned = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
+        place, turned = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
         if self._axle is not None:  # else the base is its centre of mass
             place, turned = pybullet.multiplyTransforms(place, turned, *self._axle)
         return place, turned
 
-    def step(self, left_m_s: float, right_m_s: float) -> None:
-        """Advance by one control step."""
+    def command(self, left_m_s: float, right_m_s: float) -> None:
+        """Set the speeds of the wheels for the next control step."""
         pybullet.setJointMotorControlArray(
-            self._body, (0, 1), pybullet.VELOCITY_CONTROL, forces=self._forces, physicsClientId=self._client,
+            self.body, (0, 1), pybullet.VELOCITY_CONTROL, forces=self._forces, physicsClientId=self._client,
             targetVelocities=(left_m_s * self._left, right_m_s * self._right))
         if self._floors:
             self._grip_floor()
-        pybullet.stepSimulation(physicsClientId=self._client)
-        self._steps += 1
-        if self._steps % _CONTACT_STEPS == 0:
-            self._look_for_contacts()
 
-    def _look_for_contacts(self) -> None:
-        near = pybullet.getContactPoints(self._body, self._solids, physicsClientId=self._client)
+    def look_for_contacts(self, since_s: float) -> None:
+        """Note whether it touches an obstacle."""
+        self._note(None, pybullet.getContactPoints(self.body, self._solids, physicsClientId=self._client), since_s)
+
+    def look_at(self, robot: int, other: _Robot, since_s: float) -> bool:
+        """Note whether it touches another robot; whether it does so anew."""
+        before = robot in self._touching
+        self._note(robot, pybullet.getContactPoints(self.body, other.body, physicsClientId=self._client), since_s)
+        return robot in self._touching and not before
+
+    def _note(self, other: int | None, near: Sequence[tuple[Any, ...]], since_s: float) -> None:
         places = [point[_PLACE] for point in near if point[_DISTANCE] <= 0]
         period = _CONTACT_STEPS / CONTROL_HZ
-        if places and self._touched:
-            self.touches[-1] = replace(self.touches[-1], lasted_s=self.touches[-1].lasted_s + period)
+        if places and other in self._touching:
+            last = max(k for k, touch in enumerate(self.touches) if touch.robot == other)
+            self.touches[last] = replace(self.touches[last], lasted_s=self.touches[last].lasted_s + period)
         elif places:
-            self.touches.append(Touch(since_s=self._steps / CONTROL_HZ, lasted_s=period, x_m=places[0][0],
-                                      y_m=places[0][1]))
-        self._touched = bool(places)
+            self.touches.append(Touch(since_s=since_s, lasted_s=period, x_m=places[0][0], y_m=places[0][1],
+                                      robot=other))
+            self._touching.add(other)
+        else:
+            self._touching.discard(other)
 
     def _grip_floor(self) -> None:
         """Give each wheel the friction of the floor that it stands on."""
@@ -173,22 +185,9 @@ class Bullet:
                     grip = friction
             if grip != self._grips[wheel]:
                 self._grips[wheel] = grip
-                pybullet.changeDynamics(self._body, wheel, lateralFriction=grip, physicsClientId=self._client)
+                pybullet.changeDynamics(self.body, wheel, lateralFriction=grip, physicsClientId=self._client)
 
-    def _build_world(self, obstacles: Obstacles) -> int:
-        floor = pybullet.createMultiBody(
-            0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client),
-            physicsClientId=self._client)
-        # Casters that hover over the floor are no contacts to solve for: they'd take a sixth of the time.
-        pybullet.setCollisionFilterGroupMask(floor, -1, _STATIC | _FLOOR, -1, physicsClientId=self._client)
-        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=CASTER_GAP_M / 2,
-                                physicsClientId=self._client)
-        # One compound body for all obstacles: its own tree finds the few that are near. Only a URDF may hold more
-        # than 16 shapes: createCollisionShapeArray drops the others without a word.
-        height_m = max(HEIGHT_M, height_of(self._model))
-        return _load(obstacles_urdf(obstacles, height_m), useFixedBase=True, physicsClientId=self._client)
-
-    def _build_robot(self, pose: tuple[float, float, float]) -> int:
+    def _build(self, pose: _Pose) -> int:
         model, client = self._model, self._client
         track, payload = model.track_m * self._disturbance.track_gain, self._disturbance.payload_kg
         if model.body is None:
@@ -199,7 +198,7 @@ class Bullet:
             body = _load_own(body_urdf(own, model, track), model, pose, client)
         smooth = {"linearDamping": 0.0, "angularDamping": 0.0, "physicsClientId": client}
         rough = self._disturbance.hull_friction > 0
-        # PyBullet multiplies the frictions of two bodies.
+        # PyBullet multiplies the frictions of two bodies: robots slide along each other.
         pybullet.changeDynamics(body, -1, lateralFriction=_CASTER_FRICTION if rough else 0.0, **smooth)
         if rough:
             pybullet.changeDynamics(self._solids, -1, physicsClientId=client,
@@ -212,32 +211,116 @@ class Bullet:
         return body
 
 
-def fastest_wheel_rad_s(model: RobotModel) -> float:
-    """Fastest that a wheel turns, driving and turning at a time."""
-    return (model.followed_speed_m_s + model.max_turn_rad_s * model.track_m / 2) / model.wheel_radius_m
+class Bullet:
+    """A world of obstacles with one robot in it, in PyBullet.
+
+    Robots that don't meet have a world each; filtering collisions between them would not be the same.
+    """
+
+    def __init__(self, obstacles: Obstacles, model: RobotModel, pose: _Pose, disturbance: Disturbance) -> None:
+        self._steps = 0
+        self._client = _Client(obstacles, [model])
+        with self._client.closed_on_error():
+            self._robot = _Robot(self._client, model, pose, disturbance, obstacles.floors.tolist())
+        self.pose, self.touches = self._robot.pose, self._robot.touches
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self._client.close(error)
+
+    @property
+    def tipped_over(self) -> bool:
+        """Whether it lies on its side, or nobody knows where."""
+        return self._robot.tipped_over
+
+    def tilt_rad(self) -> float:
+        """Angle between the robot's upright axis and the vertical: some milliradians, unless it tips over."""
+        _, (qx, qy, _, _) = self._robot.axle_placed()
+        return math.acos(max(-1.0, 1 - 2 * (qx * qx + qy * qy)))
+
+    def step(self, left_m_s: float, right_m_s: float) -> None:
+        """Advance by one control step."""
+        self._robot.command(left_m_s, right_m_s)
+        self._client.advance()
+        self._steps += 1
+        if self._steps % _CONTACT_STEPS == 0:
+            self._robot.look_for_contacts(self._steps / CONTROL_HZ)
 
 
-def motor_torque(model: RobotModel) -> float:
-    """Greatest torque of a wheel's motor [Nm]: several times what the robot's limits ask for, driving or turning."""
-    turning = model.turn_inertia_m2 * model.turn_acceleration_rad_s2 / model.track_m
-    force = max(model.acceleration_m_s2, model.acceleration_m_s2 / 2 + turning)  # of each wheel, per mass [m/s2]
-    return _MOTOR_G * model.mass_kg * force * model.wheel_radius_m
+class BulletTeam:
+    """A world of obstacles with several robots in it, in PyBullet; with one robot it is ``Bullet`` to the bit."""
+
+    def __init__(self, obstacles: Obstacles, robots: Sequence[tuple[RobotModel, _Pose, Disturbance]]) -> None:
+        self._steps = 0
+        self._client = _Client(obstacles, [model for model, _, _ in robots])
+        with self._client.closed_on_error():
+            self._robots = [_Robot(self._client, *robot, obstacles.floors.tolist()) for robot in robots]
+        self._stood = [False] * len(robots)
+        radii = [model.radius_m for model, _, _ in robots]
+        self._pairs = [(i, j, radii[i] + radii[j] + _NEAR_M) for j in range(len(robots)) for i in range(j)]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self._client.close(error)
+
+    def touches(self, robot: int) -> Sequence[Touch]:
+        """Each time that a robot's hull came to touch an obstacle or another robot, so far."""
+        return self._robots[robot].touches
+
+    def tipped_over(self) -> list[int]:
+        """Numbers of the robots that lie on their side."""
+        return [number for number, robot in enumerate(self._robots) if robot.tipped_over]
+
+    def step(self, wheels_m_s: FloatArray, poses: FloatArray) -> list[tuple[int, int]]:
+        """Advance by one control step.
+
+        Args:
+            wheels_m_s: Speed along the floor that the left and the right wheel of each robot are commanded to have,
+                before the disturbance, shape (n, 2).
+            poses: Receives x, y [m], yaw [rad] of each robot, shape (n, 3).
+
+        Returns:
+            Pairs of robots that came to touch.
+        """
+        for number, (left, right) in enumerate(wheels_m_s.tolist()):
+            stands = left == 0.0 and right == 0.0
+            if not (stands and self._stood[number]):
+                self._robots[number].command(left, right)
+            self._stood[number] = stands
+        self._client.advance()
+        self._steps += 1
+        placed = [robot.pose() for robot in self._robots]
+        poses[:] = placed
+        return self._look_for_contacts(placed) if self._steps % _CONTACT_STEPS == 0 else []
+
+    def _look_for_contacts(self, placed: Sequence[_Pose]) -> list[tuple[int, int]]:
+        since_s, met = self._steps / CONTROL_HZ, []
+        for robot in self._robots:
+            robot.look_for_contacts(since_s)
+        for i, j, near_m in self._pairs:
+            if math.hypot(placed[i][0] - placed[j][0], placed[i][1] - placed[j][1]) < near_m:
+                self._robots[j].look_at(i, self._robots[i], since_s)
+                if self._robots[i].look_at(j, self._robots[j], since_s):
+                    met.append((i, j))
+        return met
 
 
-def _accuracy(model: RobotModel) -> dict[str, float]:
-    """Steps and solver of the physics: finer for wheels that are so slow, or so fast, that it would show,
-    and for bodies of their own."""
-    turning = model.track_m / 2
-    speed = min(model.followed_speed_m_s, model.max_turn_rad_s * turning) / model.wheel_radius_m
-    acceleration = min(model.acceleration_m_s2, model.turn_acceleration_rad_s2 * turning) / model.wheel_radius_m
-    slowness = min(speed / _WHEEL_RAD_S, acceleration / _WHEEL_RAD_S2, 1.0)
-    own = model.body is not None
-    fast = own or fastest_wheel_rad_s(model) > _FAST_RAD_S
-    return {"fixedTimeStep": 1.0 / CONTROL_HZ,
-            "numSubSteps": round((_FINE_HZ if fast or slowness < 1 else PHYSICS_HZ) / CONTROL_HZ),
-            "numSolverIterations": _ITERATIONS if slowness == 1 and not own else _FINE_ITERATIONS,
-            "solverResidualThreshold": (_OWN_RESIDUAL if own else _RESIDUAL) * slowness**2, "enableConeFriction": 0,
-            "deterministicOverlappingPairs": 1}
+def _build_world(obstacles: Obstacles, height_m: float, client: int) -> int:
+    floor = pybullet.createMultiBody(
+        0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), physicsClientId=client)
+    # Casters that hover over the floor are no contacts to solve for: they'd take a sixth of the time.
+    pybullet.setCollisionFilterGroupMask(floor, -1, _STATIC | _FLOOR, -1, physicsClientId=client)
+    pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=CASTER_GAP_M / 2,
+                            physicsClientId=client)
+    # One compound body for all obstacles: its own tree finds the few that are near. Only a URDF may hold more
+    # than 16 shapes: createCollisionShapeArray drops the others without a word.
+    return _load(obstacles_urdf(obstacles, height_m), useFixedBase=True, physicsClientId=client)
 
 
 def _load(urdf: str, **options: Any) -> int:
@@ -248,7 +331,7 @@ def _load(urdf: str, **options: Any) -> int:
     return body
 
 
-def _load_own(urdf: str, model: RobotModel, pose: tuple[float, float, float], client: int) -> int:
+def _load_own(urdf: str, model: RobotModel, pose: _Pose, client: int) -> int:
     with _quiet():
         body = _load(urdf, basePosition=[pose[0], pose[1], model.wheel_radius_m],
                      baseOrientation=_upright(pose[2]), physicsClientId=client,
@@ -258,7 +341,7 @@ def _load_own(urdf: str, model: RobotModel, pose: tuple[float, float, float], cl
     return body
 
 
-def _create_round(parts: RoundBody, pose: tuple[float, float, float], client: int) -> int:
+def _create_round(parts: RoundBody, pose: _Pose, client: int) -> int:
     base = pybullet.createCollisionShapeArray(
         shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_SPHERE, pybullet.GEOM_SPHERE],
         radii=list(parts.radii_m), lengths=[parts.hull_m, 0, 0], halfExtents=[[0, 0, 0]] * 3,

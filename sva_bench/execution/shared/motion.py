@@ -16,15 +16,11 @@ from sva_bench.execution.shared.driver import Happening, Hold, LegSoFar, LegWait
 from sva_bench.execution.shared.lanes import Lane
 from sva_bench.execution.shared.state import (
     BRAKED,
-    BRAKING,
-    HOPS_S,
-    NOW,
     READY,
-    READY_S,
-    TRACED,
-    at_rest,
-    figures_of,
     longer,
+    nothing_noted,
+    robots_at_rest,
+    team_of,
 )
 from sva_bench.execution.shared.ticks import (
     DEADLOCK,
@@ -34,11 +30,11 @@ from sva_bench.execution.shared.ticks import (
     IS_STUCK,
     NOBODY,
     REST,
-    begin_stretch,
-    stop,
+    begin_leg,
+    stop_robot,
 )
-from sva_bench.execution.shared.ways import Ways, ways_of
-from sva_bench.execution.touch import Touch
+from sva_bench.execution.shared.ways import Places, Ways, ways_of
+from sva_bench.robot.disturbance import FEATURES
 from sva_bench.robot.follower import CONTROL_HZ
 
 _DT = 1.0 / CONTROL_HZ
@@ -58,28 +54,26 @@ class TeamMotion:
             checked: Whether robots that hardly move are looked for, as in physics.
         """
         count = len(members)
-        self._members = tuple(members)
-        self._figures = figures_of(members)
-        self._state = at_rest(members, traced=traced, checked=checked)
-        self._parts = np.empty((3, self._figures.waves.shape[2]))
+        self._members, self._traced = tuple(members), traced
+        self._robots, self._teams = robots_at_rest(members), team_of(traced=traced, checked=checked)
+        self._notes = nothing_noted(count, traced=traced)
+        self._parts = np.empty((3, FEATURES))
         self._lanes: list[Lane | None] = [None] * count
         self._needs: list[Sequence[IntArray] | None] = [None] * count
         self._holds: list[tuple[Hold, ...]] = [()] * count
-        self._ended_s = [math.inf] * count
-        self._touches: list[list[Touch]] = [[] for _ in members]  # on their legs; of what moves them
-        self._known_ways: Ways | None = None
+        self._known: tuple[Ways, Places] | None = None
 
     @property
     def clock_s(self) -> float:
         """The mission clock [s], a multiple of the control step."""
-        return float(self._state.team[NOW] * _DT)
+        return float(self._teams["now"][0]) * _DT
 
     def assign(self, robot: int, lane: Lane | None, needs: Sequence[IntArray] | None) -> None:
         """Give a robot that stands at rest another lane; what it was driving is over."""
-        self._lanes[robot], self._needs[robot], self._known_ways = lane, needs, None
-        state = self._state
-        self._stand(robot)
-        state.leg[robot], state.cell[robot], state.open_to[robot], state.dropped[robot] = -1, 0, 0, False
+        self._lanes[robot], self._needs[robot], self._known = lane, needs, None
+        stop_robot(self._robots, robot, 0)
+        record = self._robots[robot]
+        record["leg"], record["cell"], record["open_to"], record["dropped"] = -1, 0, 0, False
         self._clear_leg(robot, self.clock_s)
 
     def start_leg(self, robot: int, ready_s: float, driving_s: float, holds: Sequence[Hold] = (), *,
@@ -89,69 +83,72 @@ class TeamMotion:
         Raises:
             ValueError: If its lane has no leg left, or it drives one yet.
         """
-        state, lane = self._state, self._lanes[robot]
-        number = int(state.leg[robot]) + 1
-        if lane is None or number >= len(lane.cuts) or state.doing[robot]:
+        record, lane = self._robots[robot], self._lanes[robot]
+        number = int(record["leg"]) + 1
+        if lane is None or number >= len(lane.cuts) or record["doing"]:
             raise ValueError(f"robot {robot} has no leg left to start, or drives one yet")
         self._clear_leg(robot, ready_s)
-        state.leg[robot], state.doing[robot] = number, READY
-        state.clock_s[robot] = ready_s, 0.0, driving_s, fuel_s, idle_share
-        self._holds[robot], self._ended_s[robot] = tuple(holds), math.inf
-        if len(holds) > state.holds.shape[1]:
-            self._state = state = state._replace(holds=longer(state.holds, len(holds)))
-        state.hold_count[robot] = len(holds)
+        record["leg"], record["doing"], record["hold_count"] = number, READY, len(holds)
+        record["first_cell"], record["end_cell"] = lane.first_cell[number:number + 2]
+        record["driving_s"], record["fuel_s"], record["idle"] = driving_s, fuel_s, idle_share
+        self._holds[robot] = tuple(holds)
+        if len(holds) > self._notes.holds.shape[1]:
+            self._notes = self._notes._replace(holds=longer(self._notes.holds, len(holds)))
         for k, hold in enumerate(holds):
-            state.holds[robot, k] = hold.along_m, max(round(hold.lasts_s * CONTROL_HZ), 0)
-        begin_stretch(state, robot, self._ways.leg_stretch[robot, number])
+            self._notes.holds[robot, k] = hold.along_m, round(hold.lasts_s * CONTROL_HZ)
+        begin_leg(self._robots, robot, self._placed[1].first_stretch[robot][number])
 
     def drop(self, robot: int) -> None:
         """A robot failed: it stands where it is, and nobody waits for it any more."""
-        self._stand(robot)
-        self._state.dropped[robot] = True
+        stop_robot(self._robots, robot, 0)
+        self._robots[robot]["dropped"] = True
 
     def brake(self, on: bool) -> None:
         """Let all robots brake, or let them go on."""
-        self._state.team[BRAKING] = on
+        self._teams["braking"] = on
 
     def run(self) -> Happening:
         """Drive until something happens."""
         while (happened := self._told()) is None:
-            code = self._until_something(self._ways)
+            code = self._until_something(self._placed[0])
             if code == FULL:
-                state = self._state
-                self._state = state._replace(waits=longer(state.waits, 0), poses=longer(
-                    state.poses, 0) if state.team[TRACED] else state.poses)
+                notes = self._notes
+                self._notes = notes._replace(waits=longer(notes.waits, 0), poses=longer(
+                    notes.poses, 0) if self._traced else notes.poses)
             elif code in _OF_ALL:
                 return Happening(kind=_OF_ALL[code], clock_s=self.clock_s)
         return happened
 
     def leg(self, robot: int) -> LegSoFar:
         """A robot's present leg."""
-        state = self._state
-        kept = state.poses[robot, :state.pose_count[robot]]
-        if state.team[TRACED] and (not len(kept) or kept[-1, 0] != state.elapsed[robot]):
-            kept = np.concatenate([kept, [[state.elapsed[robot], *state.pose[robot]]]])
-        driving_s = min(float(state.clock_s[robot, HOPS_S] + state.steps[robot] * _DT), self._ended_s[robot])
+        record, notes = self._robots[robot], self._notes
+        waited_s = float(record["waited"]) * _DT
+        # Its last control step may go beyond what it had.
+        driving_s = min(self._driven_s(robot), float(record["driving_s"]),
+                        max(float(record["fuel_s"] - record["idle"] * waited_s), 0.0))
+        kept, elapsed = notes.poses[robot, :record["pose_count"]], float(record["elapsed"])
+        if self._traced and (not len(kept) or kept[-1, 0] != elapsed):
+            kept = np.concatenate([kept, [[elapsed, *record["pose"]]]])
         return LegSoFar(
-            driving_s=driving_s, clock_s=float(state.clock_s[robot, READY_S] + driving_s + state.waited[robot] * _DT),
-            waits=tuple(self._wait(robot, entry) for entry in state.waits[robot, :state.wait_count[robot]].tolist()),
-            since_s=kept[:, 0] * _DT, pose=kept[:, 1:].copy(), touches=tuple(self._touches[robot]))
+            driving_s=driving_s, clock_s=float(record["ready_s"]) + driving_s + waited_s,
+            waits=tuple(self._wait(robot, entry) for entry in notes.waits[robot, :record["wait_count"]].tolist()),
+            since_s=kept[:, 0] * _DT, pose=kept[:, 1:].copy())
 
     def pose(self, robot: int) -> Pose:
         """Where a robot is."""
-        x, y, yaw = self._state.pose[robot].tolist()
+        x, y, yaw = self._robots[robot]["pose"].tolist()
         return x, y, yaw
 
     def arc_m(self, robot: int) -> float:
         """How far a robot is on its leg [m]."""
-        state = self._state
-        if state.leg[robot] < 0:
+        record = self._robots[robot]
+        if record["leg"] < 0:
             return 0.0
-        return float(self._ways.before_m[state.stretch[robot]] + state.follow[robot, 1])
+        return float(self._placed[0].stretches["before_m"][record["stretch"]] + record["follow"][1])
 
     def cell(self, robot: int) -> int:
         """The cell of its lane that a robot is in."""
-        return int(self._state.cell[robot])
+        return int(self._robots[robot]["cell"])
 
     def __enter__(self) -> Self:
         return self
@@ -165,36 +162,39 @@ class TeamMotion:
         raise NotImplementedError
 
     @property
-    def _ways(self) -> Ways:
-        if self._known_ways is None:
-            self._known_ways = ways_of([member.model for member in self._members], self._lanes, self._needs)
-        return self._known_ways
+    def _placed(self) -> tuple[Ways, Places]:
+        """The lanes as arrays; the records know where theirs are."""
+        if self._known is None:
+            models = [member.model for member in self._members]
+            self._known = _, places = ways_of(models, self._lanes, self._needs)
+            self._robots["cells"], self._robots["need_row"] = places.cells, places.need_row
+            for record, first in zip(self._robots, places.first_stretch, strict=True):
+                record["stretch"] += first[0] - record["lane_stretch"]
+                record["lane_stretch"] = first[0]
+        return self._known
 
-    def _stand(self, robot: int) -> None:
-        stop(self._state, robot, 0)
-        self._state.commanded[robot] = False
+    def _driven_s(self, robot: int) -> float:
+        record = self._robots[robot]
+        return float(record["hops_s"] + record["steps"] * _DT)
 
     def _clear_leg(self, robot: int, ready_s: float) -> None:
-        state = self._state
-        for counter in (state.elapsed, state.waited, state.wait_count, state.pose_count, state.steps, state.hold,
-                        state.hold_count):
-            counter[robot] = 0
-        self._touches[robot] = []
-        state.hold_left[robot], state.commanded[robot] = -1, False
-        state.clock_s[robot] = ready_s, 0.0, math.inf, math.inf, 0.0
+        """Nothing of a leg yet."""
+        record = self._robots[robot]
+        for name in ("elapsed", "waited", "wait_count", "pose_count", "steps", "hold", "hold_count"):
+            record[name] = 0
+        record["hold_left"], record["commanded"] = -1, False
+        record["ready_s"], record["hops_s"], record["idle"] = ready_s, 0.0, 0.0
+        record["driving_s"] = record["fuel_s"] = math.inf
 
     def _told(self) -> Happening | None:
         """What happened and was not told yet: robots before pairs, by their numbers."""
-        state = self._state
-        for robot in np.flatnonzero(state.event).tolist():
-            kind = _OF_A_ROBOT[int(state.event[robot])]
-            state.event[robot] = 0
-            if kind == "ended":
-                _, _, driving_s, fuel_s, idle = state.clock_s[robot].tolist()
-                self._ended_s[robot] = min(driving_s, max(fuel_s - idle * float(state.waited[robot]) * _DT, 0.0))
+        events, touched = self._robots["event"], self._notes.touched
+        for robot in np.flatnonzero(events).tolist():
+            kind = _OF_A_ROBOT[int(events[robot])]
+            events[robot] = 0
             return Happening(kind=kind, clock_s=self.leg(robot).clock_s, robot=robot)
-        for robot, other in np.argwhere(state.touched).tolist():
-            state.touched[robot, other] = False
+        for robot, other in np.argwhere(touched).tolist():
+            touched[robot, other] = False
             return Happening(kind="touch", clock_s=self.clock_s, robot=robot, other=other)
         return None
 

@@ -27,5 +27,5 @@ class TeamTwin(TeamMotion):
         super().__init__(members, traced=traced)
 
     def _until_something(self, ways: Ways) -> int:
-        code: int = drive_twins(ways, self._figures, self._state, self._parts)
+        code: int = drive_twins(self._robots, self._teams, ways, self._notes, self._parts)
         return code

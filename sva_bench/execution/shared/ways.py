@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.execution.shared.lanes import Lane
@@ -17,56 +18,57 @@ GOES_ON, ENDS_HOP, ENDS_LEG = 0, 1, 2
 """How a stretch ends: at a corner, at a stop that is no site of the route, at one that is."""
 
 
+STRETCH = np.dtype([("first", np.int64), ("end", np.int64), ("heading", np.float64), ("before_m", np.float64),
+                    ("patience", np.int64), ("ends", np.int64)], align=True)
+"""First vertex, and that of the next stretch; heading at its end [rad]; way of its leg before it [m]; control steps
+after which it counts as stuck if unfinished; and how it ends."""
+
+
 class Ways(NamedTuple):
     """The lanes of all robots, one behind the other.
 
     Attributes:
         path: Vertices of all stretches [m], shape (vertices, 2).
         arc: Arc length at each vertex, from the start of its stretch [m].
-        vertex: First vertex of each stretch, and of all, shape (stretches + 1,).
-        heading: Heading at the end of each stretch [rad].
-        before_m: Way of its leg before each stretch [m].
-        patience: Control steps after which an unfinished stretch counts as stuck.
-        ends: How each stretch ends.
-        leg_stretch: First stretch of each leg, shape (robots, legs + 1).
-        leg_cell: First cell of each leg, and of all, shape (robots, legs + 1); numbered for each robot.
-        cells: Number of cells of each robot that have gates.
-        need: Cells that the others must have reached before a cell is entered, shape (cells of all, robots).
-        need_row: Row of each robot's first cell in ``need``.
+        stretches: Records of ``STRETCH``.
+        need: Cells that the others must have reached before a cell is entered, shape (cells with gates, robots).
     """
 
     path: FloatArray
     arc: FloatArray
-    vertex: IntArray
-    heading: FloatArray
-    before_m: FloatArray
-    patience: IntArray
-    ends: IntArray
-    leg_stretch: IntArray
-    leg_cell: IntArray
-    cells: IntArray
+    stretches: NDArray[Any]
     need: IntArray
-    need_row: IntArray
+
+
+class Places(NamedTuple):
+    """Where the lanes are in ``Ways``.
+
+    Attributes:
+        first_stretch: First stretch of each leg, for each robot.
+        cells: Number of cells of each robot that have gates.
+        need_row: Row of each robot's first cell in ``Ways.need``.
+    """
+
+    first_stretch: tuple[tuple[int, ...], ...]
+    cells: tuple[int, ...]
+    need_row: tuple[int, ...]
 
 
 class _Flat(NamedTuple):
-    """One lane's part of ``Ways``, counted from its own start."""
+    """One lane's part of ``Ways``, counted from its own start; without patience, which is a matter of the model."""
 
     path: FloatArray
     arc: FloatArray
-    vertex: IntArray
-    heading: FloatArray
-    before_m: FloatArray
-    ends: IntArray
-    leg_stretch: IntArray
+    stretches: NDArray[Any]
+    first_stretch: IntArray
 
 
-_flat: weakref.WeakKeyDictionary[Lane, _Flat] = weakref.WeakKeyDictionary()  # trials of a pattern share their lanes
-_patience: weakref.WeakKeyDictionary[Lane, dict[str, IntArray]] = weakref.WeakKeyDictionary()
+_flat: weakref.WeakKeyDictionary[Lane, dict[str, _Flat]] = weakref.WeakKeyDictionary()
+"""By robot model: trials of the same order share their lanes."""
 
 
 def ways_of(models: Sequence[RobotModel], lanes: Sequence[Lane | None],
-            needs: Sequence[Sequence[IntArray] | None]) -> Ways:
+            needs: Sequence[Sequence[IntArray] | None]) -> tuple[Ways, Places]:
     """Put the lanes of a team together.
 
     Args:
@@ -75,64 +77,48 @@ def ways_of(models: Sequence[RobotModel], lanes: Sequence[Lane | None],
         needs: For each robot and each other one, the cell that the other must have reached before each of its cells;
             ``None`` = it has no gates.
     """
-    flat = [_NOTHING if lane is None else _flattened(lane) for lane in lanes]
-    legs = max(len(part.leg_stretch) for part in flat)
-    vertices = np.cumsum([0, *(len(part.path) for part in flat)])
-    stretches = np.cumsum([0, *(len(part.heading) for part in flat)])
-    count = len(lanes)
-    leg_stretch, leg_cell = np.zeros((count, legs), dtype=np.int64), np.zeros((count, legs), dtype=np.int64)
-    cells, rows = np.zeros(count, dtype=np.int64), [np.empty((0, count), dtype=np.int64)]
-    for i, (part, lane, need) in enumerate(zip(flat, lanes, needs, strict=True)):
-        leg_stretch[i, :len(part.leg_stretch)] = part.leg_stretch + stretches[i]
-        if lane is not None:
-            leg_cell[i, :len(lane.first_cell)] = lane.first_cell
-            if need is not None:
-                cells[i] = lane.first_cell[-1]
-                rows.append(np.column_stack([
-                    np.zeros(cells[i], dtype=np.int64) if j == i else need[j] for j in range(count)]))
-    return Ways(
-        path=np.concatenate([part.path for part in flat]), arc=np.concatenate([part.arc for part in flat]),
-        vertex=np.concatenate([*(part.vertex[:-1] + start for part, start in zip(flat, vertices[:-1], strict=True)),
-                               vertices[-1:]]),
-        heading=np.concatenate([part.heading for part in flat]),
-        before_m=np.concatenate([part.before_m for part in flat]),
-        patience=np.concatenate([np.empty(0, dtype=np.int64), *(
-            _patience_of(lane, model) for lane, model in zip(lanes, models, strict=True) if lane is not None)]),
-        ends=np.concatenate([part.ends for part in flat]), leg_stretch=leg_stretch, leg_cell=leg_cell, cells=cells,
-        need=np.ascontiguousarray(np.concatenate(rows)), need_row=np.cumsum([0, *cells[:-1]]))
+    flat = [_NOTHING if lane is None else _flattened(lane, model) for lane, model in zip(lanes, models, strict=True)]
+    vertices = np.cumsum([0, *(len(part.path) for part in flat)]).tolist()
+    numbers = np.cumsum([0, *(len(part.stretches) for part in flat)]).tolist()
+    stretches = np.concatenate([part.stretches for part in flat])
+    for first, end, vertex in zip(numbers[:-1], numbers[1:], vertices[:-1], strict=True):
+        stretches["first"][first:end] += vertex
+        stretches["end"][first:end] += vertex
+    rows, cells = [np.empty((0, len(lanes)), dtype=np.int64)], [0] * len(lanes)
+    for i, (lane, need) in enumerate(zip(lanes, needs, strict=True)):
+        if lane is not None and need is not None:
+            cells[i] = int(lane.first_cell[-1])
+            none = np.zeros(cells[i], dtype=np.int64)
+            rows.append(np.column_stack([none if j == i else need[j] for j in range(len(lanes))]))
+    ways = Ways(path=np.concatenate([part.path for part in flat]), arc=np.concatenate([part.arc for part in flat]),
+                stretches=stretches, need=np.ascontiguousarray(np.concatenate(rows)))
+    return ways, Places(
+        first_stretch=tuple(tuple((part.first_stretch + first).tolist())
+                            for part, first in zip(flat, numbers[:-1], strict=True)),
+        cells=tuple(cells), need_row=tuple(np.cumsum([0, *cells[:-1]]).tolist()))
 
 
-def _flattened(lane: Lane) -> _Flat:
-    if (known := _flat.get(lane)) is not None:
-        return known
-    paths, arcs, headings, before, ends, firsts = [], [], [], [], [], [0]
+def _flattened(lane: Lane, model: RobotModel) -> _Flat:
+    known = _flat.setdefault(lane, {})
+    if model.name in known:
+        return known[model.name]
+    paths, arcs, records, firsts, vertex = [], [], [], [0], 0
     for cut in lane.cuts:
         way_m = 0.0
-        for hop in cut.leg:
-            for stretch in hop:
+        for number, hop in enumerate(cut.leg, start=1):
+            for k, stretch in enumerate(hop, start=1):
+                ends = GOES_ON if k < len(hop) else ENDS_HOP if number < len(cut.leg) else ENDS_LEG
+                records.append((vertex, vertex + len(stretch.path), stretch.heading_rad, way_m,
+                                patience_steps(stretch, model), ends))
                 paths.append(stretch.path)
                 arcs.append(stretch.arc)
-                headings.append(stretch.heading_rad)
-                before.append(way_m)
-                ends.append(GOES_ON)
                 way_m += float(stretch.arc[-1])
-            ends[-1] = ENDS_HOP
-        ends[-1] = ENDS_LEG
-        firsts.append(len(paths))
-    _flat[lane] = _Flat(
-        path=np.ascontiguousarray(np.concatenate(paths)), arc=np.concatenate(arcs),
-        vertex=np.cumsum([0, *map(len, paths)]), heading=np.array(headings), before_m=np.array(before),
-        ends=np.array(ends, dtype=np.int64), leg_stretch=np.array(firsts, dtype=np.int64))
-    return _flat[lane]
-
-
-def _patience_of(lane: Lane, model: RobotModel) -> IntArray:
-    known = _patience.setdefault(lane, {})
-    if model.name not in known:
-        known[model.name] = np.array([patience_steps(stretch, model) for cut in lane.cuts for hop in cut.leg
-                                      for stretch in hop], dtype=np.int64)
+                vertex += len(stretch.path)
+        firsts.append(len(records))
+    known[model.name] = _Flat(path=np.ascontiguousarray(np.concatenate(paths)), arc=np.concatenate(arcs),
+                              stretches=np.array(records, dtype=STRETCH), first_stretch=np.array(firsts))
     return known[model.name]
 
 
-_NOTHING = _Flat(path=np.empty((0, 2)), arc=np.empty(0), vertex=np.zeros(1, dtype=np.int64), heading=np.empty(0),
-                 before_m=np.empty(0), ends=np.empty(0, dtype=np.int64), leg_stretch=np.zeros(1, dtype=np.int64))
+_NOTHING = _Flat(path=np.empty((0, 2)), arc=np.empty(0), stretches=np.empty(0, dtype=STRETCH),
+                 first_stretch=np.zeros(1, dtype=np.int64))
