@@ -92,7 +92,7 @@ def run(
         evpi: Work out the value of perfect information however long it takes.
         informed: Execute as well what somebody would plan who knew beforehand who is available.
         assumptions: Execute the plans made for each failure process under all of them.
-        precision: Go on until the executed VSS is known to so many per cent of the stochastic plan's mean: 1 or "1%".
+        precision: Go on until the executed VSS is known to so many per cent of the stochastic mean: 1 or ``"1%"``.
         max_trials: With ``precision``: trials at which to stop all the same, 100 000 by default.
         interaction: ``independent``, ``uncoordinated`` or ``shared``, as in world files; by default the world's.
         out: Folder that receives the run folder.
@@ -143,9 +143,9 @@ def execute(
         world: The world, or its file.
         plans: One plan, which goes by the name ``plan``; plans by their names; or plan files, which go by their stems.
         allow_infeasible: Drive plans that break fuel capacity or mission limit too; each is warned of.
-        seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure, policy, news, anticipate,
-            interaction: As for ``run``.
-        out, workers, progress: As for ``run``.
+        seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure, policy, news, anticipate: As for
+            ``run``.
+        interaction, out, workers, progress: As for ``run``.
 
     Returns:
         Summary with the comparisons, and the outcomes and legs as Arrow tables.
