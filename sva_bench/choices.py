@@ -70,6 +70,8 @@ Best = Literal["best"]
 """What plans are calibrated for in place of a share of bad missions: the greatest executed value."""
 EventKind = Literal["departed", "waits", "touches", "arrived", "collected", "refuelled", "failed", "out_of_fuel",
                     "late", "stuck", "home"]
+Fault = Literal["tipped over", "physics failed"]
+"""Why a robot drives no more though nothing holds it: it lies on its side, or physics gives no finite pose of it."""
 DriveUnit = Literal["hops", "routes"]
 """What is driven at a time: from site to site, or from base to base."""
 MarkKind = Literal["contact", "wait"]

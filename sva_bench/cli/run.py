@@ -33,7 +33,7 @@ from sva_bench.cli.options import (
     WorldArgument,
 )
 from sva_bench.cli.terminal import messages, print_json, progress_bars, set_up_logging
-from sva_bench.errors import BadInput
+from sva_bench.errors import BadInput, ExitCode
 from sva_bench.files.outputs import check_folder
 from sva_bench.study.bounds import MOST_TRIALS
 from sva_bench.study.libraries import PRELOAD, load_libraries
@@ -181,6 +181,7 @@ def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
+        from sva_bench.report.doubts import failed_physics
         from sva_bench.storage.stored_run import write_csv
 
     if csv:
@@ -190,3 +191,7 @@ def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False
     else:
         print_summary(summary, wide=wide)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
+    if failed := failed_physics(summary):
+        if as_json:
+            messages.print(*failed, highlight=False)
+        raise typer.Exit(ExitCode.UNFINISHED_TRIALS)

@@ -18,7 +18,7 @@ from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_page import calibration_lines
-from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
+from sva_bench.report.doubts import CONTRADICTED, contradictions, failed_physics, upset_by_noise
 from sva_bench.report.source_table import SOURCES_HEAD, source_rows
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
@@ -54,7 +54,7 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
     console.print(answer(summary), highlight=False)
     for said in contradictions(summary):
         console.print(f"{CONTRADICTED} {said}", highlight=False)
-    for said in (*upset_by_noise(summary), *remarks(summary)):
+    for said in (*failed_physics(summary), *upset_by_noise(summary), *remarks(summary)):
         console.print(said, highlight=False)
     if isinstance(summary, ComparisonSummary):
         print_given_reactions(summary, console)

@@ -103,7 +103,9 @@ def drives_made(drives: Drives) -> DrivesMade:
     return DrivesMade(
         unit="hops" if drives.hops else "routes", count=len(made),
         in_physics_pct=min(round(100 * physics_s / total_s, 6), 100.0) if total_s > 0 else 0.0, checked=len(checks),
-        worst_check_pct=round(max(checks), 6) if checks else None, tipped_over=sum(one.tipped_over for one in made))
+        worst_check_pct=round(max(checks), 6) if checks else None,
+        tipped_over=sum(one.fault == "tipped over" for one in made),
+        physics_failed=sum(one.fault == "physics failed" for one in made))
 
 
 def by_case(executed: Sequence[Executed]) -> dict[tuple[str, str], Executed]:

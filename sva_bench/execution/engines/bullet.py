@@ -13,6 +13,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
+from sva_bench.choices import Fault
 from sva_bench.execution.engines.bodies import (
     HEIGHT_M,
     RoundBody,
@@ -86,7 +87,7 @@ class Bullet:
         self._right = disturbance.wheel_gains[1] / model.wheel_radius_m
         self._steps, self._touched = 0, False
         self.touches: list[Touch] = []
-        self.tipped_over = False
+        self.fault: Fault | None = None
         self._disturbance, self._floors = disturbance, obstacles.floors.tolist()
         self._grips = [1.0, 1.0]
         self._last = pose
@@ -111,7 +112,7 @@ class Bullet:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        if error is not None:  # whatever state it is in
+        if error is not None or self.fault == "physics failed":  # whatever state it is in
             pybullet.disconnect(physicsClientId=self._client)
             return
         pybullet.resetSimulation(physicsClientId=self._client)
@@ -120,8 +121,11 @@ class Bullet:
     def pose(self) -> tuple[float, float, float]:
         """x, y [m], yaw [rad]."""
         (x, y, _), (qx, qy, qz, qw) = self._axle_placed()
-        if not (1 - 2 * (qx * qx + qy * qy) > _UPRIGHT and math.isfinite(x + y + qz + qw)):  # NaN is not greater
-            self.tipped_over = True
+        if not math.isfinite(x + y + qx + qy + qz + qw):
+            self.fault = "physics failed"
+            return self._last
+        if 1 - 2 * (qx * qx + qy * qy) <= _UPRIGHT:
+            self.fault = "tipped over"
             return self._last
         self._last = x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
         return self._last
