@@ -42,6 +42,7 @@ from sva_bench.workers.pool import local_workers
 
 if TYPE_CHECKING:
     from sva_bench.analysis.summaries import AnySummary
+    from sva_bench.world.model import World
 
 """Refused: whoever looks for it here is told where it is."""
 
@@ -113,7 +114,7 @@ def run(
                       calibrate=target, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
 
 
 def execute(
@@ -174,10 +175,10 @@ def execute(
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
 
 
-def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False, wide: bool = False) -> None:
+def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv: bool, wide: bool) -> None:
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
@@ -189,7 +190,7 @@ def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_summary(summary, wide=wide)
+        print_summary(summary, wide=wide, world=world)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
     if failed := failed_physics(summary):
         if as_json:

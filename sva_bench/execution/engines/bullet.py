@@ -28,7 +28,7 @@ from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.robot.body import CASTER_GAP_M
 from sva_bench.robot.disturbance import Disturbance
 from sva_bench.robot.follower import CONTROL_HZ
-from sva_bench.robot.model import RobotModel
+from sva_bench.robot.model import MOTOR_RESERVE, RobotModel
 
 
 @contextlib.contextmanager
@@ -67,7 +67,6 @@ _UPRIGHT = 0.7  # cosine of the tilt at which a robot has tipped over
 _CASTER_FRICTION = 0.01  # of the hull in PyBullet, with the casters, which slide; obstacles make up for it
 _WHEEL_FRICTION = 1.0  # rubber on a hard floor
 _USUAL_RAD_S = 100.0  # to which PyBullet holds joints, unless told otherwise: small wheels of a fast robot turn faster
-_MOTOR_G = 3.0  # motor torque, in multiples of what accelerates the robot as its limits allow
 _ROBOT, _STATIC, _FLOOR = 1, 2, 64  # groups of bodies: Bullet's own for moving and fixed ones, and one of ours
 _free: list[int] = []  # clients of this process that no engine uses
 
@@ -225,7 +224,7 @@ def motor_torque(model: RobotModel) -> float:
     """Greatest torque of a wheel's motor [Nm]: several times what the robot's limits ask for, driving or turning."""
     turning = model.turn_inertia_m2 * model.turn_acceleration_rad_s2 / model.track_m
     force = max(model.acceleration_m_s2, model.acceleration_m_s2 / 2 + turning)  # of each wheel, per mass [m/s2]
-    return _MOTOR_G * model.mass_kg * force * model.wheel_radius_m
+    return MOTOR_RESERVE * model.mass_kg * force * model.wheel_radius_m
 
 
 def _accuracy(model: RobotModel) -> dict[str, float]:
