@@ -81,6 +81,8 @@ HappeningKind = Literal["arrived", "ended", "stuck", "touch", "rest", "idle", "d
 """What a team that shares a world is stopped for."""
 DriveUnit = Literal["hops", "routes", "missions"]
 """What is driven at a time: from site to site, from base to base, or all robots of a world together."""
+Fault = Literal["tipped over", "physics failed"]
+"""Why a robot drives no more though nothing holds it: it lies on its side, or physics gives no finite pose of it."""
 MarkKind = Literal["contact", "wait"]
 """What a picture marks of what robots met."""
 StandKind = Literal["berth", "slot"]

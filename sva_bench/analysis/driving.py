@@ -24,6 +24,7 @@ class DrivesMade(Record):
         checked: How many were driven in physics for no other reason than to check the twin.
         worst_check_pct: By how much physics took another time on one of them at most; ``None`` without any.
         tipped_over: How many ended because the robot fell on its side.
+        physics_failed: How many ended because physics gave no finite pose of the robot; they count as stuck.
     """
 
     unit: DriveUnit
@@ -32,6 +33,7 @@ class DrivesMade(Record):
     checked: NonNegativeInt
     worst_check_pct: Amount | None
     tipped_over: NonNegativeInt
+    physics_failed: NonNegativeInt = 0
 
 
 def driving_told(made: DrivesMade) -> str:
@@ -40,4 +42,6 @@ def driving_told(made: DrivesMade) -> str:
     if made.checked:
         said += (f"; {made.checked} of them checked the twin, which was off by {made.worst_check_pct:.2g} % of a "
                  "drive's time at most")
-    return said + (f"; {made.tipped_over} ended since the robot fell on its side" if made.tipped_over else "")
+    if made.tipped_over:
+        said += f"; {made.tipped_over} ended since the robot fell on its side"
+    return said + (f"; in {made.physics_failed} physics failed" if made.physics_failed else "")

@@ -129,8 +129,9 @@ def map_rows(units: Sequence[UnitSummary], executed: Mapping[Key, Estimate]) -> 
             rows.append(MapRow(
                 variant=variant, world=world, scenario=scenario, seeds=len(seeds), vss_pct=float(np.mean(pct)) if pct
                 else None, vss=MapVss(mean=found.mean, ci95=found.ci95, same_plan=all(s.same_plan for s in seeds))))
-    order = {world: number for number, world in enumerate(dict.fromkeys(unit.world for unit in units))}
-    return tuple(sorted(rows, key=lambda row: (order[row.world], row.variant)))
+    worlds, variants = ({name: number for number, name in enumerate(dict.fromkeys(names))} for names in (
+        [unit.world for unit in units], [unit.variant for unit in units]))
+    return tuple(sorted(rows, key=lambda row: (worlds[row.world], variants[row.variant])))
 
 
 def _by_map(units: Sequence[UnitSummary]) -> dict[tuple[str, str], dict[str, list[VssFigures]]]:

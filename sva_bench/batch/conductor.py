@@ -147,7 +147,7 @@ class Conductor:
         job, attempts = self._jobs[key], self._attempts[key]
         if not isinstance(answer, Done) and not answer.mendable and attempts < ATTEMPTS:
             _log.info("%s: %s; trying again", job.what, answer.reason)
-            self._queue.append(key)  # last, so that others come first
+            self._queue.appendleft(key)  # first, so that a world whose drives all hang is given up early
             return
         if isinstance(answer, Done):
             for warning in answer.warnings:

@@ -10,10 +10,11 @@ import numpy as np
 
 from sva_bench.analysis.summaries import Facts
 from sva_bench.arrays import FloatArray
+from sva_bench.batch.physics import refuse_failed_physics
 from sva_bench.batch.shards import Reactions, Shard, shard_of
 from sva_bench.choices import PathPlanner
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.drives import DriveTask, RouteKey, drive_tasks
+from sva_bench.execution.drives import Drives, DriveTask, RouteKey, drive_tasks
 from sva_bench.execution.execute import execute, settle_trials
 from sva_bench.execution.orders import PlannedLegs
 from sva_bench.execution.outcome import Driven
@@ -145,7 +146,9 @@ class DriveJob:
 
     def run(self) -> tuple[Driven, ...]:
         """Drive it."""
-        return drive_tasks(self.tasks)
+        driven = drive_tasks(self.tasks)
+        refuse_failed_physics(driven)
+        return driven
 
     def fits(self, result: tuple[Driven, ...]) -> bool:
         """A drive for each disturbance, with a time for each leg, or for those until it got stuck."""
@@ -202,7 +205,9 @@ class TrialsJob:
         """Settle them."""
         settings = replace(self.settings, first=self.first, trials=self.trials, recorded=False)
         if settings.fidelity == "physics" or self.world.meets:
-            executed = execute(self.world, self.costs, self.cases, settings)
+            drives = Drives()
+            executed = execute(self.world, self.costs, self.cases, settings, drives=drives)
+            refuse_failed_physics([*drives.whole.values(), *drives.of_missions])
         else:
             executed = settle_trials(self.world, self.cases, settings, self.drives, self.planned)
         return shard_of(self.world, self.variant, executed, settings, self.facts, self.reactions)

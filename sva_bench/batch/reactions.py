@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.reactions import reaction_result
+from sva_bench.batch.physics import refuse_failed_physics
 from sva_bench.batch.shards import Reactions
 from sva_bench.execution.case import Case
 from sva_bench.execution.drives import Drives
@@ -65,6 +66,7 @@ class ReactionsJob:
         found = react_in_scenarios(Stage(
             world=self.world, costs=self.costs, instances=self.instances, executed=executed, settings=settings,
             executor=None, drives=drives), self.options, reaction_result, lambda *_: None)
+        refuse_failed_physics([*drives.hops.values(), *drives.whole.values()])
         return {name: scenario.results for name, scenario in found.items()}
 
     def fits(self, result: Reactions) -> bool:

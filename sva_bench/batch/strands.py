@@ -16,6 +16,7 @@ from sva_bench.execution.orders import planned_legs
 from sva_bench.study.costs import grounds_of, reach_of
 from sva_bench.study.options import Options, reactions_of, settings_of
 from sva_bench.study.planning import Planned, own_cases
+from sva_bench.study.recourse import refuse_trials_beyond_memory
 from sva_bench.study.summing import facts_of, head_of, proved
 from sva_bench.travel.fuel import FuelCosts, fuel_costs
 from sva_bench.workers.engine import Job
@@ -38,6 +39,8 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     (planned,) = yield [PlansJob(world=world, costs=costs, options=options)]
     cases = tuple(case for scenario in world.scenarios for case in own_cases(scenario, planned[scenario.name]))
     settings = settings_of(world, options)
+    reacting = tuple(case for case in cases if case.role != "calibrated")
+    refuse_trials_beyond_memory(world, costs, reacting, options, settings)  # ends the batch
     drives = Drives()
     if settings.fidelity != "physics" and not world.meets:
         ahead = drives_ahead(world, costs, cases, settings)
@@ -47,7 +50,7 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     if left[0][0] == 0 and reactions_of(world, options):  # the unit of the first trials has them with it
         (reactions,) = yield [ReactionsJob(
             world=world, costs=costs, options=options, drives=drives,
-            cases=tuple(case for case in cases if case.role != "calibrated"),
+            cases=reacting,
             instances={name: plans.instance for name, plans in planned.items()})]
     facts, legs = facts_at(world, options, costs, planned), planned_legs(world, costs, cases)
     yield [TrialsJob(

@@ -181,6 +181,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
         from sva_bench.batch.grid import grid_of
         from sva_bench.cli.watching import over_maps, print_failed, reactions_over_maps
         from sva_bench.files.records import as_dict
+        from sva_bench.report.calibration_over_maps import calibrated_over_maps
 
     refuse_closed_output()
     _existing(folder)
@@ -205,6 +206,8 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
         console.print(over_maps(summary.aggregate, "VSS over maps, so far"))
         if summary.reactions:
             console.print(reactions_over_maps(summary.reactions))
+        for said in calibrated_over_maps(summary.units):
+            console.print(said, highlight=False, markup=False)
     print_failed(summary.failed, console)
 
 

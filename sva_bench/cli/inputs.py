@@ -97,7 +97,7 @@ def check_world(
     with about(world), progress_bars() as progress:
         stands = stands_of(loaded)
         costs = plan_costs(loaded, planner, progress)
-    _warn_of_passages(loaded, costs)
+    _warn_of_doubtful(loaded, costs)
     console = results()
     for kind, cost in costs.items():
         longest = int(cost.repaired_ms.max()) / 1000
@@ -131,12 +131,12 @@ def _kind_of(picture: Path) -> str:
     return kind
 
 
-def _warn_of_passages(world: World, costs: Mapping[str, FuelCosts]) -> None:
-    """Say which passages can't be what was meant."""
+def _warn_of_doubtful(world: World, costs: Mapping[str, FuelCosts]) -> None:
+    """Say what can't be what was meant."""
     with loading():
-        from sva_bench.study.passages import doubtful_passages
+        from sva_bench.study.doubtful import doubtful_loads, doubtful_passages
 
-    for said in doubtful_passages(world, costs):
+    for said in (*doubtful_passages(world, costs), *doubtful_loads(world)):
         _log.warning("%s", said)
 
 
@@ -153,7 +153,7 @@ def _check_noise(loaded: World, path: Path, planner: PathPlanner, plan: Path | N
     with about(path):
         with progress_bars() as progress:
             costs = plan_costs(loaded, planner, progress)
-        _warn_of_passages(loaded, costs)
+        _warn_of_doubtful(loaded, costs)
         check_under_noise(loaded, costs, plan, output, draws=draws, seed=seed, as_json=as_json)
 
 

@@ -34,7 +34,7 @@ from sva_bench.cli.options import (
     WorldArgument,
 )
 from sva_bench.cli.terminal import messages, print_json, progress_bars, set_up_logging
-from sva_bench.errors import BadInput
+from sva_bench.errors import BadInput, ExitCode
 from sva_bench.files.outputs import check_folder
 from sva_bench.study.bounds import MOST_TRIALS
 from sva_bench.study.libraries import PRELOAD, load_libraries
@@ -43,6 +43,7 @@ from sva_bench.workers.pool import local_workers
 
 if TYPE_CHECKING:
     from sva_bench.analysis.summaries import AnySummary
+    from sva_bench.world.model import World
 
 """Refused: whoever looks for it here is told where it is."""
 
@@ -115,7 +116,7 @@ def run(
                       calibrate=target, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
 
 
 def execute(
@@ -177,13 +178,14 @@ def execute(
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
 
 
-def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False, wide: bool = False) -> None:
+def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv: bool, wide: bool) -> None:
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
+        from sva_bench.report.doubts import failed_physics
         from sva_bench.storage.stored_run import write_csv
 
     if csv:
@@ -191,5 +193,9 @@ def _show(summary: AnySummary, folder: Path, as_json: bool, *, csv: bool = False
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_summary(summary, wide=wide)
+        print_summary(summary, wide=wide, world=world)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
+    if failed := failed_physics(summary):
+        if as_json:
+            messages.print(*failed, highlight=False)
+        raise typer.Exit(ExitCode.UNFINISHED_TRIALS)

@@ -18,7 +18,7 @@ from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_page import calibration_lines
-from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
+from sva_bench.report.doubts import CONTRADICTED, contradictions, failed_physics, upset_by_noise
 from sva_bench.report.interaction_section import INTERACTION_HEAD, interaction_table, interaction_told
 from sva_bench.report.source_table import SOURCES_HEAD, source_rows
 from sva_bench.report.wording import (
@@ -27,16 +27,18 @@ from sva_bench.report.wording import (
     assumed,
     assumption_rows,
     cell,
+    dependent_robots,
     ranked,
     remarks,
     vss_verdict,
 )
+from sva_bench.world.model import World
 
 _ALWAYS_SHOWN = 3
 """Robots that have a column however narrow the terminal is."""
 
 
-def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
+def print_summary(summary: AnySummary, *, wide: bool = False, world: World | None = None) -> None:
     """Print a summary as a table, and what it comes to; ``wide``: what each source of noise did, too."""
     console, travel = results(), summary.travel
     robots = list(summary.scenarios[0].availability)
@@ -47,6 +49,8 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
                       "of room; summary.json and report.html have all.", highlight=False)
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
                   f"{travel.max_excess_pct:.1f} %; {assumed(summary)}.", highlight=False)
+    for said in dependent_robots(world, summary) if world else ():
+        console.print(said, highlight=False, markup=False)
     _print_unhappy(summary, console)
     if told := interaction_told(summary.scenarios):
         console.print(told, highlight=False)
@@ -57,7 +61,7 @@ def print_summary(summary: AnySummary, *, wide: bool = False) -> None:
     console.print(answer(summary), highlight=False)
     for said in contradictions(summary):
         console.print(f"{CONTRADICTED} {said}", highlight=False)
-    for said in (*upset_by_noise(summary), *remarks(summary)):
+    for said in (*failed_physics(summary), *upset_by_noise(summary), *remarks(summary)):
         console.print(said, highlight=False)
     if isinstance(summary, ComparisonSummary):
         print_given_reactions(summary, console)
@@ -119,9 +123,9 @@ def _print_unhappy(summary: AnySummary, console: Console) -> None:
         for scenario in summary.scenarios:
             ends.update(scenario.plans[name].ends)
         missions += ends.total()
-        bad = [f"{ends[end]} {end}" for end in ("out_of_fuel", "late", "stuck") if ends[end]]
+        bad = [f"{ends[end]} {end.replace('_', ' ')}" for end in ("out_of_fuel", "late", "stuck") if ends[end]]
         if bad:
-            unhappy.append(f"{', '.join(bad)} ({shown_over(summary.scenarios, name)})")
+            unhappy.append(f"{shown_over(summary.scenarios, name)} {', '.join(bad)}")
     if unhappy:
         console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
                       highlight=False)

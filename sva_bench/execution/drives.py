@@ -65,6 +65,11 @@ class Drives:
     routes: dict[RouteKey, Driven] = field(default_factory=dict)
     missions: dict[MissionKey, TeamDriven] = field(default_factory=dict)
 
+    @property
+    def of_missions(self) -> list[Driven]:
+        """What each robot drove of the missions."""
+        return [driven for mission in self.missions.values() for driven in mission.driven]
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DriveTask:
@@ -177,7 +182,7 @@ def _in_engine(task: DriveTask, near: Obstacles, poses: list[Pose]) -> Driven:
         # A touch is looked for at the end of a control step, so one that ends a leg is not later than the leg.
         legs = np.minimum(np.searchsorted(until_s, [touch.since_s - 1e-9 for touch in engine.touches]),
                           len(until_s) - 1)
-        return replace(driven, in_physics=1.0, tipped_over=engine.tipped_over, touches=tuple(
+        return replace(driven, in_physics=1.0, fault=engine.fault, touches=tuple(
             replace(touch, leg=leg, since_s=touch.since_s - (float(until_s[leg - 1]) if leg else 0.0),
                     solid=solid_at(task.obstacles, touch.x_m, touch.y_m))
             for leg, touch in zip(legs.tolist(), engine.touches, strict=True)))
@@ -344,7 +349,7 @@ def composed(legs: Sequence[Sequence[Driven]]) -> Driven:
     times: list[float] = []
     touches: list[Touch] = []
     leg_of, clock, poses = [np.empty(0)], [np.empty(0)], [np.empty((0, 3))]
-    physics_s, tipped_over, stuck = 0.0, False, False
+    physics_s, fault, stuck = 0.0, None, False
     for number, hops in enumerate(legs):
         total = 0.0
         for hop in hops:
@@ -355,12 +360,12 @@ def composed(legs: Sequence[Sequence[Driven]]) -> Driven:
             hop_s = float(hop.leg_s[0])
             total, physics_s, stuck = total + hop_s, physics_s + hop.in_physics * hop_s, hop.stuck
             if stuck:
-                tipped_over = hop.tipped_over
+                fault = hop.fault
                 break
         times.append(total)
         if stuck:
             break
-    return Driven(leg_s=np.array(times), stuck=stuck, touches=tuple(touches), tipped_over=tipped_over,
+    return Driven(leg_s=np.array(times), stuck=stuck, touches=tuple(touches), fault=fault,
                   in_physics=physics_s / sum(times) if physics_s else 0.0,
                   leg_of=np.concatenate(leg_of), clock_s=np.concatenate(clock), pose=np.concatenate(poses))
 

@@ -61,7 +61,7 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
             pose = where()
             if poses is not None:
                 poses.append(pose)
-            if engine.tipped_over:
+            if engine.fault:
                 return total * dt, False
             if number % STUCK_STEPS == 0:
                 progress_m, turned_rad = float(state[1]) - since_s, math.remainder(yaw - since_yaw, 2 * math.pi)
@@ -76,7 +76,7 @@ def follow(engine: Engine, model: RobotModel, hop: Sequence[Stretch], poses: lis
         pose = where()
         if poses is not None:
             poses.append(pose)
-    return (total + len(queue)) * dt, not engine.tipped_over
+    return (total + len(queue)) * dt, not engine.fault
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray, frozen
-from sva_bench.choices import End, EventKind
+from sva_bench.choices import End, EventKind, Fault
 from sva_bench.execution.touch import Touch
 from sva_bench.mission.failures import NEVER
 from sva_bench.mission.instance import TOLERANCE_S
@@ -37,9 +37,7 @@ class Wait:
     since_s: float = 0.0
 
 
-TIPPED_OVER = "tipped over"
-"""What held a robot that lies on its side."""
-_HELD_S = 10.0  # contact so shortly before a robot gave up is what held it: it takes so long to give up
+HELD_S = 10.0  # contact so shortly before a robot gave up is what held it: it takes so long to give up
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,7 +56,7 @@ class Driven:
         capacity: Factor on what the robot's tank holds.
         in_physics: Share of its driving time that was driven in physics.
         twin_s: Driving time by the twin [s], where physics drove to check it; else ``None``.
-        tipped_over: Whether it got stuck because it fell on its side.
+        fault: Why it got stuck where nothing held it.
     """
 
     leg_s: FloatArray
@@ -71,7 +69,7 @@ class Driven:
     capacity: float = 1.0
     in_physics: float = 0.0
     twin_s: float | None = None
-    tipped_over: bool = False
+    fault: Fault | None = None
 
     def __post_init__(self) -> None:
         n = len(self.clock_s)
@@ -95,12 +93,12 @@ class Driven:
 
     @property
     def held_by(self) -> str:
-        """What a stuck robot was held by: ``tipped over``, the obstacle that it touches to the end, or nothing."""
-        if not self.stuck or self.tipped_over:
-            return TIPPED_OVER if self.tipped_over else ""
+        """What a stuck robot was held by: its fault, the obstacle that it touches to the end, or nothing."""
+        if not self.stuck or self.fault:
+            return self.fault or ""
         last, end_s = len(self.leg_s) - 1, float(self.leg_s[-1])
         held = [touch.solid for touch in self.touches
-                if touch.leg == last and touch.since_s + touch.lasted_s >= end_s - _HELD_S]
+                if touch.leg == last and touch.since_s + touch.lasted_s >= end_s - HELD_S]
         return held[-1] if held else ""
 
     @property

@@ -12,12 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from sva_bench.choices import News
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Courses, Drives, drive_all
 from sva_bench.execution.known_legs import KnownLegs, longest
 from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.plays import Enumerated, Rows, Sampled
+from sva_bench.execution.policies.none import none
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.reacted import Reacted as Reacted
 from sva_bench.execution.team import Team
@@ -166,17 +168,50 @@ def _plays(
     enumerated = [Enumerated(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
     if all(each.begin(legs) for each in enumerated):
         return enumerated
-    held = settings.trials * len(world.robots) * len(cases)
-    if held > MOST_TRIALS_HELD:
-        most = MOST_TRIALS_HELD // (len(world.robots) * len(cases))
-        raise BadInput(f"{counted(settings.trials, 'trial')} of {counted(len(cases), 'plan')} with and without "
-                       f"reaction: the histories of {world.name} are too many to go through all, and at most "
-                       f"{counted(most, 'trial')} can be sampled (--trials), or more of fewer reactions (--policy, "
-                       "--news)")
+    if (most := _most_held(world, len(cases))) < settings.trials:
+        raise _beyond_memory(world, len(cases), settings.trials, most)
     sampled = [Sampled(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
     for each in sampled:
         each.begin(legs)
     return sampled
+
+
+def refuse_beyond_memory(
+    world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], news: Sequence[News], runs: int,
+    settings: Settings,
+) -> None:
+    """Refuse more trials than ``react`` can hold, where that is sure before anything is driven or decided.
+
+    It is where the histories of teams that keep their orders are too many to be enumerated: theirs are gone through in
+    any case.
+
+    Args:
+        world, costs: The world and its fuel costs.
+        cases: Plans with their scenario.
+        news: When teams learn of failures.
+        runs: With how many cases ``react`` will be called, at least.
+        settings: Trials, rollouts.
+
+    Raises:
+        BadInput: If there are more.
+    """
+    if (most := _most_held(world, runs)) >= settings.trials:
+        return
+    legs = KnownLegs(world, costs, settings)
+    told = [replace(case, news=heard) for case in cases for heard in ("never", *news)]
+    if not all(Enumerated(world, case, _team(world, costs, case, none, legs), settings).begin(legs) for case in told):
+        raise _beyond_memory(world, runs, settings.trials, most)
+
+
+def _most_held(world: World, runs: int) -> int:
+    """Most trials of so many cases that fit in memory."""
+    return MOST_TRIALS_HELD // (len(world.robots) * runs)
+
+
+def _beyond_memory(world: World, runs: int, trials: int, most: int) -> BadInput:
+    return BadInput(f"{counted(trials, 'trial')} of {counted(runs, 'plan')} with and without reaction: the histories "
+                    f"of {world.name} are too many to go through all, and at most {counted(most, 'trial')} can be "
+                    "sampled (--trials), or more of fewer reactions (--policy, --news)")
 
 
 def _team(world: World, costs: Mapping[str, FuelCosts], case: Case, policy: Policy, legs: KnownLegs) -> Team:

@@ -9,10 +9,12 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, frozen
 from sva_bench.choices import End
-from sva_bench.execution.outcome import TIPPED_OVER, Trace
+from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.recording.colors import Color
 
+_FAULTS: Mapping[str, str] = {
+    "tipped over": "it fell on its side", "physics failed": "physics failed, which gave no finite pose of it"}
 LOST: Mapping[End, str] = {"failed": "failed", "out_of_fuel": "out of fuel", "stuck": "stuck"}
 """Ends of robots that don't come home, as they are labelled."""
 
@@ -69,7 +71,7 @@ def lost_of(trace: Trace, radius_m: float) -> Lost:
 
 def held_told(what: str) -> str:
     """What a stuck robot is held by, in a few words."""
-    return "it fell on its side" if what == TIPPED_OVER else f"held by {what}"
+    return _FAULTS.get(what, f"held by {what}")
 
 
 def changes_of(news: Sequence[NewsHeard], colors: Mapping[str, Color]) -> tuple[Change, ...]:

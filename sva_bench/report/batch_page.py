@@ -63,10 +63,14 @@ def _calibrated(summary: BatchSummary) -> list[str]:
             for unit in summary.units for s in unit.scenarios if (found := s.calibration) is not None]
     if not rows:
         return []
-    return [heading("Calibrated plans"), *(note(said) for said in calibrated_over_maps(summary.units)), table(
-        ["scenario", "seed", "made for costs at", "promised, nominal", "calibrated", "missions that go wrong, nominal",
-         "calibrated", "executed, stochastic", "calibrated"], rows, words=(0, 2),
-        sections=[unit.label for unit in summary.units for s in unit.scenarios if s.calibration is not None])]
+    what_for, *lines = calibrated_over_maps(summary.units)
+    return [heading("Calibrated plans"), f"<p>{sentence(what_for)}</p>",
+            f"<ul>{''.join(f'<li>{sentence(line)}</li>' for line in lines)}</ul>",
+            note("The nominal plan is the stochastic one. Missions go wrong by the twin, under draws of its own."),
+            table(["scenario", "seed", "made for costs at", "promised, nominal", "promised, calibrated",
+                   "go wrong, nominal", "go wrong, calibrated", "executed, nominal", "executed, calibrated"],
+                  rows, words=(0, 2), sections=[
+                      unit.label for unit in summary.units for s in unit.scenarios if s.calibration is not None])]
 
 
 def _reactions(summary: BatchSummary) -> list[str]:

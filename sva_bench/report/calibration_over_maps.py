@@ -1,4 +1,4 @@
-"""What calibrated plans of a batch come to, in a line for each scenario, on the terminal and on the page."""
+"""What calibrated plans of a batch come to: what for, and a line for each scenario, on the terminal and on the page."""
 
 from __future__ import annotations
 
@@ -14,28 +14,34 @@ _MOST_NAMED = 4
 
 
 def calibrated_over_maps(units: Sequence[UnitSummary]) -> list[str]:
-    """In how many worlds each scenario's plan reached the share, and its price there; none without calibrated plans."""
+    """What plans were calibrated for, then in how many worlds each scenario's reached it, and its price there.
+
+    Nothing without calibrated plans.
+    """
     # Plans don't depend on seeds, so a world counts once.
     found: dict[str, dict[str, Calibration]] = {}
     for unit in units:
         for scenario in unit.scenarios:
             if scenario.calibration is not None:
                 found.setdefault(labelled(scenario.name, unit.variant), {})[unit.world] = scenario.calibration
-    return [f"{label}: {_told(worlds)}" for label, worlds in found.items()]
+    if not found:
+        return []
+    goal = share_pct(next(iter(next(iter(found.values())).values())))
+    head = f"at most {goal} of missions that go wrong though nobody fails" if goal else "the greatest executed value"
+    return [f"Plans were calibrated for {head}:", *(f"{label}: {_told(worlds)}" for label, worlds in found.items())]
 
 
 def _told(worlds: Mapping[str, Calibration]) -> str:
     missing = [name for name, found in worlds.items() if not found.reached]
     reached = [found for found in worlds.values() if found.reached]
     price = _price(reached)
-    goal = share_pct(next(iter(worlds.values())))
-    if not goal:
-        return f"calibrated for the greatest executed value in {counted(len(worlds), 'world')}{price}."
+    if all(one.share is None for one in worlds.values()):
+        return f"{counted(len(worlds), 'world')}{price}."
     where = f"{len(reached)} of {counted(len(worlds), 'world')}"
     named = missing if len(missing) <= _MOST_NAMED else [
         *missing[:_MOST_NAMED], f"{len(missing) - _MOST_NAMED} more"]
-    missed = f" Share not reached in {listed(named)}: the plans shown there are not calibrated." if missing else ""
-    return f"calibrated for at most {goal} of missions that go wrong: reached in {where}{price}.{missed}"
+    missed = f" Not reached in {listed(named)}: the plans shown there are not calibrated." if missing else ""
+    return f"reached in {where}{price}.{missed}"
 
 
 def _price(reached: Sequence[Calibration]) -> str:

@@ -7,6 +7,7 @@ from sva_bench.analysis.results import PlanResult
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, Summary
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
+from sva_bench.files.printable import counted
 from sva_bench.report.wording import per_cent, with_interval
 
 CONTRADICTED = "The execution contradicts the model."
@@ -51,6 +52,16 @@ def _why(lost: dict[str, tuple[float, str]]) -> str:
 def _lost(plan: PlanResult) -> tuple[float, str]:
     """The most that an end of the execution cost a plan, and which end."""
     return max((-getattr(plan.ledger, end), end) for end in EXECUTION_LOSSES)
+
+
+def failed_physics(summary: AnySummary) -> list[str]:
+    """In how many drives physics failed; nothing where it failed in none."""
+    made = summary.drives
+    if made is None or not made.physics_failed:
+        return []
+    return [f"Physics failed in {made.physics_failed} of {counted(made.count, 'drive')}: it gave no finite pose of the "
+            "robot. Missions with such a drive count as stuck there, which says nothing about their plan: look at the "
+            "masses, sizes and loads of the robots."]
 
 
 def upset_by_noise(summary: AnySummary) -> list[str]:

@@ -64,7 +64,7 @@ _KINDS: dict[SiteKind, str] = {"base": "base", "station": "refuelling station", 
 _ROUTES: tuple[tuple[str, Any, float], ...] = (  # colour, style, width [pt]; later ones lie on top, so thinner
     ("#D55E00", "-", 2.6), ("#009E73", (0, (5, 2)), 2.0), ("#CC79A7", (0, (1.2, 1.5)), 2.0),
     ("#56B4E9", (0, (6, 1.5, 1.2, 1.5)), 1.8), ("#000000", (0, (3, 4)), 1.4))
-_PASSAGE = "#0B6E4F"
+_PASSAGE, _PASSAGE_PT = "#0B6E4F", 5.0  # colour; width that names keep off it [pt]
 _MARKS: dict[MarkKind, tuple[str, str, str]] = {  # shape, colour, what it is
     "contact": ("X", "#D00000", "contact"), "wait": ("D", "#7B3294", "wait")}
 _STANDS: dict[StandKind, tuple[str, str]] = {  # colour, what it is
@@ -191,8 +191,6 @@ def _map(figure: Figure, frame: Frame, world: World) -> Axes:
         ax, ay, bx, by = passage.ends_m
         axes.plot([ax, bx], [ay, by], color=_PASSAGE, linestyle=(0, (2.2, 1.2)), linewidth=2.4, zorder=3.5,
                   dash_capstyle="butt")
-        axes.annotate(passage.name, ((ax + bx) / 2, (ay + by) / 2), xytext=(3, 0), textcoords="offset points",
-                      color=_PASSAGE, fontsize=7, va="center", zorder=6, path_effects=[_HALO])
     return axes
 
 
@@ -268,7 +266,7 @@ def _arrow(axes: Axes, path: FloatArray, colour: str) -> None:
 
 
 def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None:
-    """Markers and labels of all sites."""
+    """Markers of all sites, and labels of these and of passages."""
     labels: list[tuple[Text, ...]] = []
     for site in world.sites:
         marker, colour, size = _MARKERS[site.kind]
@@ -278,6 +276,7 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
         earned += [f"{site.slots} slots"] if site.slots > 1 else []
         labels.append((Text(text=site.name, fontsize=8, weight="bold"),
                        *(Text(text=line, fontsize=7) for line in earned)))
+    labels += [(Text(text=passage.name, fontsize=7, color=_PASSAGE),) for passage in world.passages]
     for label in labels:
         for line in label:
             line.set(zorder=8, path_effects=[_HALO], ha="center", va="center")
@@ -285,7 +284,8 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     boxes = [[line.get_window_extent(renderer) for line in lines] for lines in labels]
     to_pixels = axes.transData.transform
-    at = to_pixels(np.array([(site.x_m, site.y_m) for site in world.sites]))
+    middles = [np.reshape(passage.ends_m, (2, 2)).mean(axis=0) for passage in world.passages]
+    at = to_pixels(np.array([*((site.x_m, site.y_m) for site in world.sites), *middles]))
     drawn = [every(to_pixels(leg.path)) for legs in overlays.routes.values() for leg in legs]
     drawn += [every(to_pixels(leg.path)) for leg in overlays.judged]
     drawn += [every(to_pixels(np.reshape(passage.ends_m, (2, 2))), 4.0) for passage in world.passages]
@@ -295,7 +295,8 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
         drawn += [every(to_pixels(path), 16.0) for path in overlays.paths]
     x0, y0, x1, y1 = shown_of(world).tolist()
     sizes = np.array([[max(box.width for box in group), sum(box.height for box in group)] for group in boxes])
-    radii = np.array([_MARKERS[site.kind][2] for site in world.sites]) * DPI / 72 / 2
+    across_pt = [*(_MARKERS[site.kind][2] for site in world.sites), *(_PASSAGE_PT for _ in middles)]
+    radii = np.array(across_pt) * DPI / 72 / 2
     centres = place_labels(
         at, sizes, radii=radii,
         frame=np.concatenate([to_pixels((x0, y0)), to_pixels((x1, y1))]),
@@ -308,11 +309,12 @@ def _sites(figure: Figure, axes: Axes, world: World, overlays: Overlays) -> None
             top -= box.height
     nearest = np.clip(at, centres - sizes / 2, centres + sizes / 2)
     apart_px = np.hypot(*(nearest - at).T) - radii
-    for site, place, here, apart in zip(world.sites, at, nearest, apart_px, strict=True):
+    names = [*(site.name for site in world.sites), *(passage.name for passage in world.passages)]
+    for name, place, here, apart in zip(names, at, nearest, apart_px, strict=True):
         if apart > _LEADER:
             ends = back(np.stack([place, here]))
             axes.plot(ends[:, 0], ends[:, 1], color="black", linewidth=0.6, zorder=6, path_effects=[_HALO],
-                      gid=f"leader-{site.name}")
+                      gid=f"leader-{name}")
 
 
 def _earned(world: World, poi: str) -> list[str]:

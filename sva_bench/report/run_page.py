@@ -20,7 +20,7 @@ from sva_bench.choices import ENDS
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.calibration_page import against_nominal, calibration_section
-from sva_bench.report.doubts import CONTRADICTED, contradictions, upset_by_noise
+from sva_bench.report.doubts import CONTRADICTED, contradictions, failed_physics, upset_by_noise
 from sva_bench.report.interaction_section import interaction_section
 from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
@@ -98,6 +98,7 @@ def _answer(summary: AnySummary, world: World) -> list[str]:
     unproved = "" if summary.reproducible else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
+            *(f"<p><b>{sentence(said)}</b></p>" for said in failed_physics(summary)),
             *(f"<p><b>{CONTRADICTED}</b> {sentence(said)}</p>" for said in contradictions(summary)),
             *(note(remark) for remark in (*upset_by_noise(summary), *remarks(summary))), unproved, "</div>"]
 

@@ -151,6 +151,12 @@ def reliability_told(world: World, scenario: str, summary: AnySummary) -> str:
     return "; ".join(told if doubtful or lifetimes else ["all available", *told])
 
 
+def dependent_robots(world: World, summary: AnySummary) -> list[str]:
+    """A line for each scenario whose robots are not available independently of each other."""
+    return [f"{scenario.name}: {reliability_told(world, scenario.name, summary)}."
+            for scenario in summary.scenarios if world.scenario(scenario.name).joint is not None]
+
+
 def _available_together(scenario: Scenario) -> list[tuple[list[str], float]]:
     """Robots with their availability; those that are always available or lost together are one entry."""
     found: dict[tuple[str | int, ...], list[str]] = {}

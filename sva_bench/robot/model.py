@@ -20,6 +20,8 @@ CASTERS_AT = 0.75
 """Where the casters are, before and behind the middle, in radii of the hull."""
 _HULL_SHARE, _WHEELS_SHARE = 0.9, 0.1  # of the mass
 _LEAST_TRACK = 0.6  # of a body's own, in radii of gyration; of round ones it is half the radius, which is 0.64
+MOTOR_RESERVE = 3.0
+"""Torque of the motors, in multiples of what accelerates the robot alone as its limits allow."""
 _TIPPING = 1.5  # times its acceleration and braking is what a robot must bear without tipping
 
 

@@ -23,7 +23,7 @@ from sva_bench.study.costs import instance_of, reach_of
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import unlimited
 from sva_bench.study.publish import Run, Stopwatch, publish
-from sva_bench.study.recourse import Stage, react_in_scenarios
+from sva_bench.study.recourse import Stage, react_in_scenarios, refuse_trials_beyond_memory
 from sva_bench.study.run import refuse_too_many_rows
 from sva_bench.study.sources import Grounds, with_sources
 from sva_bench.study.summing import by_case, head_of, with_drives
@@ -70,6 +70,7 @@ def measure_plans(
     settings = settings_of(world, options)
     cases = [Case(scenario=scenario, planner=name, plan=plan) for scenario in world.scenarios
              for name, plan in plans.items()]
+    refuse_trials_beyond_memory(world, costs, cases, options, settings)
     drives = Drives()
     with clock.phase("execution"):
         executed = execute(world, costs, cases, settings, executor,

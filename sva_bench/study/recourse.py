@@ -19,7 +19,7 @@ from sva_bench.execution.executed import Executed
 from sva_bench.execution.orders import planned_legs
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.policies.registry import POLICIES, Means
-from sva_bench.execution.react import Reacted, modelled_values, react
+from sva_bench.execution.react import Reacted, modelled_values, react, refuse_beyond_memory
 from sva_bench.mission.certify import certify, expected_value
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan, unless_interrupted
@@ -165,6 +165,30 @@ def _react(
             for (whose, case), run in zip(cases, everything, strict=False) if whose == pair}
         results.append(summed(plans, made[pair][1] if pair in made else (), noisy=stage.world.noisy))
     return ScenarioReactions(results=tuple(results), reacted=tuple(everything[:len(reacting)]))
+
+
+def refuse_trials_beyond_memory(
+    world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], options: Options, settings: Settings
+) -> None:
+    """Refuse more trials of teams that react than memory holds, where that is sure once there are plans.
+
+    Args:
+        world, costs: The world and its fuel costs.
+        cases: The plans that react, with their scenarios.
+        options: The reactions, and whether plans are made for them.
+        settings: How they are executed.
+
+    Raises:
+        BadInput: If there are more.
+    """
+    pairs = reactions_of(world, options)
+    if not pairs:
+        return
+    news = list(dict.fromkeys(heard for _, heard in pairs))
+    for scenario in world.scenarios:
+        own = [case for case in cases if case.scenario.name == scenario.name]
+        runs = len(own) * (len(pairs) + 1) + (2 * len(pairs) if options.anticipate else 0)
+        refuse_beyond_memory(world, costs, own, news, runs, settings)
 
 
 def observed(

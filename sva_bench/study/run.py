@@ -22,7 +22,7 @@ from sva_bench.study.informed import cases_of, combined_trials
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, own_cases, plan_scenarios, with_calibration
 from sva_bench.study.publish import Run, Stopwatch, publish
-from sva_bench.study.recourse import Stage, react_in_scenarios
+from sva_bench.study.recourse import Stage, react_in_scenarios, refuse_trials_beyond_memory
 from sva_bench.study.sources import Grounds, with_sources
 from sva_bench.study.summing import head_of, proved, summarise, with_drives
 from sva_bench.travel.fuel import FuelCosts
@@ -82,6 +82,8 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
     with clock.phase("calibration"):
         planned = with_calibration(world, costs, planned, options, executor, progress)
     cases = [case for scenario in world.scenarios for case in _cases_of(world, scenario, planned[scenario.name])]
+    refuse_trials_beyond_memory(world, costs, [case for case in cases if case.role in ("stochastic", "deterministic")],
+                                options, settings_of(world, options))
     drives = Drives()
     reach = reach_of(world, costs)
     while True:

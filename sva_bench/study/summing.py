@@ -11,7 +11,7 @@ from sva_bench.analysis.driving import DrivesMade, driving_told
 from sva_bench.analysis.over_trials import Judged, ScenarioTrials, promise_of, scenario_summary
 from sva_bench.analysis.results import Promise, ScenarioFacts
 from sva_bench.analysis.summaries import ComparisonSummary, Failures, Head, Reach, Summary, Travel
-from sva_bench.choices import Role
+from sva_bench.choices import Fault, Role
 from sva_bench.execution.case import Settings
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.executed import Executed
@@ -107,7 +107,9 @@ def drives_made(drives: Drives) -> DrivesMade:
     return DrivesMade(
         unit="hops" if drives.hops else "routes", count=len(made),
         in_physics_pct=min(round(100 * physics_s / total_s, 6), 100.0) if total_s > 0 else 0.0, checked=len(checks),
-        worst_check_pct=round(max(checks), 6) if checks else None, tipped_over=sum(one.tipped_over for one in made))
+        worst_check_pct=round(max(checks), 6) if checks else None,
+        tipped_over=sum(one.fault == "tipped over" for one in made),
+        physics_failed=sum(one.fault == "physics failed" for one in made))
 
 
 def _missions_made(missions: Sequence[TeamDriven]) -> DrivesMade:
@@ -121,7 +123,11 @@ def _missions_made(missions: Sequence[TeamDriven]) -> DrivesMade:
         unit="missions", count=len(missions), checked=len(checks),
         in_physics_pct=min(round(100 * physics_s / total_s, 6), 100.0) if total_s > 0 else 0.0,
         worst_check_pct=round(max(checks), 6) if checks else None,
-        tipped_over=sum(driven.tipped_over for mission in missions for driven in mission.driven))
+        tipped_over=_with_fault(missions, "tipped over"), physics_failed=_with_fault(missions, "physics failed"))
+
+
+def _with_fault(missions: Sequence[TeamDriven], fault: Fault) -> int:
+    return sum(driven.fault == fault for mission in missions for driven in mission.driven)
 
 
 def by_case(executed: Sequence[Executed]) -> dict[tuple[str, str], Executed]:

@@ -14,7 +14,8 @@ import sva_bench as sb
 from sva_bench.__main__ import run_command_line
 from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
 from sva_bench.analysis.over_maps import UnitSummary
-from sva_bench.analysis.results import Share
+from sva_bench.analysis.results import Estimate, Share
+from sva_bench.batch.aggregates import map_rows
 from sva_bench.batch.sweep import Sweep, grid_of, sweep_of
 from sva_bench.errors import BadFile
 from sva_bench.report.calibration_over_maps import calibrated_over_maps
@@ -59,7 +60,12 @@ def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path, capsys: pytest.
     assert run_command_line(["batch", str(folder / "world.yaml"), *QUICK, "--seed", "0-1", "--calibrate", "5%",
                              "--cache", str(folder / "cache"), "--out", str(folder / "again")]) == 0
     assert {path: path.stat().st_mtime_ns for path in (folder / "cache").glob("*/plans/*/*")} == before
-    assert "half: calibrated for at most 5 % of missions" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "Plans were calibrated for at most 5 % of missions" in told
+    assert run_command_line(["batch", "status", str(folder / "done")]) == 0
+    lines = [line for line in told.splitlines() if line.startswith(("Plans were calibrated", "half: "))]
+    assert len(lines) == 2
+    assert set(lines) <= set(capsys.readouterr().out.splitlines())
     assert (folder / "again" / "summary.json").read_bytes() == (folder / "done" / "summary.json").read_bytes()
 
 
@@ -105,11 +111,19 @@ def test_a_line_of_each_scenario_says_where_the_share_is_reached_and_the_price()
     # The price is of worlds that reach the share: (20 + 10) / 2; a seed more of one counts for nothing.
     assert calibrated_over_maps([calibrated("a", 80.0), calibrated("b", 90.0), calibrated("b", 90.0),
                                  calibrated("c", 10.0, reached=False)]) == [
-        "S: calibrated for at most 1 % of missions that go wrong: reached in 2 of 3 worlds, where plans promise 15 % "
-        "less than nominal ones on average. Share not reached in c: the plans shown there are not calibrated."]
-    (line,) = calibrated_over_maps([calibrated("a", 80.0, reached=False)])
-    assert "reached in 0 of 1 world. Share not reached in a" in line
-    (line,) = calibrated_over_maps([calibrated("a", 100.0, share=None)])
-    assert line == ("S: calibrated for the greatest executed value in 1 world, where plans promise as much as nominal "
-                    "ones.")
+        "Plans were calibrated for at most 1 % of missions that go wrong though nobody fails:",
+        "S: reached in 2 of 3 worlds, where plans promise 15 % less than nominal ones on average. Not reached in c: "
+        "the plans shown there are not calibrated."]
+    _, line = calibrated_over_maps([calibrated("a", 80.0, reached=False)])
+    assert "reached in 0 of 1 world. Not reached in a" in line
+    assert calibrated_over_maps([calibrated("a", 100.0, share=None)]) == [
+        "Plans were calibrated for the greatest executed value:",
+        "S: 1 world, where plans promise as much as nominal ones."]
     assert calibrated_over_maps([unit("a", 100.0)]) == []
+
+
+def test_variants_stand_map_by_map_in_the_order_of_the_grid() -> None:
+    # Of words, x=100 would come before x=30, and differ from the table over maps.
+    units = [replace(unit(world, 1.0), variant=variant) for world in ("b", "a") for variant in ("x=30", "x=100", "x=5")]
+    rows = map_rows(units, {(one.variant, "S", one.world): Estimate(mean=1.0, ci95=None) for one in units})
+    assert [(row.world, row.variant) for row in rows] == [(one.world, one.variant) for one in units]

@@ -117,6 +117,19 @@ def test_a_job_that_fails_is_tried_again_and_then_its_strand_given_up(tmp_path: 
     assert "5 + 6" not in engine.given
 
 
+def test_a_world_whose_jobs_all_hang_is_given_up_before_most_of_them_are_tried(tmp_path: Path) -> None:
+    other: list[Any] = []
+    engine = Fake(lambda job: Failed(reason="too long") if job.what.startswith("1 ") else done(job))
+    drives = [Add(1, number) for number in range(12)]
+    failed = conduct(tmp_path, engine, [summing([], [drives]), summing(other, [[Add(3, 4)], [Add(5, 6)]])])
+    ((reason, attempts),) = failed
+    assert reason.endswith("too long")
+    assert attempts == ATTEMPTS
+    # Those that were in flight beside the one given up may have been tried as often, and no other at all.
+    assert sum(what.startswith("1 ") for what in engine.given) <= engine.slots * ATTEMPTS
+    assert other == [[(7,)], [(11,)]]
+
+
 def test_what_the_user_must_mend_is_tried_once(tmp_path: Path) -> None:
     engine = Fake(lambda _: Failed(reason="no such file", mendable=True))
     assert conduct(tmp_path, engine, [summing([], [[Add(1, 2)]])]) == [("1 + 2: no such file", 1)]

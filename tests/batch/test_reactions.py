@@ -27,6 +27,7 @@ from sva_bench.batch.shards import Unit, read_note
 from sva_bench.batch.strands import strand
 from sva_bench.choices import NEWS, News
 from sva_bench.errors import BadFile
+from sva_bench.execution import plays, react
 from sva_bench.files.codec import decoded, encoded
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.batch_page import write_batch_report
@@ -267,3 +268,17 @@ def test_a_job_is_known_by_what_its_result_depends_on(tmp_path: Path) -> None:
     assert first.fits(result)
     assert decoded(encoded(result, ReactionsJob.result), ReactionsJob.result) == result
     assert not first.fits(dict.fromkeys(result, ()))
+
+
+def test_a_batch_with_more_trials_than_memory_holds_ends_at_the_first_world_with_one_message(
+        folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(plays, "MOST_HISTORIES", 0)
+    monkeypatch.setattr(react, "MOST_TRIALS_HELD", 100)
+    assert run_command_line(["batch", str(folder / "one.yaml"), str(folder / "two.yaml"), *QUICK, *REACT, "--workers",
+                             "1", "--cache", str(folder / "cache"), "--out", str(tmp_path / "out")]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert told.count("the histories of") == 1
+    assert "30 trials of 10 plans with and without reaction: the histories of one are too many" in told
+    assert "at most 5 trials can be sampled (--trials)" in told
+    assert not list((tmp_path / "out").glob("*.parquet"))
+    assert not (tmp_path / "out" / "failures.json").exists()

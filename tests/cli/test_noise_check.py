@@ -78,6 +78,19 @@ def test_a_passage_that_makes_no_difference_is_warned_of_once(
     assert all(str(said) in message for message in found)
 
 
+@pytest.mark.parametrize(("payload_kg", "warned"), [(12.6, False), (12.7, True), (1e5, True)])
+def test_a_payload_that_no_motor_of_the_robot_accelerates_is_warned_of(
+    payload_kg: float, warned: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # A turtlebot2 weighs 6.3 kg, and its motors are three times as strong as it needs by itself.
+    world = tmp_path / "laden.yaml"
+    world.write_text(SMALL.replace("wheel_gain_sd: 0.01", f"payload_kg: [0, {payload_kg}]"))
+    assert run_command_line(["world", "check", str(world)]) == 0
+    found = [line for line in capsys.readouterr().err.splitlines() if line.startswith("WARNING")]
+    assert len(found) == warned
+    assert all("on turtlebot2, which weighs 6.3 kg itself: its motors bear 12.6 kg more" in line for line in found)
+
+
 def test_terminal_picture_and_pages_call_a_judgement_by_one_word() -> None:
     contact, formats = ((DOOR.parents[1] / "docs" / f"{page}.md").read_text(encoding="utf-8")
                         for page in ("contact", "formats"))

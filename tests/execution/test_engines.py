@@ -66,7 +66,7 @@ def test_an_engine_begins_in_the_pose_it_was_given_and_stands_there_until_told_o
             engine.step(0.0, 0.0)
         assert engine.pose() == pytest.approx(START, abs=1e-3)
         assert not engine.touches
-        assert not engine.tipped_over
+        assert engine.fault is None
 
 
 @engines
@@ -141,7 +141,7 @@ class Blocked:
     """An engine that never moves."""
 
     touches: tuple[Touch, ...] = ()
-    tipped_over = False
+    fault = None
 
     def pose(self) -> Pose:
         return 0.0, 0.0, 0.0

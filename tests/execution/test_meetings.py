@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sva_bench.execution.outcome import TIPPED_OVER, Driven, RobotFate, Wait, met_on_leg, trace_of
+from sva_bench.execution.outcome import Driven, RobotFate, Wait, met_on_leg, trace_of
 from sva_bench.execution.rules import legs_of, settle
 from sva_bench.execution.touch import Touch
 from sva_bench.robot.disturbance import ErrorField
@@ -76,7 +76,8 @@ def test_a_robot_that_runs_dry_before_a_door_does_not_drive_on_to_it_in_its_trac
 
 
 @pytest.mark.parametrize(("changes", "what"), [
-    ({}, "box 2"), ({"tipped_over": True}, TIPPED_OVER),
+    ({}, "box 2"), ({"fault": "tipped over"}, "tipped over"),
+    ({"fault": "physics failed"}, "physics failed"),
     ({"touches": (replace(POST, leg=1, since_s=1.0), replace(POST, leg=0))}, "")])
 def test_a_stuck_robot_says_what_holds_it(changes: dict[str, object], what: str) -> None:
     # It gives up 8 s or 20 s into the leg; contact 10 s before that is no reason.

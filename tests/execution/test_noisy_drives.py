@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
-from sva_bench.choices import Fidelity, NoiseName
+from sva_bench.choices import Fault, Fidelity, NoiseName
 from sva_bench.execution.drives import DriveTask, drive_route
 from sva_bench.execution.engines import bullet
 from sva_bench.execution.engines.engine import ENGINES, Pose
@@ -179,7 +179,7 @@ def fallen(monkeypatch: pytest.MonkeyPatch, *, heavy: float = 0.0, tall: float =
 def test_a_robot_that_tips_over_is_stuck_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     driven = fallen(monkeypatch, tall=0.5)
     assert driven.stuck
-    assert driven.tipped_over
+    assert driven.fault == "tipped over"
     assert len(driven.leg_s) == 1
     assert driven.leg_s[0] < 1.0  # at once: nothing is waited for
 
@@ -200,7 +200,7 @@ def test_a_robot_of_which_physics_has_lost_track_is_stuck_where_it_was_last(
         before = engine.pose()
         monkeypatch.setattr(PYBULLET, "getBasePositionAndOrientation", lambda *_, **__: lost)
         assert engine.pose() == before
-        assert engine.tipped_over
+        assert engine.fault == "physics failed"
         poses: list[Pose] = []
         time_s, arrived = follow(engine, MODEL, stretches(np.array([[1.0, 2.0], [4.0, 2.0]]), 0.0), poses)
     assert not arrived
@@ -219,8 +219,8 @@ def test_a_robot_that_falls_while_its_last_commands_are_on_their_way_has_not_arr
             self._left = after
 
         @property
-        def tipped_over(self) -> bool:
-            return self._left <= 0
+        def fault(self) -> Fault | None:
+            return "tipped over" if self._left <= 0 else None
 
         def pose(self) -> Pose:
             return self._ideal.pose()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import matplotlib as mpl
@@ -24,7 +25,7 @@ from sva_bench.generate.terrain import random_places, random_terrain
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.report import charts
+from sva_bench.report import charts, drawing
 from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world
 from sva_bench.report.ground import frame_of
 from sva_bench.report.labels import place_labels
@@ -229,3 +230,22 @@ def test_a_legend_keeps_within_its_chart_however_long_names_are(longest: int, pl
     legend = axes.get_legend()
     assert legend is not None
     assert legend.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_names_of_passages_and_sites_keep_off_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The first passage has the base in its middle, the second a POI.
+    world = world_of(tmp_path, SMALL + "passages:\n  door: {at_m: [[0.3, 0.3], [1.3, 1.3]], blocked: 0.1, wait_s: 1}\n"
+                     "  side: {at_m: [[4.2, 0.0], [4.2, 1.6]], blocked: 0.1, wait_s: 1}\n")
+    found: list[FloatArray] = []
+
+    def placed(at: FloatArray, sizes: FloatArray, **others: FloatArray) -> FloatArray:
+        centres = place_labels(at, sizes, **others)
+        found.append(np.concatenate([centres - sizes / 2, centres + sizes / 2], axis=1))
+        return centres
+
+    monkeypatch.setattr(drawing, "place_labels", placed)
+    draw_world(world, "svg", Overlays())
+    (boxes,) = found
+    assert len(boxes) == len(world.sites) + len(world.passages)
+    for one, other in combinations(boxes, 2):
+        assert (np.minimum(one[2:], other[2:]) <= np.maximum(one[:2], other[:2])).any()

@@ -17,6 +17,7 @@ from sva_bench.analysis.reaction_table import REACTION_COLUMNS, reaction_rows
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import News, PolicyName
 from sva_bench.errors import BadInput
+from sva_bench.execution import drives as driving
 from sva_bench.execution import plays
 from sva_bench.execution import react as reacting
 from sva_bench.execution.case import Case, Settings
@@ -173,6 +174,33 @@ def test_more_trials_than_memory_holds_are_refused_unless_all_histories_are_play
     with pytest.raises(BadInput, match=r"at most 10 trials can be sampled \(--trials\)"):
         reacted(world, settings_of(trials=11))
     reacted(world, settings_of(trials=10))
+
+
+@pytest.mark.parametrize("command", ["run", "execute"])
+def test_trials_that_memory_does_not_hold_are_refused_before_anything_is_driven(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def driven(*_: object) -> None:
+        raise AssertionError("driven all the same")
+
+    world = per_leg(tmp_path)
+    monkeypatch.setattr(plays, "MOST_HISTORIES", 0)
+    # Two robots; without reaction, under two kinds of news, and the anticipative plan of each with and without those.
+    plans = 2 * 3 + 2 * 2 if command == "run" else 1 * 3
+    monkeypatch.setattr(reacting, "MOST_TRIALS_HELD", 2 * plans * QUICK["trials"])
+    given = sb.Plan(routes={"uv1": ("base", "p4", "base"), "uv2": ("base", "p1", "base")})
+
+    def asked(trials: int) -> None:
+        words = {**REACTIONS, **QUICK, "trials": trials, "scenario": "half"}
+        if command == "run":
+            sb.run(world, anticipate=True, **words)
+        else:
+            sb.execute(world, given, **words)
+
+    asked(QUICK["trials"])
+    monkeypatch.setattr(driving, "drive_route", driven)
+    with pytest.raises(BadInput, match=f"61 trials of {plans} plans with and without reaction: .* at most 60 trials"):
+        asked(QUICK["trials"] + 1)
 
 
 def test_a_summary_with_reactions_is_read_as_it_was_written(world: sb.World) -> None:

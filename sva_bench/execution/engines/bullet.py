@@ -8,12 +8,13 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import Fault
 from sva_bench.execution.engines.accuracy import accuracy, fastest_wheel_rad_s, finest, motor_torque
 from sva_bench.execution.engines.bodies import (
     HEIGHT_M,
@@ -95,9 +96,9 @@ class _Client:
             pybullet.disconnect(physicsClientId=self.number)
             raise
 
-    def close(self, error: BaseException | None) -> None:
-        """Keep the client for others, unless something went wrong."""
-        if error is not None:
+    def close(self, error: BaseException | None, faults: Iterable[Fault | None]) -> None:
+        """Keep the client for others, unless something went wrong: then it is in whatever state."""
+        if error is not None or "physics failed" in faults:
             pybullet.disconnect(physicsClientId=self.number)
             return
         pybullet.resetSimulation(physicsClientId=self.number)
@@ -122,15 +123,18 @@ class _Robot:
         self._forces = (torque, torque)
         self._touching: set[int | None] = set()
         self.touches: list[Touch] = []
-        self.tipped_over = False
+        self.fault: Fault | None = None
         self.body = self._build(pose)
         self._axle = None if model.body is None else _axle_in_base(self.body, self._client)
 
     def pose(self) -> _Pose:
-        """x, y [m], yaw [rad]; the last that was known of a robot that tipped over."""
+        """x, y [m], yaw [rad]; the last that was known of a robot that has a fault."""
         (x, y, _), (qx, qy, qz, qw) = self.axle_placed()
-        if not (1 - 2 * (qx * qx + qy * qy) > _UPRIGHT and math.isfinite(x + y + qz + qw)):  # NaN is not greater
-            self.tipped_over = True
+        if not math.isfinite(x + y + qx + qy + qz + qw):
+            self.fault = "physics failed"
+            return self._last
+        if 1 - 2 * (qx * qx + qy * qy) <= _UPRIGHT:
+            self.fault = "tipped over"
             return self._last
         self._last = x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
         return self._last
@@ -229,12 +233,12 @@ class Bullet:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        self._client.close(error)
+        self._client.close(error, [self._robot.fault])
 
     @property
-    def tipped_over(self) -> bool:
-        """Whether it lies on its side, or nobody knows where."""
-        return self._robot.tipped_over
+    def fault(self) -> Fault | None:
+        """Why it drives no more though nothing holds it."""
+        return self._robot.fault
 
     def tilt_rad(self) -> float:
         """Angle between the robot's upright axis and the vertical: some milliradians, unless it tips over."""
@@ -267,15 +271,15 @@ class BulletTeam:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        self._client.close(error)
+        self._client.close(error, [robot.fault for robot in self._robots])
 
     def touches(self, robot: int) -> Sequence[Touch]:
         """Each time that a robot's hull came to touch an obstacle or another robot, so far."""
         return self._robots[robot].touches
 
-    def tipped_over(self) -> list[int]:
-        """Numbers of the robots that lie on their side."""
-        return [number for number, robot in enumerate(self._robots) if robot.tipped_over]
+    def faults(self) -> dict[int, Fault]:
+        """Why robots drive no more though nothing holds them, by their numbers."""
+        return {number: robot.fault for number, robot in enumerate(self._robots) if robot.fault}
 
     def step(self, wheels_m_s: FloatArray, poses: FloatArray) -> list[tuple[int, int]]:
         """Advance by one control step.

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Protocol, Self
 
-from sva_bench.choices import EngineName, Fidelity
+from sva_bench.choices import EngineName, Fault, Fidelity
 from sva_bench.execution.engines.bullet import Bullet
 from sva_bench.execution.engines.ideal import Ideal
 from sva_bench.execution.touch import Touch
@@ -31,8 +31,8 @@ class Engine(Protocol):
         ...
 
     @property
-    def tipped_over(self) -> bool:
-        """Whether it lies on its side, or nobody knows where: it drives no more."""
+    def fault(self) -> Fault | None:
+        """Why it drives no more, once it doesn't, wherever it may be."""
         ...
 
     def pose(self) -> Pose:

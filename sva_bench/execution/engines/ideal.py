@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from sva_bench.choices import Fault
 from sva_bench.execution.touch import Touch
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.disturbance import Disturbance
@@ -19,7 +20,7 @@ class Ideal:
     """The kinematic twin, step by step: the same arithmetic to the bit, so the follower takes the same time."""
 
     touches: tuple[Touch, ...] = ()
-    tipped_over = False
+    fault: Fault | None = None
 
     def __init__(self, obstacles: Obstacles, model: RobotModel, pose: tuple[float, float, float],
                  disturbance: Disturbance) -> None:

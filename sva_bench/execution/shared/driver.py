@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.choices import HappeningKind
+from sva_bench.choices import Fault, HappeningKind
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.shared.lanes import Lane
 from sva_bench.execution.touch import Touch
@@ -168,6 +168,10 @@ class TeamDriver(Protocol):
 
     def cell(self, robot: int) -> int:
         """The cell of its lane that a robot is in."""
+        ...
+
+    def fault(self, robot: int) -> Fault | None:
+        """Why a robot drives no more though nothing holds it."""
         ...
 
     def __enter__(self) -> Self: ...

@@ -18,7 +18,7 @@ from sva_bench.execution.noise import draw_noise
 from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.outcome import Assignment, RobotFate, Trace
 from sva_bench.execution.settling import figures_of, left_by_draws
-from sva_bench.execution.shared.drive import drive_team
+from sva_bench.execution.shared.drive import TeamRun, drive_team
 from sva_bench.execution.shared.own_ways import Ways
 from sva_bench.execution.shared.planning import first_order
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
@@ -62,8 +62,9 @@ def play_missions(task: TeamTask) -> tuple[TeamDriven, ...]:
     played = []
     for (_, own, rollout), traced in zip(task.keys, task.traced, strict=True):
         drawn = [draw_noise(world.noise, task.seed, rollout, number) for number in range(len(world.robots))]
-        played.append(drive_team(world, ways, task.orders, own, drawn, order, (task.seed, rollout), task.fidelity,
-                                 traced=traced))
+        played.append(drive_team(TeamRun(
+            world=world, ways=ways, orders=task.orders, fates=own, drawn=drawn, order=order,
+            noise_index=(task.seed, rollout)), task.fidelity, traced=traced))
     return tuple(played)
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from sva_bench.execution.noise import NoiseDraw
-from sva_bench.execution.outcome import Assignment, RobotFate, Wait
+from sva_bench.execution.outcome import HELD_S, Assignment, RobotFate, Wait
 from sva_bench.execution.rules import LegDriven, RobotMission
 from sva_bench.execution.shared.driver import Happening, Hold, LegWait, TeamDriver
 from sva_bench.execution.shared.lanes import Order
@@ -92,7 +92,8 @@ class SharedMission:
             case "ended":
                 self._stop_for_good(player)
             case "stuck":
-                self._stop_for_good(player, stuck=True)
+                player.fault = self._driver.fault(player.number)
+                self._stop_for_good(player, stuck=True, held_by=player.fault or self._held_by(player.number))
             case "touch":
                 self._touch(player, self._players[happening.other])
             case "rest":
@@ -176,6 +177,14 @@ class SharedMission:
         elif player.active:
             self._finish(player, stuck=stuck, over=not stuck, held_by=held_by)
         self._stands(player)
+
+    def _held_by(self, number: int) -> str:
+        """What a stuck robot touches, or touched until shortly before."""
+        leg = self._driver.leg(number)
+        held = [touch for touch in leg.touches if touch.since_s + touch.lasted_s >= leg.driving_s - HELD_S]
+        if not held:
+            return ""
+        return held[-1].solid if held[-1].robot is None else self._names[held[-1].robot]
 
     def _touch(self, one: Player, other: Player) -> None:
         """Two hulls touched: of robots that nobody coordinates, that is the end of both."""

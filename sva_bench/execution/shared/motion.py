@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from sva_bench.arrays import IntArray
-from sva_bench.choices import HappeningKind
+from sva_bench.choices import Fault, HappeningKind
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.shared.driver import Happening, Hold, LegSoFar, LegWait, Member
 from sva_bench.execution.shared.lanes import Lane
@@ -149,6 +149,10 @@ class TeamMotion:
     def cell(self, robot: int) -> int:
         """The cell of its lane that a robot is in."""
         return int(self._robots[robot]["cell"])
+
+    def fault(self, robot: int) -> Fault | None:  # noqa: ARG002 - twins have none
+        """Why a robot drives no more though nothing holds it."""
+        return None
 
     def __enter__(self) -> Self:
         return self

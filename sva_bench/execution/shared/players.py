@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sva_bench.choices import Fault
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import Driven, Outcome, RobotFate
 from sva_bench.execution.rules import LegDriven, RobotMission
@@ -77,6 +78,7 @@ class Player:
         legs: The legs that are over.
         trail: What it drove of each of them.
         down: Whether it stands for good away from its berth.
+        fault: Why it got stuck where nothing held it.
     """
 
     number: int
@@ -89,6 +91,7 @@ class Player:
     legs: list[LegDriven] = field(default_factory=list)
     trail: list[tuple[LegSoFar, ...]] = field(default_factory=list)
     down: bool = False
+    fault: Fault | None = None
 
     @property
     def active(self) -> bool:
@@ -105,6 +108,7 @@ class Player:
 def driven_by(player: Player) -> Driven:
     """What a robot drove, leg by leg; poses are in its trail."""
     return Driven(
+        fault=player.fault,
         leg_s=np.array([leg.time_s for leg in player.legs]), stuck=bool(player.legs) and player.legs[-1].stuck,
         leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)), capacity=player.drawn.capacity,
         touches=tuple(touch for leg in player.legs for touch in leg.touches),

@@ -8,6 +8,7 @@ from types import TracebackType
 
 import numpy as np
 
+from sva_bench.choices import Fault
 from sva_bench.execution.engines.bullet import BulletTeam
 from sva_bench.execution.shared.driver import LegSoFar, Member
 from sva_bench.execution.shared.motion import TeamMotion
@@ -50,6 +51,10 @@ class TeamBullet(TeamMotion):
         return replace(super().leg(robot), touches=tuple(
             self._seen(touch, driven_s) for touch, driven_s in touches))
 
+    def fault(self, robot: int) -> Fault | None:
+        """Why a robot drives no more though nothing holds it."""
+        return self._world.faults().get(robot)
+
     def _seen(self, touch: Touch, driven_s: float) -> Touch:
         solid = "" if touch.robot is not None else solid_at(self._obstacles, touch.x_m, touch.y_m)
         return replace(touch, since_s=driven_s, solid=solid)
@@ -68,7 +73,7 @@ class TeamBullet(TeamMotion):
             met = world.step(wheels, poses)
             end_tick(robots, teams, notes, poses)
             self._note_touches()
-            for robot in world.tipped_over():
+            for robot in world.faults():
                 if robots["doing"][robot] != STANDS:
                     stop_robot(robots, robot, IS_STUCK)
             if met:

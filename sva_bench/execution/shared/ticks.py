@@ -137,7 +137,7 @@ def _drive(robot: Robot, i: int, team: Team, ways: Ways, notes: Notes, cause: in
         stretch.before_m + follow[1], robot.end_cell - robot.first_cell))
     if follow[0] == ARRIVED:
         if stretch.ends != ENDS_LEG or robot.hold >= robot.hold_count:
-            return _stretch_over(robot, ways)
+            return bool(_stretch_over(robot, ways))
         follow[4], cause = 1.0, -2 - robot.hold  # a hold at the end of the leg
     if _spent(robot):
         return True

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,7 +24,8 @@ from sva_bench.world.model import World
 from sva_bench.world.places import Places
 from sva_bench.world.schema import Shapes
 
-FAMILIES = ("rooms", "aisles", "field", "maze", "doors")
+Family = Literal["rooms", "aisles", "field", "maze", "doors"]
+FAMILIES: tuple[Family, ...] = ("rooms", "aisles", "field", "maze", "doors")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,7 +38,7 @@ class Ready:
     orders: tuple[Assignment, ...]
 
 
-def random_mission(seed: int, *, interaction: str = "shared", family: str | None = None, robots: int | None = None,
+def random_mission(seed: int, *, interaction: str = "shared", family: Family | None = None, robots: int | None = None,
                    noisy: bool | None = None, process: str | None = None) -> Ready | None:
     """A mission by its seed; ``None`` if the robots don't fit into the world drawn."""
     rng = np.random.default_rng([61, seed])
@@ -85,7 +86,7 @@ def random_mission(seed: int, *, interaction: str = "shared", family: str | None
                  orders=tuple(orders_of(world, case, planned_legs(world, costs, [case]))))
 
 
-def _terrain(family: str, size_m: float, seed: int, pois: int, stations: int) -> tuple[list[Any], Places]:
+def _terrain(family: Family, size_m: float, seed: int, pois: int, stations: int) -> tuple[list[Any], Places]:
     """Obstacles and places; two rooms with a narrow door are no family of the generator."""
     if family != "doors":
         terrain = random_terrain(family, size_m=size_m, density=DENSITY[family], seed=seed)

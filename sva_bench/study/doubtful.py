@@ -1,4 +1,4 @@
-"""Passages that are likely to be somewhere else than their author thinks."""
+"""What is likely not meant as it stands in a world: passages that lie elsewhere, loads that no motor moves."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.waits import crossings_of
+from sva_bench.robot.model import MOTOR_RESERVE
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
@@ -38,6 +39,16 @@ def doubtful_passages(world: World, costs: Mapping[str, FuelCosts]) -> list[str]
             said.append(f"no planned path crosses passage {passage.name}, so no robot ever waits there: let its at_m "
                         "reach across a door that robots drive through, or remove it")
     return said
+
+
+def doubtful_loads(world: World) -> list[str]:
+    """A sentence for each robot model whose motors can't accelerate the greatest payload as its limits ask."""
+    load_kg = world.noise.payload_kg[1]
+    masses = {robot.model.name: robot.model.mass_kg for robot in world.robots}
+    return [f"noise.payload_kg: up to {load_kg:g} kg on {name}, which weighs {mass_kg:g} kg itself: its motors bear "
+            f"{(MOTOR_RESERVE - 1) * mass_kg:.3g} kg more at the accelerations of its model, and a robot that is "
+            "slower than planned runs dry, comes late or gets stuck; lower the payload, or give a stronger robot"
+            for name, mass_kg in masses.items() if load_kg > (MOTOR_RESERVE - 1) * mass_kg]
 
 
 def _planned_paths(costs: Mapping[str, FuelCosts]) -> list[FloatArray]:
