@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear
 from sva_bench.geometry.distances import point_segment
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.travel.roadmap import Roadmap, plan_paths, surely_disconnected
+from sva_bench.travel.roadmap import plan_paths, surely_disconnected
+from sva_bench.travel.samples import arc_points, roadmap_samples
+from sva_bench.travel.tangents import tangents
 
 _PENALTIES = ((0.6, 2.5), (1.2, 6.0))  # distance to the shortest path [m] within which a metre costs so many
 _LONGEST, _LONGER_M = 1.7, 1.5  # a way may be so many times as long as the shortest, and so much more
+_SPREAD, _NEAREST = 600, 10  # places between the corners, and neighbours that each vertex is joined to
+_PER_CORNER = 6  # points on a quarter circle about a corner
+_START_SLACK_M = 1e-9  # a start on the boundary of the free space is free
 _APART_M = 0.3  # from which on two ways count as different
 _CELL_M = 0.1  # of the grid that marks what is near a path
 _GRAZE_M = 1e-6  # a line that leaves a narrow place may come nearer to its walls by so much
@@ -26,39 +32,86 @@ _FARTHEST_M = 0.6  # up to this distance from it
 _DIRECTIONS = 32
 
 
-def alternatives(roadmap: Roadmap, path: FloatArray) -> list[FloatArray]:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ways:
+    """The free straight lines between some points of a world, the corners that paths bend about, and places between.
+
+    Unlike OMPL's roadmap, which differs by single edges from process to process, it depends on the world alone: the
+    shortest way doesn't use these edges, but the second best may.
+
+    Attributes:
+        vertices: The ends of the lines, the points first [m], shape (v, 2).
+        lines: Numbers of both ends of each line, shape (e, 2).
+        checker: From ``clearance_checker``, for lines.
+    """
+
+    vertices: FloatArray
+    lines: IntArray
+    checker: FloatArray
+
+
+def ways_among(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> Ways:
+    """The ways between points.
+
+    Args:
+        obstacles: The obstacles.
+        points: Ends of ways [m], shape (n, 2); all at least ``clearance_m`` from obstacles.
+        clearance_m: Distance that they keep from obstacles [m].
+    """
+    checker = clearance_checker(obstacles, clearance_m, _START_SLACK_M)
+    arcs = arc_points(obstacles, clearance_m, _PER_CORNER, points)
+    isolated = np.column_stack([points, np.full((len(points), 2), np.nan), np.zeros(len(points))])
+    spread = roadmap_samples(obstacles, clearance_m, _SPREAD, arcs[:0])
+    vertices = np.concatenate([points, arcs[:, :2], spread])
+    _, nearest = KDTree(vertices).query(vertices, k=min(_NEAREST + 1, len(vertices)))
+    beside = np.column_stack([np.repeat(np.arange(len(vertices)), nearest.shape[1]), nearest.ravel()])
+    beside = np.unique(np.sort(beside[beside[:, 0] != beside[:, 1]], axis=1), axis=0)
+    lines = np.concatenate([tangents(checker, np.concatenate([isolated, arcs])),
+                            beside[_free_lines(checker, vertices, beside)]])
+    return Ways(vertices=vertices, lines=np.unique(np.sort(lines, axis=1), axis=0), checker=checker)
+
+
+def alternatives(ways: Ways, path: FloatArray) -> list[FloatArray]:
     """A path, and up to two others between its ends that avoid it as far as that is worth while.
 
     Args:
-        roadmap: A roadmap with both ends among its points, from ``connecting_roadmap``.
+        ways: Ways with both ends among their points.
         path: The shortest path [m], shape (k, 2).
 
     Returns:
         The paths [m], the shortest first, each of shape (k, 2).
     """
     found = [path]
-    start, goal = (int(np.argmin(np.hypot(*(roadmap.vertices - end).T))) for end in (path[0], path[-1]))
+    start, goal = (int(np.argmin(np.hypot(*(ways.vertices - end).T))) for end in (path[0], path[-1]))
     if start == goal:
         return found
-    edges = roadmap.graph.tocoo()
-    low = roadmap.vertices.min(axis=0) - 2 * _PENALTIES[-1][0]
-    counts = np.ceil((roadmap.vertices.max(axis=0) + 2 * _PENALTIES[-1][0] - low) / _CELL_M).astype(np.int64)
     for near_m, factor in _PENALTIES:
-        near = _marked(path, low, counts[0], counts[1], near_m)
-        costs = _costs(roadmap.vertices, edges.row.astype(np.int64), edges.col.astype(np.int64), near, low, factor)
-        graph = csr_array((costs, (edges.row, edges.col)), shape=roadmap.graph.shape)
-        _, before = dijkstra(graph, directed=False, indices=np.array([goal]), return_predecessors=True)
-        way = [start]
-        while way[-1] != goal and before[0, way[-1]] >= 0:
-            way.append(int(before[0, way[-1]]))
-        if way[-1] != goal:
-            return found
-        other = _pulled(roadmap.checker, roadmap.vertices[way], near, low, factor)
-        other[0], other[-1] = path[0], path[-1]
-        if _length(other) <= _LONGEST * _length(path) + _LONGER_M and all(
+        other = _cheapest(ways, start, goal, path, near_m, factor)
+        if other is not None and _length(other) <= _LONGEST * _length(path) + _LONGER_M and all(
                 _farthest(other, known) > _APART_M for known in found):
+            other[0], other[-1] = path[0], path[-1]
             found.append(other)
     return found
+
+
+def _cheapest(
+    ways: Ways, start: int, goal: int, path: FloatArray, near_m: float, factor: float
+) -> FloatArray | None:
+    """The way between two vertices of least cost, a metre near a path counted so many times; ``None`` if none."""
+    low = ways.vertices.min(axis=0) - _CELL_M
+    columns, rows = np.ceil((ways.vertices.max(axis=0) - low) / _CELL_M).astype(np.int64) + 2
+    near = _marked(path, low, columns, rows, near_m)
+    costs = _costs(ways.vertices, ways.lines, near, low, factor)
+    count = len(ways.vertices)
+    graph = csr_array((costs, (ways.lines[:, 0], ways.lines[:, 1])), shape=(count, count))
+    _, before = dijkstra(graph, directed=False, indices=np.array([goal]), return_predecessors=True)
+    way = [start]
+    while way[-1] != goal:
+        if before[0, way[-1]] < 0:
+            return None
+        way.append(int(before[0, way[-1]]))
+    pulled: FloatArray = _pulled(ways.checker, ways.vertices[way], near, low, factor)
+    return pulled
 
 
 def way_round(
@@ -81,23 +134,29 @@ def way_round(
     if len(discs) and (np.hypot(*(discs[:, :2] - end).T) - discs[:, 2]).min() < clearance_m - _GRAZE_M:
         return None
     closed = replace(obstacles, cylinders=np.concatenate([obstacles.cylinders, discs])) if len(discs) else obstacles
-    checker = clearance_checker(closed, clearance_m, 1e-9)
+    checker = clearance_checker(closed, clearance_m, _START_SLACK_M)
     first, last = (_freed(closed, checker, np.asarray(place, dtype=np.float64)) for place in (start, end))
     if first is None or last is None:
         return None
-    if keeps_clear(checker, *first[-1], *last[-1]):
-        inner = np.array([first[-1], last[-1]])
-    else:
-        points = np.array([first[-1], last[-1]])
-        found = None if surely_disconnected(closed, points, clearance_m)[0, 1] else plan_paths(
-            closed, points, clearance_m)[0][1]
-        if found is None:
-            return None
-        inner = found
+    inner = _joined(closed, checker, np.array([first[-1], last[-1]]), clearance_m)
+    if inner is None:
+        return None
     path = np.concatenate([first[:-1], inner, last[:-1][::-1]])
-    moves = np.hypot(*np.diff(path, axis=0).T) > 1e-9
-    kept: FloatArray = path[np.r_[True, moves]]
+    kept: FloatArray = path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > _GRAZE_M]]
     return kept if len(kept) > 1 else np.array([start, end], dtype=np.float64)
+
+
+def _joined(obstacles: Obstacles, checker: FloatArray, ends: FloatArray, clearance_m: float) -> FloatArray | None:
+    """A path between two places that keep the clearance; ``None`` if there is none."""
+    if keeps_clear(checker, *ends[0], *ends[1]):
+        return ends
+    path = _cheapest(ways_among(obstacles, ends, clearance_m), 0, 1, ends[:1], 0.0, 1.0)
+    if path is not None:
+        return path
+    # The roadmap grows until it finds the narrowest passage.
+    if surely_disconnected(obstacles, ends, clearance_m)[0, 1]:
+        return None
+    return plan_paths(obstacles, ends, clearance_m)[0][1]
 
 
 def _freed(obstacles: Obstacles, checker: FloatArray, place: FloatArray) -> FloatArray | None:
@@ -166,13 +225,21 @@ def _cost(ax: float, ay: float, bx: float, by: float, near: BoolArray, low: Floa
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _costs(
-    vertices: FloatArray, heads: IntArray, tails: IntArray, near: BoolArray, low: FloatArray, factor: float
-) -> FloatArray:
-    """The cost of each edge, shape (edges,)."""
-    costs = np.empty(len(heads))
-    for k in range(len(heads)):
-        a, b = heads[k], tails[k]
+def _free_lines(checker: FloatArray, vertices: FloatArray, lines: IntArray) -> BoolArray:
+    """Which lines keep the checker's clearance, shape (lines,)."""
+    free = np.empty(len(lines), dtype=np.bool_)
+    for k in range(len(lines)):
+        a, b = lines[k, 0], lines[k, 1]
+        free[k] = keeps_clear(checker, vertices[a, 0], vertices[a, 1], vertices[b, 0], vertices[b, 1])
+    return free
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _costs(vertices: FloatArray, lines: IntArray, near: BoolArray, low: FloatArray, factor: float) -> FloatArray:
+    """The cost of each line, shape (lines,)."""
+    costs = np.empty(len(lines))
+    for k in range(len(lines)):
+        a, b = lines[k, 0], lines[k, 1]
         costs[k] = max(_cost(vertices[a, 0], vertices[a, 1], vertices[b, 0], vertices[b, 1], near, low, factor), 1e-12)
     return costs
 

@@ -91,26 +91,27 @@ def plan_paths(
     Source:
         Karaman & Frazzoli (2011), "Sampling-based algorithms for optimal motion planning" (PRM*).
     """
+    ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
     if planner in PAIR_PLANNERS:
-        ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
         return _pair_by_pair(obstacles, points, clearance_m, planner)
     if len(points) < 2:
         return [[None] for _ in points]
-    return _shortest(connecting_roadmap(obstacles, points, clearance_m, seed), points)
+    return _shortest(_connecting_roadmap(obstacles, points, clearance_m), points)
 
 
 def roadmap_edges(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> FloatArray:
     """The edges of the roadmap of ``plan_paths``, for display: both ends of each [m], shape (e, 2, 2)."""
     if len(points) < 2:
         return np.empty((0, 2, 2))
-    roadmap = connecting_roadmap(obstacles, points, clearance_m)
+    ou.RNG.setSeed(1)
+    roadmap = _connecting_roadmap(obstacles, points, clearance_m)
     one, other = roadmap.graph.nonzero()
     ends: FloatArray = np.stack([roadmap.vertices[one], roadmap.vertices[other]], axis=1)
     return ends
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Roadmap:
+class _Roadmap:
     """A roadmap.
 
     Attributes:
@@ -203,9 +204,8 @@ def _state(si: Any, point: Sequence[float] | FloatArray) -> Any:
     return state
 
 
-def connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: float, seed: int = 0) -> Roadmap:
-    """The roadmap of ``plan_paths``, of two points or more: grown until it connects all, or to the last of _GROWTH."""
-    ou.RNG.setSeed(seed + 1)  # 0 means "by the clock" to OMPL
+def _connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: float) -> _Roadmap:
+    """A roadmap grown until it connects all points, or to the last of ``_GROWTH``."""
     disconnected: BoolArray | None = None
     for milestones, per_corner in _GROWTH:
         roadmap = _build_roadmap(obstacles, points, clearance_m, milestones, per_corner)
@@ -224,8 +224,8 @@ def connecting_roadmap(obstacles: Obstacles, points: FloatArray, clearance_m: fl
 
 
 def _with_lattice_paths(
-    roadmap: Roadmap, obstacles: Obstacles, points: FloatArray, clearance_m: float, goals: IntArray
-) -> Roadmap:
+    roadmap: _Roadmap, obstacles: Obstacles, points: FloatArray, clearance_m: float, goals: IntArray
+) -> _Roadmap:
     """A roadmap with lattice paths from the first point to some others added, and tangents from their vertices."""
     found = lattice_paths(obstacles, roadmap.checker, clearance_m, points, goals.tolist())
     paths = [path for path in found if path is not None]
@@ -243,7 +243,7 @@ def _with_lattice_paths(
 
 def _build_roadmap(
     obstacles: Obstacles, points: FloatArray, clearance_m: float, milestones: int, per_corner: int,
-) -> Roadmap:
+) -> _Roadmap:
     si, _ = _space(obstacles, clearance_m)
     arcs = arc_points(obstacles, clearance_m, per_corner, points)
     samples = roadmap_samples(obstacles, clearance_m, milestones, arcs)
@@ -264,10 +264,10 @@ def _build_roadmap(
     ends = np.concatenate([_isolated(points), arcs])
     vertices, graph = _with_edges(*_read_roadmap(si, planner), ends[:, :2], tangents(checker, ends))
     at = np.array([int(np.argmin(np.hypot(*(vertices - point).T))) for point in points], dtype=np.int64)
-    return Roadmap(vertices=vertices, graph=graph, at=at, checker=checker, arcs=arcs)
+    return _Roadmap(vertices=vertices, graph=graph, at=at, checker=checker, arcs=arcs)
 
 
-def _shortest(roadmap: Roadmap, points: FloatArray) -> list[list[FloatArray | None]]:
+def _shortest(roadmap: _Roadmap, points: FloatArray) -> list[list[FloatArray | None]]:
     """Shortest paths on a roadmap, shortened by shortcuts, as ``plan_paths`` returns them."""
     at = roadmap.at.tolist()
     lengths, before = dijkstra(roadmap.graph, directed=False, indices=at, return_predecessors=True)

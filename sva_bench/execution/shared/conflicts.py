@@ -19,7 +19,7 @@ STILL_M = 0.12
 _START_M = 0.1  # what the gap is smaller by between robots that stand nearer than it: their cells' lengths
 _START_STILL_M = 0.03  # the same next to one that stands for good, whose cell has no length
 _START_CELLS = 6  # cells in which they get clear of each other
-_FAR_M = 1.0  # a way that is farther than this beyond the gap is not looked at again for as long as it must be
+_BLOCK = 16  # neighbouring cells that are looked at together
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,19 +91,13 @@ def runs_of(itineraries: Sequence[Itinerary], strips: Strips, gap_m: float) -> R
         strips: Their cells.
         gap_m: Least gap between two hulls in the middle of their cells [m].
     """
-    steps = np.hypot(*np.diff(strips.place_m, axis=0, append=strips.place_m[-1:]).T)
-    ways = len(strips.robot)
-    step = np.array([max(steps[strips.first[k]:strips.first[k + 1] - 1].max(initial=0.0), CELL_M) * (1 + 1e-9)
-                     for k in range(ways)])
     near, early = _gaps(itineraries, gap_m)
-    first_leg = np.zeros(ways, dtype=np.bool_)
-    for number in range(len(itineraries)):
-        first_leg[strips.leg[strips.legs[number]]:strips.leg[strips.legs[number] + 1]] = True
-    found = _find_runs(strips.robot, strips.first, strips.place_m, step, first_leg, near, early)
-    cell, way, low, high = np.ascontiguousarray(found.T)
-    order = np.argsort(cell, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=len(strips.place_m)))])
-    return Runs(start=start, way=way[order], low=low[order], high=high[order])
+    first_leg = np.zeros(len(strips.robot), dtype=np.bool_)
+    for leg in strips.legs[:-1].tolist():
+        first_leg[strips.leg[leg]:strips.leg[leg + 1]] = True
+    rows = _find_runs(strips.robot, strips.first, strips.place_m, first_leg, near, early)
+    start, rows = _by_cell(rows, len(strips.place_m))
+    return Runs(start=start, way=rows[:, 1], low=rows[:, 2], high=rows[:, 3])
 
 
 def _gaps(itineraries: Sequence[Itinerary], gap_m: float) -> tuple[FloatArray, FloatArray]:
@@ -120,67 +114,118 @@ def _gaps(itineraries: Sequence[Itinerary], gap_m: float) -> tuple[FloatArray, F
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _noted(rows: NDArray[np.int32], count: int, cell: int, way: int, low: int, high: int) -> NDArray[np.int32]:
-    """The rows with one more."""
-    if count == len(rows):
-        more = np.empty((2 * len(rows), rows.shape[1]), dtype=np.int32)
-        more[:len(rows)] = rows
-        rows = more
-    rows[count, 0], rows[count, 1], rows[count, 2], rows[count, 3] = cell, way, low, high
-    return rows
+def _circles(first: IntArray, place: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Circles about each ``_BLOCK`` cells of a way.
 
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _first_within(place: FloatArray, x: float, y: float, begin: int, end: int, step: float, within: float) -> int:
-    """The first of some cells of a way that is nearer to a point; ``end`` if none is."""
-    b = begin
-    while b < end:
-        distance = math.hypot(place[b, 0] - x, place[b, 1] - y)
-        if distance < within:
-            return b
-        b += max(int((distance - within) / step), 1)
-    return end
+    Returns:
+        Number of the first circle of each way, and of all, shape (ways + 1,); x, y, radius [m], shape (circles, 3).
+    """
+    begins = np.zeros(len(first), dtype=np.int64)
+    for way in range(len(first) - 1):
+        begins[way + 1] = begins[way] + (first[way + 1] - first[way] + _BLOCK - 1) // _BLOCK
+    circles = np.empty((begins[-1], 3))
+    for way in range(len(first) - 1):
+        for k in range(begins[way + 1] - begins[way]):
+            cells = place[first[way] + k * _BLOCK:min(first[way] + (k + 1) * _BLOCK, first[way + 1])]
+            x, y, reach = cells[:, 0].mean(), cells[:, 1].mean(), 0.0
+            for cell in range(len(cells)):
+                reach = max(reach, math.hypot(cells[cell, 0] - x, cells[cell, 1] - y))
+            circles[begins[way] + k, 0], circles[begins[way] + k, 1] = x, y
+            circles[begins[way] + k, 2] = reach + 1e-9
+    return begins, circles
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _find_runs(
-    robot: IntArray, first: IntArray, place: FloatArray, step: FloatArray, first_leg: BoolArray, near: FloatArray,
-    early: FloatArray,
+    robot: IntArray, first: IntArray, place: FloatArray, first_leg: BoolArray, near: FloatArray, early: FloatArray,
 ) -> NDArray[np.int32]:
-    """Cell, way, first and last cell of each run, shape (runs, 4).
+    """Cell, way, first and last cell of each run, in no order, shape (runs, 4); compiled in one loop over all pairs.
 
-    Neighbouring cells of a way are at most ``step`` apart: at a distance from it that differs from the one asked for
-    by d, the next d / step cells need not be looked at.
+    For each cell of one way the cells of the other are searched, among those of blocks that are near enough; runs of
+    the first way's cells about those of the other are found along with them.
     """
-    rows, count = np.empty((4096, 4), dtype=np.int32), 0
+    rows, count = np.empty((65_536, 4), dtype=np.int32), 0
+    begins, circles = _circles(first, place)
+    longest = np.diff(first).max()
+    close = np.empty(longest // _BLOCK + 1, dtype=np.int64)
+    since, until = np.empty(longest, dtype=np.int64), np.empty(longest, dtype=np.int64)
     for mine in range(len(robot)):
-        for other in range(len(robot)):
+        for other in range(mine + 1, len(robot)):
             i, j = robot[mine], robot[other]
             if i == j:
                 continue
-            begin, end = first[other], first[other + 1]
-            from_rest = first_leg[mine] and first_leg[other] and early[i, j] < near[i, j]
-            a = first[mine]
-            while a < first[mine + 1]:
-                x, y = place[a, 0], place[a, 1]
-                b = _first_within(place, x, y, begin, end, step[other], near[i, j] + _FAR_M)
-                if b == end:
-                    a += max(int(_FAR_M / step[mine]), 1)
+            begin, end, within = first[other], first[other + 1], near[i, j]
+            usual, special = within * within, early[i, j] * early[i, j]
+            from_rest = first_leg[mine] and first_leg[other] and special < usual
+            until[:end - begin] = -2
+            for block in range(begins[mine], begins[mine + 1]):
+                found = 0
+                for k in range(begins[other], begins[other + 1]):
+                    dx, dy = circles[k, 0] - circles[block, 0], circles[k, 1] - circles[block, 1]
+                    reach = circles[k, 2] + circles[block, 2] + within
+                    if dx * dx + dy * dy <= reach * reach:
+                        close[found] = k
+                        found += 1
+                if found == 0:
                     continue
-                starts = from_rest and a - first[mine] < _START_CELLS
-                low = -1
-                while b < end:
-                    distance = math.hypot(place[b, 0] - x, place[b, 1] - y)
-                    slow = starts and b - begin < _START_CELLS
-                    within = early[i, j] if slow else near[i, j]
-                    if distance < within and not (slow and a == first[mine] and b == begin):
-                        low = b if low < 0 else low
-                    elif low >= 0:
-                        rows = _noted(rows, count, a, other, low, b - 1)
-                        count, low = count + 1, -1
-                    b += 1 if slow else max(int(abs(distance - within) / step[other]), 1)
-                if low >= 0:
-                    rows = _noted(rows, count, a, other, low, end - 1)
+                head = first[mine] + (block - begins[mine]) * _BLOCK
+                for a in range(head, min(head + _BLOCK, first[mine + 1])):
+                    if count + 2 * (end - begin) + 2 > len(rows):
+                        more = np.empty((2 * len(rows) + 4 * longest, 4), dtype=np.int32)
+                        more[:count] = rows[:count]
+                        rows = more
+                    x, y, low, high = place[a, 0], place[a, 1], -2, -2
+                    starts = from_rest and a - first[mine] < _START_CELLS
+                    for k in close[:found]:
+                        dx, dy, reach = circles[k, 0] - x, circles[k, 1] - y, circles[k, 2] + within
+                        if dx * dx + dy * dy > reach * reach:
+                            continue
+                        ahead = begin + (k - begins[other]) * _BLOCK
+                        for b in range(ahead, min(ahead + _BLOCK, end)):
+                            dx, dy, limit = place[b, 0] - x, place[b, 1] - y, usual
+                            if starts and b - begin < _START_CELLS:
+                                limit = special if a > first[mine] or b > begin else -1.0  # they stand there both
+                            if dx * dx + dy * dy >= limit:
+                                continue
+                            if high != b - 1:
+                                if low >= 0:
+                                    rows[count, 0], rows[count, 1], rows[count, 2], rows[count, 3] = a, other, low, high
+                                    count += 1
+                                low = b
+                            high = b
+                            at = b - begin
+                            if until[at] != a - 1:
+                                if until[at] >= 0:
+                                    rows[count, 0], rows[count, 1] = b, mine
+                                    rows[count, 2], rows[count, 3] = since[at], until[at]
+                                    count += 1
+                                since[at] = a
+                            until[at] = a
+                    if low >= 0:
+                        rows[count, 0], rows[count, 1], rows[count, 2], rows[count, 3] = a, other, low, high
+                        count += 1
+            if count + end - begin > len(rows):
+                more = np.empty((2 * len(rows) + longest, 4), dtype=np.int32)
+                more[:count] = rows[:count]
+                rows = more
+            for at in range(end - begin):
+                if until[at] >= 0:
+                    rows[count, 0], rows[count, 1] = begin + at, mine
+                    rows[count, 2], rows[count, 3] = since[at], until[at]
                     count += 1
-                a += 1
     return rows[:count]
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _by_cell(rows: NDArray[np.int32], cells: int) -> tuple[IntArray, NDArray[np.int32]]:
+    """Where the runs of each cell begin, and the end, shape (cells + 1,); the runs in that order."""
+    start = np.zeros(cells + 1, dtype=np.int64)
+    for k in range(len(rows)):
+        start[rows[k, 0] + 1] += 1
+    for cell in range(cells):
+        start[cell + 1] += start[cell]
+    fill, ordered = start[:-1].copy(), np.empty_like(rows)
+    for k in range(len(rows)):
+        ordered[fill[rows[k, 0]]] = rows[k]
+        fill[rows[k, 0]] += 1
+    return start, ordered

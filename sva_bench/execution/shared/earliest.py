@@ -74,7 +74,9 @@ def plan_earliest(
     ways: IntArray, first: IntArray, lasts: FloatArray, ready: float, start: IntArray, way: NDArray[np.int32],
     low: NDArray[np.int32], high: NDArray[np.int32], chosen: BoolArray, enter: FloatArray, leave: FloatArray,
 ) -> float:
-    """Plan a robot among those planned; its earliest end [s], ``inf`` if there is none. Compiled in one piece.
+    """Plan a robot among those planned; its earliest end [s], ``inf`` if there is none.
+
+    One loop, because compiled code called for each cell would pass a dozen arrays each time.
 
     Args:
         ways: Number of the first way of each of its legs, then the end, shape (legs + 1,).

@@ -22,15 +22,17 @@ from sva_bench.execution.shared.conflicts import Runs, Strips, runs_of, strips_o
 from sva_bench.execution.shared.earliest import plan_earliest
 from sva_bench.execution.shared.lanes import Itinerary, Lane, Order
 
-_ALL_ORDERS = 4  # robots up to which every order of priority is tried,
-_ORDERS = 24  # beyond which so many are
+_ALL_ORDERS = 5  # robots up to which every order of priority is tried,
+_ORDERS = 24  # beyond which so many are, and then moves of one robot in the best of them,
+_MOST_ORDERS = 120  # until none saves anything, or so many orders were tried
 _SAVED_S = 1e-6  # what a later order must save to be preferred: less is rounding
 
 
 def plan_order(itineraries: Sequence[Itinerary], gap_m: float) -> Order | None:
     """The order of the plan with the least robot time: the sum of when the robots' last stops end.
 
-    Among plans of equal sum the first order of priority counts, by the robots' numbers. A robot holds its first cell
+    Every order of priority is planned for few robots, and a fixed choice and its neighbours for many; among plans of
+    equal sum the first counts, by the robots' numbers. A robot holds its first cell
     from the beginning, before it is ready too, and its last one for good; a robot without legs holds its place always.
 
     Args:
@@ -73,6 +75,11 @@ class _Search:
         self._chosen = np.zeros(len(strips.robot), dtype=np.bool_)
         self._enter, self._leave = np.zeros(len(strips.place_m)), np.zeros(len(strips.place_m))
         self._ends = np.array(self._ready)
+        self._alone: dict[int, float] = {}
+        self._planned: list[int] = []
+        self._best: _Plan | None = None
+        self._order: tuple[int, ...] = ()
+        self._least = math.inf
         for number, itinerary in enumerate(itineraries):
             if not itinerary.legs:
                 way = strips.leg[strips.legs[number]]
@@ -80,35 +87,44 @@ class _Search:
                 self._enter[strips.first[way]], self._leave[strips.first[way]] = -math.inf, math.inf
 
     def best(self) -> _Plan | None:
-        """The plan of the best order of priority; ``None`` if none has one."""
-        # With nobody else driving a robot is as early as in any plan.
-        alone = {}
+        """The plan of the best order of priority tried; ``None`` if none has one."""
         for number in self._driving:
-            alone[number] = self._plan(number)
+            self._alone[number] = self._plan(number)
             self._drop(number)
-        best, least, planned = None, math.inf, list[int]()
+        tried = 0
         for order in _orders(self._driving):
-            common = 0
-            while common < len(planned) and planned[common] == order[common]:
-                common += 1
-            for number in planned[common:]:
-                self._drop(number)
-            planned = list(order[:common])
-            for number in order[common:]:
-                total = sum(alone[n] if n not in planned else float(self._ends[n]) for n in self._driving)
-                if total >= least - _SAVED_S:
+            self._try(order)
+            tried += 1
+        while len(self._driving) > _ALL_ORDERS and tried < _MOST_ORDERS and self._order:
+            for order in _moved(self._order):
+                tried += 1
+                if self._try(order) or tried == _MOST_ORDERS:
                     break
-                if not math.isfinite(self._plan(number)):
-                    break
-                planned.append(number)
-            if len(planned) < len(order):
-                continue
-            total = sum(float(self._ends[n]) for n in self._driving)
-            if total < least - _SAVED_S:
-                least = total
-                best = _Plan(chosen=self._chosen.copy(), enter=self._enter.copy(), leave=self._leave.copy(),
-                             ends=self._ends.copy())
-        return best
+            else:
+                break
+        return self._best
+
+    def _try(self, order: tuple[int, ...]) -> bool:
+        """Plan the robots in that order, and keep the plan if it is better; whether it is."""
+        common = 0
+        while common < len(self._planned) and self._planned[common] == order[common]:
+            common += 1
+        for number in self._planned[common:]:
+            self._drop(number)
+        del self._planned[common:]
+        for number in order[common:]:
+            # With nobody else driving a robot is as early as in any plan.
+            least = sum(float(self._ends[n]) if n in self._planned else self._alone[n] for n in self._driving)
+            if least >= self._least - _SAVED_S or not math.isfinite(self._plan(number)):
+                return False
+            self._planned.append(number)
+        total = sum(float(self._ends[n]) for n in self._driving)
+        if total >= self._least - _SAVED_S:
+            return False
+        self._least, self._order = total, order
+        self._best = _Plan(chosen=self._chosen.copy(), enter=self._enter.copy(), leave=self._leave.copy(),
+                           ends=self._ends.copy())
+        return True
 
     def _plan(self, number: int) -> float:
         """Plan a robot among those planned; its end [s], ``inf`` if there is no way for it."""
@@ -126,7 +142,7 @@ class _Search:
 
 
 def _orders(numbers: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    """Orders of priority to try: all of few robots, else a fixed choice, sorted so that neighbours begin alike."""
+    """Orders of priority to begin with: all of few robots, else a fixed choice, sorted so that they begin alike."""
     if len(numbers) <= _ALL_ORDERS:
         yield from permutations(numbers)
         return
@@ -134,6 +150,15 @@ def _orders(numbers: Sequence[int]) -> Iterator[tuple[int, ...]]:
     while len(tried) < _ORDERS:
         tried.add(tuple(draws.sample(list(numbers), len(numbers))))
     yield from sorted(tried)
+
+
+def _moved(order: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+    """The orders in which one robot has another place, those that begin alike first."""
+    for low in range(len(order) - 2, -1, -1):
+        for high in range(low + 1, len(order)):
+            yield (*order[:low], order[high], *order[low:high], *order[high + 1:])
+            if high > low + 1:
+                yield (*order[:low], *order[low + 1:high + 1], order[low], *order[high + 1:])
 
 
 def _order_of(itineraries: Sequence[Itinerary], search: _Search, plan: _Plan) -> Order:
