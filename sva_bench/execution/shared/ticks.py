@@ -113,12 +113,12 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
         if not busy:
             return NOBODY
         if still:
+            steps = 1 if team.braking else _steps_to_wait(robots, team)
+            _pass_over(robots, team, waits, abs(steps))
             if team.braking:
                 return REST
-            steps = _steps_to_wait(robots, team)
             if steps < 0:
                 return DEADLOCK
-            _pass_over(robots, team, waits, steps)
             continue
         if not by_twin:
             return GO
@@ -287,7 +287,7 @@ def _hardly_moved(robot: Robot, yaw: float) -> bool:
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _steps_to_wait(robots: Records, team: Team) -> int:
-    """Control steps until something changes though nobody moves; -1 = never."""
+    """Control steps until something changes though nobody moves; -1 = nothing ever does."""
     least = -1
     for i in range(len(robots)):
         robot, steps = robots[i], -1
