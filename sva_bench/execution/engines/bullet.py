@@ -281,18 +281,18 @@ class BulletTeam:
         """Why robots drive no more though nothing holds them, by their numbers."""
         return {number: robot.fault for number, robot in enumerate(self._robots) if robot.fault}
 
-    def step(self, wheels_m_s: FloatArray, poses: FloatArray) -> list[tuple[int, int]]:
+    def step(self, wheels_m_s: Sequence[tuple[float, float]], poses: FloatArray) -> list[tuple[int, int]]:
         """Advance by one control step.
 
         Args:
             wheels_m_s: Speed along the floor that the left and the right wheel of each robot are commanded to have,
-                before the disturbance, shape (n, 2).
+                before the disturbance.
             poses: Receives x, y [m], yaw [rad] of each robot, shape (n, 3).
 
         Returns:
             Pairs of robots that came to touch.
         """
-        for number, (left, right) in enumerate(wheels_m_s.tolist()):
+        for number, (left, right) in enumerate(wheels_m_s):
             stands = left == 0.0 and right == 0.0
             if not (stands and self._stood[number]):
                 self._robots[number].command(left, right)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from sva_bench.execution.shared.planning import first_order
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.trace import leg_times, traces_of
 from sva_bench.execution.shared.truncation import cut_off
+from sva_bench.files.digest import digest
 from sva_bench.mission.failures import NEVER, process_of
 from sva_bench.mission.plan import Route
 from sva_bench.travel.fuel import FuelCosts
@@ -32,12 +34,39 @@ from sva_bench.world.model import World
 _CHUNK = 32  # missions that a worker plays at a time, of one plan and one set of robots that leave
 
 
+@dataclass(frozen=True, kw_only=True)
+class Ground:
+    """A world whose robots meet, and their fuel costs; the same as another of the same content.
+
+    Attributes:
+        content: Digest of what the ways of robots depend on.
+        world, costs: The world and its fuel costs, by robot.
+    """
+
+    content: str
+    world: World = field(compare=False)
+    costs: Mapping[str, FuelCosts] = field(compare=False)
+
+
+def ground_of(world: World, costs: Mapping[str, FuelCosts]) -> Ground:
+    """The ground of a world."""
+    content = digest(world.obstacles, world.sites, [(robot.name, robot.model) for robot in world.robots],
+                     world.noise.localisation, [costs[world.kind_of(robot)].repaired_ms for robot in world.robots])
+    return Ground(content=content, world=world, costs=costs)
+
+
+@lru_cache(maxsize=2)  # a worker plays missions of one world after the other, plan by plan
+def _ways_of(ground: Ground) -> Ways:
+    return Ways(ground.world, ground.costs)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TeamTask:
     """Missions of one plan from which the same robots leave: all that a worker needs.
 
     Attributes:
-        world, costs: The world and its fuel costs, by robot.
+        world: The world.
+        ground: What the ways of its robots depend on.
         orders: The robots' orders.
         keys: The missions.
         traced: Whether poses are kept, by mission.
@@ -45,7 +74,7 @@ class TeamTask:
     """
 
     world: World
-    costs: Mapping[str, FuelCosts]
+    ground: Ground
     orders: tuple[Assignment, ...]
     keys: tuple[MissionKey, ...]
     traced: tuple[bool, ...]
@@ -55,9 +84,9 @@ class TeamTask:
 
 def play_missions(task: TeamTask) -> tuple[TeamDriven, ...]:
     """Play the missions of a task."""
-    world, ways = task.world, Ways(task.world, task.costs)
+    world, ways = task.world, _ways_of(task.ground)
     _, fates, _ = task.keys[0]
-    leaves = [fate.before_poi > 0 and bool(own.route) for fate, own in zip(fates, task.orders, strict=True)]
+    leaves = tuple(fate.before_poi > 0 and bool(own.route) for fate, own in zip(fates, task.orders, strict=True))
     order = first_order(ways, task.orders, leaves) if world.interaction == "shared" else None
     played = []
     for (_, own, rollout), traced in zip(task.keys, task.traced, strict=True):
@@ -81,17 +110,18 @@ def execute_team(
         world, costs, cases, settings, executor, progress: As of ``execute``.
         known: Missions played already; what is played now is added.
     """
-    planned, ways = planned_legs(world, costs, cases), Ways(world, costs)
+    planned, ground = planned_legs(world, costs, cases), ground_of(world, costs)
+    ways = _ways_of(ground)
     teams = [_Team(world, ways, case, orders_of(world, case, planned), settings) for case in cases]
-    _play_all(world, costs, settings, [(team.orders, key, traced) for team in teams
+    _play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
                                        for key, traced in team.unfailed().items()], executor, progress, known)
-    _play_all(world, costs, settings, [(team.orders, key, traced) for team in teams
+    _play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
                                        for key, traced in team.failed(known).items()], executor, progress, known)
     return [team.executed(costs, known) for team in teams]
 
 
 def _play_all(
-    world: World, costs: Mapping[str, FuelCosts], settings: Settings,
+    world: World, ground: Ground, settings: Settings,
     wanted: Sequence[tuple[Sequence[Assignment], MissionKey, bool]], executor: Executor | None,
     progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven],
 ) -> None:
@@ -109,7 +139,7 @@ def _play_all(
         keys = list(group)
         for first in range(0, len(keys), _CHUNK):
             mine = tuple(keys[first:first + _CHUNK])
-            tasks.append(TeamTask(world=world, costs=costs, orders=tuple(orders_of_routes[routes]), keys=mine,
+            tasks.append(TeamTask(world=world, ground=ground, orders=tuple(orders_of_routes[routes]), keys=mine,
                                   traced=tuple(group[key] for key in mine), seed=settings.seed,
                                   fidelity=settings.fidelity))
     count, of = 0, sum(len(task.keys) for task in tasks)

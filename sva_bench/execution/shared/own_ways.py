@@ -15,8 +15,9 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.legs import Leg
-from sva_bench.execution.shared.lanes import Cut, cut
+from sva_bench.execution.shared.lanes import Cut, Order, cut
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.mission.plan import Route
 from sva_bench.robot.follower import Stretch, arc_lengths, stretches
 from sva_bench.robot.model import RobotModel
 from sva_bench.travel.alternatives import alternatives, way_round
@@ -53,6 +54,10 @@ class Ways:
     Args:
         world: The world.
         costs: Fuel costs by robot.
+
+    Attributes:
+        gap_m: Least gap between two hulls in cells that exclude each other [m].
+        orders: Plans in space and time made already, by the routes of the robots.
     """
 
     def __init__(self, world: World, costs: Mapping[str, FuelCosts]) -> None:
@@ -60,6 +65,7 @@ class Ways:
         berths = place_berths(world)
         self._own = [own_world(world, berths, number) for number in range(len(world.robots))]
         self._sites = [{site.name: site for site in own.sites} for own in self._own]
+        self.orders: dict[tuple[Route, ...], Order | None] = {}
         self._shortest: dict[tuple[int, str, str], Cut] = {}
         self._roadmaps: dict[int, Roadmap] = {}
         located = world.noise.localisation

@@ -15,6 +15,7 @@ from sva_bench.execution.outcome import Assignment
 from sva_bench.execution.shared.lanes import Cut, Itinerary, Lane, Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.space_time import plan_order
+from sva_bench.mission.plan import Route
 
 
 def first_order(ways: Ways, orders: Sequence[Assignment], leaves: Sequence[bool]) -> Order | None:
@@ -28,9 +29,15 @@ def first_order(ways: Ways, orders: Sequence[Assignment], leaves: Sequence[bool]
     Returns:
         The order; ``None`` if there is none.
     """
+    routes = tuple(own.route if goes else () for own, goes in zip(orders, leaves, strict=True))
+    if routes not in ways.orders:
+        ways.orders[routes] = _first_order(ways, orders, routes)
+    return ways.orders[routes]
+
+
+def _first_order(ways: Ways, orders: Sequence[Assignment], routes: Sequence[Route]) -> Order | None:
     itineraries = []
-    for number, own in enumerate(orders):
-        route = own.route if leaves[number] else ()
+    for number, (own, route) in enumerate(zip(orders, routes, strict=True)):
         legs = tuple(ways.candidates(number, a, b) for a, b in pairwise(route))
         itineraries.append(_itinerary(ways, number, ways.start(number), 0.0, legs,
                                       _stops_s(own, route[1:], 0.0, [leg[0].lasts_s for leg in legs])))

@@ -61,7 +61,8 @@ class Robot(Protocol):
         idle: Share of fuel that it burns waiting.
         waited: Control steps of waiting on its leg.
         wait_count, pose_count: How many waits and poses were kept.
-        checked_m, checked_rad, checked_steps: Arc and yaw at the last check for being stuck, steps on the way since.
+        checked_m, checked_rad, checked_steps: Arc and yaw when it was last checked for being stuck, and steps on the
+            way since.
     """
 
     radius: float

@@ -13,7 +13,7 @@ from sva_bench.execution.engines.bullet import BulletTeam
 from sva_bench.execution.shared.driver import LegSoFar, Member
 from sva_bench.execution.shared.motion import TeamMotion
 from sva_bench.execution.shared.state import STANDS
-from sva_bench.execution.shared.ticks import GO, IS_STUCK, TOUCH, begin_tick, end_tick, stop_robot
+from sva_bench.execution.shared.ticks import GO, IS_STUCK, TOUCH, drive_on, moved, stop_robot
 from sva_bench.execution.shared.ways import Ways
 from sva_bench.execution.touch import Touch, solid_at
 from sva_bench.geometry.obstacles import Obstacles
@@ -65,13 +65,13 @@ class TeamBullet(TeamMotion):
 
     def _until_something(self, ways: Ways) -> int:
         robots, teams, notes, world = self._robots, self._teams, self._notes, self._world
-        wheels, poses = np.zeros((len(robots), 2)), np.zeros((len(robots), 3))
+        left, right, poses = robots["left"], robots["right"], np.zeros((len(robots), 3))
         while True:
-            code: int = begin_tick(robots, teams, ways, notes, self._parts, wheels)
+            code: int = drive_on(robots, teams, ways, notes, self._parts, False)
             if code != GO:
                 return code
-            met = world.step(wheels, poses)
-            end_tick(robots, teams, notes, poses)
+            met = world.step(list(zip(left.tolist(), right.tolist(), strict=True)), poses)
+            moved(robots, teams, notes, poses)
             self._note_touches()
             for robot in world.faults():
                 if robots["doing"][robot] != STANDS:

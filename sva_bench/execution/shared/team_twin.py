@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from sva_bench.execution.shared.driver import Member
 from sva_bench.execution.shared.motion import TeamMotion
-from sva_bench.execution.shared.ticks import drive_twins
+from sva_bench.execution.shared.ticks import drive_on
 from sva_bench.execution.shared.ways import Ways
 
 
@@ -27,5 +27,5 @@ class TeamTwin(TeamMotion):
         super().__init__(members, traced=traced)
 
     def _until_something(self, ways: Ways) -> int:
-        code: int = drive_twins(self._robots, self._teams, ways, self._notes, self._parts)
+        code: int = drive_on(self._robots, self._teams, ways, self._notes, self._parts, True)
         return code

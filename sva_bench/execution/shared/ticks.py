@@ -25,7 +25,7 @@ from sva_bench.execution.shared.state import (
     Robot,
     Team,
 )
-from sva_bench.execution.shared.ways import ENDS_LEG, GOES_ON, Ways
+from sva_bench.execution.shared.ways import ENDS_LEG, GOES_ON, Stretch, Ways
 from sva_bench.robot.disturbance import error_at
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, NO_LINE, braked, control, wrap
 from sva_bench.robot.twin import advance, delayed
@@ -44,129 +44,158 @@ _SPARE = 4  # waits for which there is always room
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def command_all(robots: Records, team: Team, ways: Ways, notes: Notes, parts: FloatArray) -> int:
-    """Give each robot its command of this control step, and pass over time in which nobody moves.
+def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: FloatArray, by_twin: bool) -> int:
+    """Command robots, and move them as unicycles unless something else moves them, until something happens.
+
+    One long function, for in compiled code passing arrays on takes longer than a control step.
 
     Args:
-        robots, team: Their records, changed in place.
+        robots, teams: The records, changed in place.
         ways: What they drive.
         notes: What is noted of them, changed in place.
         parts: Room for ``error_at``.
+        by_twin: Whether to move them; else it comes back as soon as all have their commands, with ``GO``.
 
     Returns:
-        ``GO`` if the robots are to be moved, else why not.
+        Why it came back.
     """
+    team, stretches, path, arc, need = teams[0], ways.stretches, ways.path, ways.arc, ways.need
+    holds, waits, poses, near, touched = notes.holds, notes.waits, notes.poses, notes.near, notes.touched
+    room, kept_room = waits.shape[1] - _SPARE, poses.shape[1]
     while True:
-        happened, busy, still = False, False, True
+        happened, busy, still, full = False, False, True, False
         for i in range(len(robots)):
             robot = robots[i]
-            if robot.doing != STANDS and (robot.wait_count > notes.waits.shape[1] - _SPARE or (
-                    team.traced and robot.pose_count >= notes.poses.shape[1])):
-                return FULL
-        for i in range(len(robots)):
-            robot = robots[i]
+            if robot.wait_count > room or (team.traced and robot.pose_count >= kept_room):
+                full = True
+                break
             if not robot.commanded:
-                _command(robots, i, team, ways, notes, parts)
+                robot.left = robot.right = 0.0
+                robot.at_rest = True
+                cause = -1
+                if robot.doing != STANDS and robot.open_to < robot.cells:
+                    cause = blocker(robots, robot, need)
+                if robot.doing == READY and robot.ready_s <= team.now * _DT + _SAME_S:
+                    _set_off(robot, team, waits[i], cause)
+                if robot.doing == DRAINS:
+                    _drain(robot, stretches[robot.stretch])
+                if robot.doing == DRIVES:
+                    x, y, yaw = robot.pose[0], robot.pose[1], robot.pose[2]
+                    if robot.lost:
+                        ex, ey, eyaw = error_at(robot.waves, parts, x, y)
+                        x, y, yaw = x + ex, y + ey, yaw + eyaw
+                    while True:
+                        stretch = stretches[robot.stretch]
+                        hold_m = holds[i, robot.hold, 0] if robot.hold < robot.hold_count else NO_LINE
+                        line, why = line_of(robot, team, stretch.before_m, cause, hold_m)
+                        if team.braking and robot.follow[0] != DRIVE:
+                            braked(robot.limits, robot.follow, _DT)
+                        else:
+                            control(path[stretch.first:stretch.end], arc[stretch.first:stretch.end], stretch.heading,
+                                    robot.limits, robot.follow, x, y, yaw, _DT, line)
+                        if robot.follow[4] == 0.0 and robot.follow[0] != ARRIVED:
+                            _goes(robot, team, stretch, yaw)
+                            break
+                        if robot.follow[0] == ARRIVED and (
+                                stretch.ends != ENDS_LEG or robot.hold >= robot.hold_count):
+                            if _stretch_over(robot, stretch):
+                                break
+                        elif _is_held(robot, stretch, holds[i], waits[i], why):
+                            break
                 robot.commanded = robot.event == 0
             happened = happened or robot.event != 0
             busy = busy or robot.doing != STANDS
             still = still and robot.at_rest
+        if full:
+            return FULL
         if happened:
             return EVENT
         if not busy:
             return NOBODY
-        if not still:
+        if still:
+            steps = 1 if team.braking else _steps_to_wait(robots, team)
+            _pass_over(robots, team, waits, abs(steps))
+            if team.braking:
+                return REST
+            if steps < 0:
+                return DEADLOCK
+            continue
+        if not by_twin:
             return GO
-        if team.braking:
-            return REST
-        steps = _steps_to_wait(robots, team)
-        if steps < 0:
-            return DEADLOCK
-        _pass_over(robots, team, notes.waits, steps)
+        for i in range(len(robots)):
+            robot = robots[i]
+            if robot.left != 0.0 or robot.right != 0.0:
+                advance(robot.pose, robot.left * robot.gain_left, robot.right * robot.gain_right,
+                        robot.track * robot.track_gain, _DT)
+            _count(robot, team, poses, i)
+        team.now += 1
+        came = False
+        for i in range(len(robots)):
+            for j in range(i):
+                dx, dy = robots[i].pose[0] - robots[j].pose[0], robots[i].pose[1] - robots[j].pose[1]
+                apart, hulls = dx * dx + dy * dy, robots[i].radius + robots[j].radius
+                if apart < hulls * hulls:
+                    if not near[j, i]:
+                        near[j, i] = touched[j, i] = came = True
+                elif near[j, i] and apart > (hulls + _FREE_M) ** 2:
+                    near[j, i] = False
+        if came:
+            return TOUCH
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _command(robots: Records, i: int, team: Team, ways: Ways, notes: Notes, parts: FloatArray) -> None:
-    """Set a robot's wheels for this control step, or say that its leg is over."""
-    robot = robots[i]
-    robot.left = robot.right = 0.0
-    robot.at_rest = True
-    if robot.doing == STANDS:
-        return
-    cause = blocker(robots, robot, ways.need)
-    if robot.doing == READY:
-        if robot.ready_s > team.now * _DT + _SAME_S:
-            return
-        if team.braking or (cause >= 0 and robot.open_to <= robot.first_cell):
-            if not _spent(robot):
-                wait(robot, notes.waits[i], BRAKED if team.braking else cause, 1)
-            return
-        robot.doing = DRIVES
-        robot.cell = robot.first_cell
-    if robot.doing == DRAINS:
-        if robot.drained < robot.delay:
-            _drain(robot)
-            return
-        robot.doing = DRIVES
-        if _hop_over(robot, ways):
-            return
-    x, y, yaw = robot.pose[0], robot.pose[1], robot.pose[2]
-    if robot.lost:
-        ex, ey, eyaw = error_at(robot.waves, parts, x, y)
-        x, y, yaw = x + ex, y + ey, yaw + eyaw
-    while not _drive(robot, i, team, ways, notes, cause, x, y, yaw):
-        pass
+def _set_off(robot: Robot, team: Team, waits: FloatArray, cause: int) -> None:
+    """Let a robot whose time has come begin its leg, or wait."""
+    if not team.braking and (cause < 0 or robot.open_to > robot.first_cell):
+        robot.doing, robot.cell = DRIVES, robot.first_cell
+    elif not _spent(robot):
+        wait(robot, waits, BRAKED if team.braking else cause, 1)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _drive(robot: Robot, i: int, team: Team, ways: Ways, notes: Notes, cause: int, x: float, y: float, yaw: float
-           ) -> bool:
-    """Command a robot on its way; False = its stretch or a hold ended, which takes no time: ask again."""
-    stretch, follow = ways.stretches[robot.stretch], robot.follow
+def _goes(robot: Robot, team: Team, stretch: Stretch, yaw: float) -> None:
+    """Let a robot that nothing holds do what its follower says."""
+    robot.cell = max(robot.cell, robot.first_cell + cell_at(
+        stretch.before_m + robot.follow[1], robot.end_cell - robot.first_cell))
     if robot.taken >= stretch.patience:
         stop(robot, IS_STUCK)
-        return True
-    hold_m = notes.holds[i, robot.hold, 0] if robot.hold < robot.hold_count else NO_LINE
-    line, cause = line_of(robot, team, stretch.before_m, cause, hold_m)
-    if team.braking and follow[0] != DRIVE:
-        braked(robot.limits, follow, _DT)
-    else:
-        control(ways.path[stretch.first:stretch.end], ways.arc[stretch.first:stretch.end], stretch.heading,
-                robot.limits, follow, x, y, yaw, _DT, line)
-    robot.cell = max(robot.cell, robot.first_cell + cell_at(
-        stretch.before_m + follow[1], robot.end_cell - robot.first_cell))
-    if follow[0] == ARRIVED:
-        if stretch.ends != ENDS_LEG or robot.hold >= robot.hold_count:
-            return bool(_stretch_over(robot, ways))
-        follow[4], cause = 1.0, -2 - robot.hold  # a hold at the end of the leg
-    if _spent(robot):
-        return True
-    if follow[4] == 1.0:
-        if cause < BRAKED and follow[2] == 0.0 and _hold_over(robot, int(notes.holds[i, robot.hold, 1])):
-            return False
-        wait(robot, notes.waits[i], cause, 1)
-    else:
+    elif not _spent(robot):
         robot.taken += 1
         robot.steps += 1
-        robot.checked_steps += follow[0] == DRIVE
+        robot.checked_steps += robot.follow[0] == DRIVE
         if team.checked and robot.taken % STUCK_STEPS == 0 and _hardly_moved(robot, yaw):
             stop(robot, IS_STUCK)
-            return True
-    _obey(robot, follow[2], follow[3], follow[4] == 1.0)
+        else:
+            _obey(robot, robot.follow[2], robot.follow[3], False)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _is_held(robot: Robot, stretch: Stretch, holds: FloatArray, waits: FloatArray, cause: int) -> bool:
+    """Let a robot that something holds brake or stand; False = its hold is over, so ask again."""
+    robot.cell = max(robot.cell, robot.first_cell + cell_at(
+        stretch.before_m + robot.follow[1], robot.end_cell - robot.first_cell))
+    if robot.follow[0] == ARRIVED:
+        cause = -2 - robot.hold  # a hold at the end of the leg
+    if _spent(robot):
+        return True
+    if cause < BRAKED and robot.follow[2] == 0.0 and _hold_over(robot, int(holds[robot.hold, 1])):
+        return False
+    wait(robot, waits, cause, 1)
+    _obey(robot, robot.follow[2], robot.follow[3], True)
     return True
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _stretch_over(robot: Robot, ways: Ways) -> bool:
-    """Go on to the next stretch, or stop at the end of the hop; whether the robot has its command."""
-    if ways.stretches[robot.stretch].ends == GOES_ON:
+def _stretch_over(robot: Robot, stretch: Stretch) -> bool:
+    """Go on to the next stretch, or stop at the end of the hop; False = it has no command yet, so ask again."""
+    if stretch.ends == GOES_ON:
         begin_stretch(robot, robot.stretch + 1)
-        return False
-    if robot.delay > 0:
+    elif robot.delay > 0:
         robot.doing, robot.drained = DRAINS, 0
-        _drain(robot)
-        return True
-    return bool(_hop_over(robot, ways))
+        _drain(robot, stretch)
+    else:
+        _hop_over(robot, stretch)
+    return bool(robot.doing != DRIVES)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -182,9 +211,12 @@ def _hold_over(robot: Robot, lasts: int) -> bool:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _drain(robot: Robot) -> None:
-    """Let a robot at a stop obey one of the commands that are still under way."""
-    if not _spent(robot):
+def _drain(robot: Robot, stretch: Stretch) -> None:
+    """Let a robot at a stop obey one of the commands that are still under way; without any its hop is over."""
+    if robot.drained == robot.delay:
+        robot.doing = DRIVES
+        _hop_over(robot, stretch)
+    elif not _spent(robot):
         robot.drained += 1
         robot.steps += 1
         _obey(robot, 0.0, 0.0, False)
@@ -224,18 +256,16 @@ def stop(robot: Robot, event: int) -> None:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _hop_over(robot: Robot, ways: Ways) -> bool:
-    """End a robot's hop; whether its leg is over with it."""
+def _hop_over(robot: Robot, stretch: Stretch) -> None:
+    """End a robot's hop, and its leg if that was the last."""
     robot.hops_s += robot.steps * _DT
     robot.steps = 0
-    if ways.stretches[robot.stretch].ends != ENDS_LEG:
+    if stretch.ends != ENDS_LEG:
         begin_stretch(robot, robot.stretch + 1)
-        return False
+        return
     robot.cell = robot.end_cell - 1
-    too_late = (robot.hops_s > robot.driving_s
-                or robot.hops_s + robot.idle * robot.waited * _DT > robot.fuel_s)
+    too_late = robot.hops_s > robot.driving_s or robot.hops_s + robot.idle * robot.waited * _DT > robot.fuel_s
     stop(robot, HAS_ENDED if too_late else HAS_ARRIVED)
-    return True
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -257,7 +287,7 @@ def _hardly_moved(robot: Robot, yaw: float) -> bool:
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _steps_to_wait(robots: Records, team: Team) -> int:
-    """Control steps until something changes though nobody moves; -1 = never."""
+    """Control steps until something changes though nobody moves; -1 = nothing ever does."""
     least = -1
     for i in range(len(robots)):
         robot, steps = robots[i], -1
@@ -293,73 +323,26 @@ def _pass_over(robots: Records, team: Team, waits: FloatArray, steps: int) -> No
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def look(robots: Records, team: Team, notes: Notes, by_distance: bool) -> bool:
-    """End a control step after the robots moved: clock, kept poses, and hulls that touch.
-
-    Args:
-        robots, team, notes: As of ``command_all``.
-        by_distance: Whether contact is told from the distance of the robots.
-
-    Returns:
-        Whether a pair came to touch.
-    """
-    came = False
-    for i in range(len(robots)):
-        robot = robots[i]
-        robot.commanded = False
-        if robot.doing == STANDS or (robot.doing == READY and robot.ready_s > team.now * _DT + _SAME_S):
-            continue
-        robot.elapsed += 1
-        if team.traced and robot.elapsed % _KEPT_STEPS == 0 and not robot.at_rest:
-            kept = notes.poses[i, robot.pose_count]
-            kept[0], kept[1], kept[2], kept[3] = robot.elapsed, robot.pose[0], robot.pose[1], robot.pose[2]
-            robot.pose_count += 1
-    team.now += 1
-    if by_distance:
-        for i in range(len(robots)):
-            for j in range(i):
-                dx, dy = robots[i].pose[0] - robots[j].pose[0], robots[i].pose[1] - robots[j].pose[1]
-                apart, hulls = dx * dx + dy * dy, robots[i].radius + robots[j].radius
-                if apart < hulls * hulls and not notes.near[j, i]:
-                    notes.near[j, i] = notes.touched[j, i] = came = True
-                elif notes.near[j, i] and apart > (hulls + _FREE_M) ** 2:
-                    notes.near[j, i] = False
-    return came
+def _count(robot: Robot, team: Team, poses: FloatArray, i: int) -> None:
+    """End a control step of a robot after it was moved, and keep its pose."""
+    robot.commanded = False
+    if robot.doing == STANDS or (robot.doing == READY and robot.ready_s > team.now * _DT + _SAME_S):
+        return
+    robot.elapsed += 1
+    if team.traced and robot.elapsed % _KEPT_STEPS == 0 and not robot.at_rest:
+        k = robot.pose_count
+        poses[i, k, 0] = robot.elapsed
+        poses[i, k, 1], poses[i, k, 2], poses[i, k, 3] = robot.pose[0], robot.pose[1], robot.pose[2]
+        robot.pose_count += 1
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def drive_twins(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: FloatArray) -> int:
-    """Drive unicycles until something happens; why it came back."""
-    team = teams[0]
-    while True:
-        code: int = command_all(robots, team, ways, notes, parts)
-        if code != GO:
-            return code
-        for i in range(len(robots)):
-            robot = robots[i]
-            if robot.left != 0.0 or robot.right != 0.0:
-                advance(robot.pose, robot.left * robot.gain_left, robot.right * robot.gain_right,
-                        robot.track * robot.track_gain, _DT)
-        if look(robots, team, notes, True):
-            return TOUCH
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def begin_tick(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: FloatArray, wheels: FloatArray) -> int:
-    """``command_all``; ``wheels`` receives the speeds of the left and the right wheels [m/s], shape (n, 2)."""
-    code: int = command_all(robots, teams[0], ways, notes, parts)
+def moved(robots: Records, teams: Records, notes: Notes, poses: FloatArray) -> None:
+    """End a control step after something else moved the robots to ``poses``, shape (n, 3)."""
     for i in range(len(robots)):
-        wheels[i, 0], wheels[i, 1] = robots[i].left, robots[i].right
-    return code
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def end_tick(robots: Records, teams: Records, notes: Notes, poses: FloatArray) -> None:
-    """``look``, where others moved the robots to ``poses``, shape (n, 3), and tell of contacts."""
-    for i in range(len(robots)):
-        for axis in range(3):
-            robots[i].pose[axis] = poses[i, axis]
-    look(robots, teams[0], notes, False)
+        robots[i].pose[0], robots[i].pose[1], robots[i].pose[2] = poses[i, 0], poses[i, 1], poses[i, 2]
+        _count(robots[i], teams[0], notes.poses, i)
+    teams[0].now += 1
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

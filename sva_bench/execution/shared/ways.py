@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,28 @@ GOES_ON, ENDS_HOP, ENDS_LEG = 0, 1, 2
 """How a stretch ends: at a corner, at a stop that is no site of the route, at one that is."""
 
 
+
+class Stretch(Protocol):
+    """A record of a stretch.
+
+    Attributes:
+        first, end: Its first vertex, and that of the next stretch.
+        heading: Heading at its end [rad].
+        before_m: Way of its leg before it [m].
+        patience: Control steps after which it counts as stuck if unfinished.
+        ends: How it ends.
+    """
+
+    first: int
+    end: int
+    heading: float
+    before_m: float
+    patience: int
+    ends: int
+
+
 STRETCH = np.dtype([("first", np.int64), ("end", np.int64), ("heading", np.float64), ("before_m", np.float64),
                     ("patience", np.int64), ("ends", np.int64)], align=True)
-"""First vertex, and that of the next stretch; heading at its end [rad]; way of its leg before it [m]; control steps
-after which it counts as stuck if unfinished; and how it ends."""
 
 
 class Ways(NamedTuple):

@@ -1,0 +1,310 @@
+"""A team of twins: each drives as it would by itself, but for gates, holds, the brake and its budgets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sva_bench.execution.shared.driver import Hold, Member
+from sva_bench.execution.shared.lanes import Cut
+from sva_bench.execution.shared.team_twin import TeamTwin
+from sva_bench.robot.disturbance import UNDISTURBED, Disturbance, ErrorField
+from sva_bench.robot.follower import CONTROL_HZ, stretches
+from sva_bench.robot.twin import drive
+from tests.execution.shared.teams import (
+    CORRIDOR,
+    CROSSING,
+    DOOR,
+    MODEL,
+    Mission,
+    Place,
+    Tour,
+    cuts_of,
+    geared,
+    lane_of,
+    members_of,
+    planned,
+)
+
+NOISY = Disturbance(wheel_gains=(1.01, 0.99), track_gain=1.02, delay_s=0.08,
+                    field=ErrorField(sd_m=0.05, sd_rad=0.035, length_m=0.5, seed=(1, 2)))
+AHEAD: Tour = [[(0.0, 0.0), (4.0, 0.0)]]
+TOURS = {"corridor": CORRIDOR, "door": DOOR, "crossing": CROSSING}
+TICK_S = 1.0 / CONTROL_HZ
+
+corners = st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4)), min_size=1, max_size=4)
+
+
+# One robot
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(corners, min_size=1, max_size=3), st.sampled_from([UNDISTURBED, NOISY]), st.floats(0.0, 7.0))
+def test_a_robot_without_gates_takes_the_twins_times_and_way_to_the_bit(
+        places: list[list[tuple[float, float]]], disturbance: Disturbance, ready_s: float) -> None:
+    tour: list[list[Place]] = []
+    for path in places:
+        tour.append([tour[-1][-1] if tour else (0.5, 0.5), *path])
+    cuts = cuts_of(tour)
+    pose = disturbance.start((0.5, 0.5, 0.0))
+    driver = TeamTwin(members_of([tour], [disturbance]), traced=True)
+    driver.assign(0, lane_of(cuts), None)
+    for each in cuts:
+        driver.start_leg(0, ready_s, math.inf, ())
+        assert driver.run().kind == "arrived"
+        time_s, trace = drive(MODEL, each.leg[0], pose, disturbance, traced=True)
+        leg = driver.leg(0)
+        assert leg.driving_s == time_s
+        assert driver.pose(0) == tuple(pose.tolist())
+        assert not leg.waits
+        assert leg.clock_s == ready_s + time_s
+        steps = np.round(leg.since_s * CONTROL_HZ).astype(int)
+        assert not len(trace) or np.array_equal(leg.pose, trace[steps - 1])
+        ready_s = leg.clock_s + 1.3
+    assert driver.run().kind == "idle"
+
+
+def test_a_leg_of_several_hops_takes_the_sum_of_their_times() -> None:
+    hops = (stretches(np.array([[0.0, 0.0], [2.0, 0.0]]), 1.0), stretches(np.array([[2.0, 0.0], [2.0, 2.0]]), 0.0))
+    pose, alone = np.zeros(3), 0.0
+    for hop in hops:
+        alone += drive(MODEL, hop, pose, NOISY)[0]
+    lane = lane_of([Cut(leg=hops, place_m=np.zeros((40, 2)), enter_s=np.arange(40.0), lasts_s=alone)])
+    driver = TeamTwin([Member(model=MODEL, start=(0.0, 0.0, 0.0), disturbance=NOISY)])
+    driver.assign(0, lane, None)
+    driver.start_leg(0, 0.0, math.inf, ())
+    driver.run()
+    assert driver.leg(0).driving_s == alone
+    assert driver.pose(0) == tuple(pose.tolist())
+    assert driver.cell(0) == 39
+
+
+@pytest.mark.parametrize("disturbance", [UNDISTURBED, NOISY], ids=["ideal", "noisy"])
+def test_a_hold_stops_a_robot_where_it_is_for_as_long_as_it_lasts(disturbance: Disturbance) -> None:
+    alone = TeamTwin(members_of([AHEAD], [disturbance]), traced=True)
+    held = TeamTwin(members_of([AHEAD], [disturbance]), traced=True)
+    door = Hold(along_m=2.0, lasts_s=5.0, cause="door")
+    for driver, holds in ((alone, []), (held, [door])):
+        driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+        driver.start_leg(0, 0.0, math.inf, holds)
+        assert driver.run().kind == "arrived"
+    leg = held.leg(0)
+    (wait,) = leg.waits
+    assert wait.hold == "door"
+    assert wait.robot is None
+    assert wait.lasts_s == pytest.approx(5.0 + 0.5, abs=0.5)  # braking from 0.65 m/s at 0.68 m/s2 takes 0.96 s
+    assert wait.lasts_s > 5.0
+    stood = leg.pose[np.argmax(np.diff(leg.since_s)), 0]
+    assert stood == pytest.approx(2.0, abs=0.12 if disturbance is NOISY else 0.01)
+    assert leg.driving_s == pytest.approx(alone.leg(0).driving_s, abs=1.0)
+    assert leg.clock_s == pytest.approx(leg.driving_s + wait.lasts_s)
+
+
+@pytest.mark.parametrize("along_m", [0.0, 4.0, 99.0])
+def test_a_hold_at_either_end_of_a_leg_is_served_too(along_m: float) -> None:
+    driver = TeamTwin(members_of([AHEAD]))
+    driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+    driver.start_leg(0, 0.0, math.inf, [Hold(along_m=along_m, lasts_s=2.0, cause="people")] * 2)
+    assert driver.run().kind == "arrived"
+    assert 4.0 <= sum(wait.lasts_s for wait in driver.leg(0).waits) < 5.0  # braking for it counts
+
+
+def test_a_robot_ends_when_its_driving_time_is_over_and_stands_there() -> None:
+    driver = TeamTwin(members_of([AHEAD]))
+    driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+    driver.start_leg(0, 1.0, 3.3333, ())
+    happening = driver.run()
+    assert (happening.kind, happening.robot, happening.clock_s) == ("ended", 0, 1.0 + 3.3333)
+    assert driver.leg(0).driving_s == 3.3333
+    # 3.33 s at up to 0.65 m/s, of which 0.81 s to come up to speed: 1.90 m.
+    assert driver.arc_m(0) == pytest.approx(1.90, abs=0.05)
+    assert driver.run().kind == "idle"
+
+
+def test_a_robot_whose_driving_time_is_just_enough_arrives() -> None:
+    cuts = cuts_of(AHEAD)
+    for driving_s, kind in ((cuts[0].lasts_s, "arrived"), (np.nextafter(cuts[0].lasts_s, 0.0), "ended")):
+        driver = TeamTwin(members_of([AHEAD]))
+        driver.assign(0, lane_of(cuts), None)
+        driver.start_leg(0, 0.0, float(driving_s), ())
+        assert driver.run().kind == kind
+
+
+def test_waiting_burns_the_idle_share_of_fuel_and_no_driving_time() -> None:
+    # 10 s of fuel, of which a hold of 60 s takes a tenth of its time: after 6 s of fuel burnt there 4 are left at most.
+    driver = TeamTwin(members_of([AHEAD]))
+    driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+    driver.start_leg(0, 0.0, math.inf, [Hold(along_m=2.0, lasts_s=60.0, cause="door")], fuel_s=10.0, idle_share=0.1)
+    assert driver.run().kind == "ended"
+    leg = driver.leg(0)
+    assert leg.driving_s + 0.1 * leg.waits[0].lasts_s == pytest.approx(10.0, abs=0.02)
+    # Dry while it stands: nothing is passed over beyond that.
+    driver = TeamTwin(members_of([AHEAD]))
+    driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+    driver.start_leg(0, 0.0, math.inf, [Hold(along_m=1.0, lasts_s=600.0, cause="door")], fuel_s=10.0, idle_share=0.1)
+    assert driver.run().kind == "ended"
+    leg = driver.leg(0)
+    assert leg.driving_s + 0.1 * leg.waits[0].lasts_s == pytest.approx(10.0, abs=0.02)
+    assert driver.arc_m(0) == pytest.approx(1.0, abs=0.03)
+
+
+# Teams
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.sampled_from(sorted(TOURS)), st.lists(st.floats(0.5, 1.2), min_size=4, max_size=4), st.floats(0.0, 0.15))
+def test_whatever_their_speeds_robots_on_a_planned_order_never_touch_and_always_end(
+        name: str, factors: list[float], delay_s: float) -> None:
+    tours = TOURS[name]
+    order = ORDERS[name]
+    disturbances = [Disturbance(wheel_gains=(factor, factor), delay_s=delay_s) for factor in factors[:len(tours)]]
+    mission = Mission(TeamTwin(members_of(tours, disturbances)), order.lanes, stop_s=3.0)
+    mission.begin(order)
+    assert mission.go_on().kind == "idle"
+    assert {happening.kind for happening in mission.happened} == {"arrived", "idle"}
+    assert [len(legs) for legs in mission.legs.values()] == [len(lane.cuts) for lane in order.lanes]
+
+
+ORDERS = {name: planned(tours, 3.0) for name, tours in TOURS.items()}
+
+
+@pytest.mark.parametrize("name", TOURS)
+def test_robots_that_drive_as_planned_end_when_planned(name: str) -> None:
+    order = ORDERS[name]
+    mission = Mission(TeamTwin(members_of(TOURS[name])), order.lanes, stop_s=3.0)
+    mission.begin(order)
+    mission.go_on()
+    # A gate lets a robot in when the other is out, the plan keeps 0.3 s between them.
+    assert mission.ends_s == pytest.approx(order.ends_s - 3.0, abs=3.0)
+
+
+def test_without_gates_the_same_robots_touch() -> None:
+    mission = Mission(TeamTwin(members_of(CROSSING)), ORDERS["crossing"].lanes)
+    mission.begin(None)
+    happening = mission.go_on()
+    assert (happening.kind, happening.robot, happening.other) == ("touch", 0, 1)
+    # Told once for the encounter: they stay within each other for a while.
+    rest = mission.go_on()
+    assert rest.kind in ("touch", "idle")
+    assert rest.clock_s > happening.clock_s + 1.0
+
+
+def test_a_wait_names_the_robot_that_is_waited_for_and_takes_no_driving_time() -> None:
+    order = ORDERS["crossing"]
+    free, gated = (Mission(TeamTwin(members_of(CROSSING)), order.lanes) for _ in range(2))
+    free.begin(None)
+    while free.go_on().kind != "idle":
+        pass
+    gated.begin(order)
+    gated.go_on()
+    waits = [(robot, wait) for robot, legs in gated.legs.items() for leg in legs for wait in leg.waits]
+    assert waits
+    assert all(wait.robot == 1 - robot and not wait.hold for robot, wait in waits)
+    for robot in (0, 1):
+        ready_s = 0.0
+        for one, other in zip(free.legs[robot], gated.legs[robot], strict=True):
+            assert other.driving_s <= one.driving_s + 1.2 * len(other.waits)  # it comes up to speed again
+            assert other.clock_s == pytest.approx(
+                ready_s + other.driving_s + sum(wait.lasts_s for wait in other.waits))
+            ready_s = other.clock_s
+
+
+def test_two_teams_drive_alike_to_the_bit() -> None:
+    ends = []
+    for _ in range(2):
+        mission = Mission(TeamTwin(members_of(DOOR, [NOISY] * 4)), ORDERS["door"].lanes, stop_s=1.0)
+        mission.begin(ORDERS["door"])
+        mission.go_on()
+        ends.append((mission.happened, [mission.driver.pose(robot) for robot in range(4)]))
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("at_s", [0.5, 4.0, 9.0, 17.0])
+@pytest.mark.parametrize("name", TOURS)
+def test_the_brake_brings_all_to_rest_within_their_gates_and_then_they_go_on(name: str, at_s: float) -> None:
+    tours, order = TOURS[name], ORDERS[name]
+    mission = Mission(TeamTwin(members_of(tours, [NOISY] * len(tours))), order.lanes, stop_s=1.0)
+    mission.begin(order)
+    driver = mission.driver
+    before = [driver.pose(robot) for robot in range(len(tours))]
+    while driver.clock_s < at_s:
+        if mission.go_on(until_s=at_s).kind == "idle":
+            break
+    driver.brake(on=True)
+    happening, arrived = driver.run(), []
+    while happening.kind == "arrived":
+        arrived.append(happening.robot)
+        mission.legs[happening.robot].append(driver.leg(happening.robot))
+        happening = driver.run()
+    assert happening.kind in ("rest", "idle")
+    stood = [driver.pose(robot) for robot in range(len(tours))]
+    assert before != stood
+    assert driver.run().kind == happening.kind  # nothing moves
+    assert [driver.pose(robot) for robot in range(len(tours))] == stood
+    for robot, needs in enumerate(order.needs):
+        for other, need in enumerate(needs):
+            assert driver.cell(other) >= need[driver.cell(robot)] or other == robot
+    driver.brake(on=False)
+    for robot, legs in mission.legs.items():
+        if robot in arrived and len(legs) < len(order.lanes[robot].cuts):
+            driver.start_leg(robot, driver.clock_s, math.inf, ())
+    assert mission.go_on().kind == "idle"
+    assert [len(legs) for legs in mission.legs.values()] == [len(lane.cuts) for lane in order.lanes]
+
+
+def test_a_dropped_robot_is_waited_for_by_nobody_and_stays_where_it_was() -> None:
+    # The first into the corridor stops for good on its way in: the others wait for it until it is dropped.
+    order = ORDERS["corridor"]
+    first = min(range(3), key=lambda robot: order.lanes[robot].enter_s[30])
+    for dropped in (False, True):
+        mission = Mission(TeamTwin(members_of(CORRIDOR)), order.lanes)
+        for robot, lane in enumerate(order.lanes):
+            mission.driver.assign(robot, lane, order.needs[robot])
+            mission.legs[robot] = []
+        for robot in range(3):
+            mission.driver.start_leg(robot, 0.0, 2.0 if robot == first else math.inf, ())
+        assert mission.go_on().kind == "ended"
+        place = mission.driver.pose(first)
+        if not dropped:
+            assert mission.go_on().kind == "deadlock"
+            continue
+        mission.driver.drop(first)
+        while (kind := mission.go_on().kind) == "touch":  # they drive through it
+            pass
+        assert kind == "idle"
+        assert mission.driver.pose(first) == place
+        assert [len(mission.legs[robot]) for robot in range(3)].count(2) == 2
+
+
+def test_time_in_which_all_stand_is_passed_over() -> None:
+    # An hour at a stop and an hour at a hold are not driven through: ten million control steps would take a second.
+    driver = TeamTwin(members_of([AHEAD]))
+    driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+    driver.start_leg(0, 3.6e6, math.inf, [Hold(along_m=2.0, lasts_s=3.6e6, cause="door")])
+    happening = driver.run()
+    assert happening.kind == "arrived"
+    assert happening.clock_s == pytest.approx(7.2e6 + cuts_of(AHEAD)[0].lasts_s, abs=2.0)
+
+
+def test_a_leg_is_not_started_twice_nor_beyond_the_last() -> None:
+    driver = TeamTwin(members_of([AHEAD]))
+    with pytest.raises(ValueError, match="no leg left"):
+        driver.start_leg(0, 0.0, math.inf, ())
+    driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+    driver.start_leg(0, 0.0, math.inf, ())
+    with pytest.raises(ValueError, match="drives one yet"):
+        driver.start_leg(0, 0.0, math.inf, ())
+    driver.run()
+    with pytest.raises(ValueError, match="no leg left"):
+        driver.start_leg(0, 0.0, math.inf, ())
+
+
+def test_a_robot_of_another_speed_keeps_its_own_figures() -> None:
+    mission = Mission(TeamTwin(members_of(CROSSING, [geared(0.5), geared(1.0)])), ORDERS["crossing"].lanes)
+    mission.begin(ORDERS["crossing"])
+    assert mission.go_on().kind == "idle"
+    assert mission.legs[0][0].driving_s > 1.6 * mission.legs[1][0].driving_s
