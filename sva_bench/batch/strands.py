@@ -12,7 +12,7 @@ from sva_bench.batch.reactions import ReactionsJob
 from sva_bench.batch.shards import Reactions
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import drives_ahead, planned_legs
-from sva_bench.study.costs import grounds_of, reach_of
+from sva_bench.study.costs import reach_of
 from sva_bench.study.options import Options, reactions_of, settings_of
 from sva_bench.study.planning import Planned, own_cases
 from sva_bench.study.summing import facts_of, head_of, proved
@@ -30,10 +30,10 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     left = [(first, count) for first, count in grid.ranges() if grid.unit_name(point, seed, first) not in done]
     if not left:
         return
-    grounds = grounds_of(world)
-    times = yield [TravelTimesJob(world=ground.world, model=ground.model, planner=point.planner)
-                   for ground in grounds.values()]
-    costs = {kind: fuel_costs(time, world.margin) for kind, time in zip(grounds, times, strict=True)}
+    kinds = {world.kind_of(robot): robot for robot in world.robots}
+    times = yield [TravelTimesJob(world=world, model=robot.model, planner=point.planner,
+                                  robot=robot.name if world.meets else None) for robot in kinds.values()]
+    costs = {kind: fuel_costs(time, world.margin) for kind, time in zip(kinds, times, strict=True)}
     (planned,) = yield [PlansJob(world=world, costs=costs, options=options)]
     cases = tuple(case for scenario in world.scenarios for case in own_cases(scenario, planned[scenario.name]))
     settings = settings_of(world, options)

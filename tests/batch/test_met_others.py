@@ -13,17 +13,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from sva_bench.__main__ import run_command_line
 from sva_bench.analysis.meetings import MetTally, interaction_summary, met_tally
 from sva_bench.batch.grid import Point
+from sva_bench.batch.jobs import TravelTimesJob
 from sva_bench.batch.schema import StoredMet, StoredNote
 from sva_bench.batch.shards import Unit, read_note, shard_of
 from sva_bench.batch.strands import facts_at
 from sva_bench.batch.tallies import join, scenario_of
 from sva_bench.execution.meetings import Meetings
 from sva_bench.files.records import as_dict, from_dict
+from sva_bench.robot.model import BUILT_IN
 from sva_bench.storage.tables import read_note_of
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.run import measure
+from sva_bench.world.model import World
+from sva_bench.world.noise import LocalisationError
 from tests.worlds_for_tests import SMALL, world_of
 
 EIGHT = Meetings(contacts=np.array([0, 1, 0, 0, 0, 2, 0, 0]), waited_s=np.array([0, 3.5, 1, 2, 0, 0, 9, 0.5]),
@@ -75,3 +80,54 @@ def test_sums_that_are_not_of_the_shards_trials_are_refused(change: dict[str, An
     plan["met"] = None if change is None else plan["met"] | change
     with pytest.raises(ValidationError, match=r"met|did to each other"):
         from_dict(StoredNote, told)
+
+
+# Berths
+
+
+TIGHT = """\
+format: sva-bench/world@1
+name: tight
+map: {shapes: {bounds_m: [0, 0, 8, 1.3]}}
+sites: {base: {at_m: [1, 0.5]}, pois: {p1: {at_m: [4, 0.6]}}}
+robots:
+  uv1: {model: turtlebot2, incentives: {p1: 1}}
+  uv2: {model: turtlebot2, incentives: {p1: 1}}
+"""
+
+
+def test_a_world_without_room_for_berths_is_given_up_and_the_others_go_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in (("tight", TIGHT), ("small", SMALL)):
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    words = ["batch", *(str(tmp_path / f"{name}.yaml") for name in ("tight", "small")), "--interaction", "shared",
+             "--trials", "2", "--rollouts", "1", "--fidelity", "kinematic", "--workers", "1", "--out",
+             str(tmp_path / "done"), "--cache", str(tmp_path / "cache")]
+    assert run_command_line(words) == 4
+    (failure,) = json.loads((tmp_path / "done" / "failures.json").read_text())["failures"]
+    assert failure["world"] == "tight"
+    assert "no room for 2 berths" in failure["reason"]
+    assert [path.name for path in (tmp_path / "done").glob("outcomes-*")] == ["outcomes-small-seed0.parquet"]
+    capsys.readouterr()
+
+
+def job_of(world: World, number: int) -> TravelTimesJob:
+    robot = world.robots[number]
+    return TravelTimesJob(world=world, model=robot.model, planner="prmstar",
+                          robot=robot.name if world.meets else None)
+
+
+def test_travel_times_are_shared_by_what_berths_depend_on_and_nothing_else(tmp_path: Path) -> None:
+    world = world_of(tmp_path, SMALL + "interaction: shared\n")
+    key = job_of(world, 0).key
+    poorer = replace(world, robots=tuple(replace(robot, incentives={}, fuel_capacity_s=9.0) for robot in world.robots))
+    assert job_of(poorer, 0).key == key
+    assert job_of(replace(world, interaction="uncoordinated"), 0).key == key
+    station = replace(world.sites[1], slots=2)
+    larger = replace(world.robots[1], model=BUILT_IN["jackal"])
+    unsure = replace(world.noise, localisation=LocalisationError(sd_m=0.05, sd_deg=1.0, length_m=3.0))
+    others = [job_of(world, 1), job_of(replace(world, interaction="independent"), 0),
+              job_of(replace(world, sites=(world.sites[0], station, *world.sites[2:])), 0),
+              job_of(replace(world, robots=(world.robots[0], larger)), 0), job_of(replace(world, noise=unsure), 0)]
+    assert len({key, *(job.key for job in others)}) == 1 + len(others)
