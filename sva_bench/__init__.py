@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from sva_bench.study.public.results import Result
     from sva_bench.study.public.runs import execute, record, run
     from sva_bench.study.public.worlds import load_world
+    from sva_bench.travel.berths import NoRoomForBerths, NoRoomForSlots
     from sva_bench.travel.fuel import FuelCosts
     from sva_bench.travel.times import NeverArrives, TravelTimes, UnreachableSite
     from sva_bench.workers.pool import WorkerLost
@@ -38,14 +39,15 @@ if TYPE_CHECKING:
 __version__: str
 __all__ = [
     "BadFile", "BadInput", "Certificate", "ComparisonSummary", "FuelCosts", "InfeasiblePlan", "Instance",
-    "NeverArrives", "Plan", "Result", "Summary", "SvaBenchError", "TravelTimes", "UnknownName", "UnreachableSite",
-    "WorkerLost", "World", "certify", "execute", "fuel_costs", "load_world", "make_instance", "plan", "record", "run",
-    "travel_times",
+    "NeverArrives", "NoRoomForBerths", "NoRoomForSlots", "Plan", "Result", "Summary", "SvaBenchError", "TravelTimes",
+    "UnknownName", "UnreachableSite", "WorkerLost", "World", "certify", "execute", "fuel_costs", "load_world",
+    "make_instance", "plan", "record", "run", "travel_times",
 ]
 _HOMES = {
     "BadFile": "errors", "BadInput": "errors", "Certificate": "mission.certify",
     "ComparisonSummary": "analysis.summaries", "FuelCosts": "travel.fuel", "InfeasiblePlan": "study.given_plans",
-    "Instance": "mission.instance", "NeverArrives": "travel.times", "Plan": "mission.plan",
+    "Instance": "mission.instance", "NeverArrives": "travel.times", "NoRoomForBerths": "travel.berths",
+    "NoRoomForSlots": "travel.berths", "Plan": "mission.plan",
     "Result": "study.public.results", "Summary": "analysis.summaries", "SvaBenchError": "errors",
     "TravelTimes": "travel.times", "UnknownName": "errors", "UnreachableSite": "travel.times",
     "WorkerLost": "workers.pool", "World": "world.model", "certify": "study.public.plans",

@@ -12,8 +12,8 @@ ROOT = Path(__file__).parents[1]
 FUNCTIONS = ("load_world", "travel_times", "fuel_costs", "make_instance", "plan", "certify", "execute", "run", "record")
 TYPES = ("World", "TravelTimes", "FuelCosts", "Instance", "Plan", "Certificate", "Result", "Summary",
          "ComparisonSummary")
-ERRORS = ("SvaBenchError", "BadInput", "BadFile", "UnknownName", "UnreachableSite", "NeverArrives", "InfeasiblePlan",
-          "WorkerLost")
+ERRORS = ("SvaBenchError", "BadInput", "BadFile", "UnknownName", "UnreachableSite", "NeverArrives",
+          "NoRoomForBerths", "NoRoomForSlots", "InfeasiblePlan", "WorkerLost")
 
 HEAD = """\
 # From Python

@@ -14,6 +14,7 @@ from sva_bench.analysis.moments import Figure
 from sva_bench.analysis.results import (
     MOST_AMOUNT,
     Estimate,
+    InteractionSummary,
     Ledger,
     PerfectInformation,
     PlanFigures,
@@ -144,9 +145,9 @@ def plan_result(promise: Promise, run: Executed, *, noisy: bool) -> PlanResult:
                      if (run.end[:, k] == ENDS.index(end)).any()} for k, name in enumerate(run.robots)}
     by_robot = {name: float(run.value[:, k].mean()) for k, name in enumerate(run.robots)}
     statistics = {key: estimate(found) for key, found in measured(run, noisy=noisy).items()}
-    sums = plan_figures(promise, estimate(figure), by_robot, counts, charges(run) / len(run.end), statistics)
-    own = vars(sums) | {"interaction": interaction_summary(run.meetings)}
-    return PlanResult(**own, executed_controlled=controlled(figure, promise.expected),
+    sums = plan_figures(promise, estimate(figure), by_robot, counts, charges(run) / len(run.end), statistics,
+                        interaction_summary(run.meetings))
+    return PlanResult(**vars(sums), executed_controlled=controlled(figure, promise.expected),
                       distribution=distribution(totals(run)), end_shares=shares,
                       bad=_share(bad_figure(run, noisy=noisy)))
 
@@ -173,7 +174,7 @@ def charges(run: Executed) -> FloatArray:
 
 def plan_figures(
     promise: Promise, executed: Estimate, by_robot: Mapping[str, float], ends: Mapping[End, int], charged: FloatArray,
-    statistics: Mapping[str, Estimate],
+    statistics: Mapping[str, Estimate], interaction: InteractionSummary | None = None,
 ) -> PlanFigures:
     """The results of one plan from sums over its trials.
 
@@ -184,8 +185,10 @@ def plan_figures(
         ends: Number of robot missions with each end.
         charged: Mean value lost to each end in ``EXECUTION_LOSSES``, shape (3,).
         statistics: The measured statistics, by key.
+        interaction: What robots did to each other; ``None`` where they do not meet.
     """
     return PlanFigures(**vars(promise), executed=executed, by_robot=by_robot, statistics=statistics,
+                       interaction=interaction,
                        ends={end: count for end, count in ends.items() if count},
                        ledger=ledger(promise, charged, executed.mean))
 

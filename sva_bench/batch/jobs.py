@@ -24,7 +24,7 @@ from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.robot.disturbance import UNDISTURBED
 from sva_bench.robot.model import RobotModel
-from sva_bench.study.costs import instance_of
+from sva_bench.study.costs import grounds_of, instance_of
 from sva_bench.study.options import Options
 from sva_bench.study.planning import Planned, plan_scenarios, with_calibration
 from sva_bench.travel.fuel import FuelCosts
@@ -34,7 +34,14 @@ from sva_bench.world.model import World
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TravelTimesJob:
-    """Plan the paths of one robot model in a world."""
+    """Plan the paths of one robot model in a world, or of one robot where robots meet.
+
+    Attributes:
+        world: The world.
+        model: The model.
+        planner: How.
+        robot: Name of the robot; ``None`` where robots do not meet, and those of a model are alike.
+    """
 
     kind: ClassVar[str] = "travel-times"
     kept: ClassVar[bool] = True
@@ -42,21 +49,29 @@ class TravelTimesJob:
     world: World
     model: RobotModel
     planner: PathPlanner
+    robot: str | None = None
 
     @property
     def key(self) -> str:
         """Obstacles and sites, not what robots earn, burn or fear: sweeps over those share it."""
         sites = [(site.name, site.x_m, site.y_m, site.heading_rad) for site in self.world.sites]
-        return digest(self.kind, self.world.obstacles, sites, self.model, self.planner)
+        if self.robot is None:
+            return digest(self.kind, self.world.obstacles, sites, self.model, self.planner)
+        names = [robot.name for robot in self.world.robots]
+        berths_by = ([site.slots for site in self.world.sites], self.world.noise.localisation,
+                     [robot.model.radius_m for robot in self.world.robots])
+        return digest(self.kind, self.world.obstacles, sites, self.model, self.planner, berths_by,
+                      names.index(self.robot))
 
     @property
     def what(self) -> str:
         """For a person."""
-        return f"travel times of {self.model.name}"
+        return f"travel times of {self.robot or self.model.name}"
 
     def run(self) -> TravelTimes:
-        """Plan them."""
-        return plan_travel_times(self.world, self.model, self.planner)
+        """Plan them; berths are found here too, since there may be no room for them."""
+        ground = self.world if self.robot is None else grounds_of(self.world)[self.robot].world
+        return plan_travel_times(ground, self.model, self.planner)
 
     def fits(self, result: TravelTimes) -> bool:
         """Of these sites and this robot, with a path and a time for each pair."""

@@ -106,6 +106,17 @@ class StoredFigure(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class StoredMet(Record):
+    """Sums over a plan's trials of what robots did to each other."""
+
+    missions: Annotated[_Count, Field(ge=1)]
+    contacts: _Count
+    waited_s: Annotated[_Sum, Field(ge=0)]
+    detours: _Count
+    exact: _Count
+
+
+@dataclass(frozen=True, kw_only=True)
 class StoredPlan(Record):
     """Sums over a plan's trials."""
 
@@ -114,6 +125,7 @@ class StoredPlan(Record):
     ends: Annotated[tuple[_Count, ...], Field(min_length=len(ENDS), max_length=len(ENDS))]
     charged: Annotated[tuple[_Sum, ...], Field(min_length=len(EXECUTION_LOSSES), max_length=len(EXECUTION_LOSSES))]
     statistics: Mapping[Name, StoredFigure] = field(default_factory=dict)
+    met: StoredMet | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,6 +168,9 @@ class StoredNote(Record):
             raise ValueError("facts.calibrations: expected one for each scenario, in its order")
         for name, tally in self.tallies.items():
             plans = tally.plans.values()
+            if any(plan.met is not None and (plan.met.missions != self.trials or plan.met.exact > self.trials)
+                   for plan in plans) or len({plan.met is None for plan in plans}) != 1:
+                raise ValueError(f"tallies.{name}: what robots did to each other is not of these trials")
             figures = [tally.difference, *(plan.total for plan in plans),
                        *(figure for plan in plans for figure in plan.statistics.values())]
             if tuple(tally.plans) != own or any(len(plan.by_robot) != len(self.robots) for plan in plans) \

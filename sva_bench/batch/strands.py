@@ -32,10 +32,10 @@ def strand(grid: Grid, point: Point, seed: int, done: frozenset[str]) -> Strand:
     left = [(first, count) for first, count in grid.ranges() if grid.unit_name(point, seed, first) not in done]
     if not left:
         return
-    grounds = grounds_of(world)
-    times = yield [TravelTimesJob(world=ground.world, model=ground.model, planner=point.planner)
-                   for ground in grounds.values()]
-    costs = {kind: fuel_costs(time, world.margin) for kind, time in zip(grounds, times, strict=True)}
+    kinds = {world.kind_of(robot): robot for robot in world.robots}
+    times = yield [TravelTimesJob(world=world, model=robot.model, planner=point.planner,
+                                  robot=robot.name if world.meets else None) for robot in kinds.values()]
+    costs = {kind: fuel_costs(time, world.margin) for kind, time in zip(kinds, times, strict=True)}
     (planned,) = yield [PlansJob(world=world, costs=costs, options=options)]
     cases = tuple(case for scenario in world.scenarios for case in own_cases(scenario, planned[scenario.name]))
     settings = settings_of(world, options)

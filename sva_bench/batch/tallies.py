@@ -10,6 +10,7 @@ import numpy as np
 from sva_bench.analysis.calibration import Calibration
 from sva_bench.analysis.catalogue import measured
 from sva_bench.analysis.figures import difference_figure, value_figure
+from sva_bench.analysis.meetings import MetTally, met_tally
 from sva_bench.analysis.moments import Clusters, Figure, Moments, joined
 from sva_bench.analysis.over_trials import charges, plan_figures, vss_figures
 from sva_bench.analysis.reaction_results import ReactionResult
@@ -17,7 +18,7 @@ from sva_bench.analysis.results import PlanFigures, ScenarioFacts
 from sva_bench.analysis.scenarios import UnitScenario
 from sva_bench.analysis.statistics import estimate
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.batch.schema import StoredFigure, StoredPlan, StoredTally
+from sva_bench.batch.schema import StoredFigure, StoredMet, StoredPlan, StoredTally
 from sva_bench.choices import ENDS, OwnPlan
 from sva_bench.execution.executed import Executed
 
@@ -32,6 +33,7 @@ class PlanTally:
         ends: Number of robot missions with each end, shape (5,).
         charged: Value lost to each end in ``EXECUTION_LOSSES`` in all trials, shape (3,).
         statistics: The measured statistics, by key.
+        met: What robots did to each other; ``None`` where they do not meet.
     """
 
     total: Figure
@@ -39,6 +41,7 @@ class PlanTally:
     ends: IntArray
     charged: FloatArray
     statistics: Mapping[str, Figure]
+    met: MetTally | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,7 +57,7 @@ def tally_of(runs: Mapping[OwnPlan, Executed], *, noisy: bool) -> Tally:
     def added_up(run: Executed) -> PlanTally:
         return PlanTally(total=value_figure(run, noisy=noisy), by_robot=run.value.sum(axis=0),
                          ends=np.bincount(run.end.ravel(), minlength=len(ENDS)), charged=charges(run),
-                         statistics=measured(run, noisy=noisy))
+                         statistics=measured(run, noisy=noisy), met=met_tally(run.meetings))
 
     return Tally(plans={name: added_up(run) for name, run in runs.items()},
                  difference=difference_figure(runs["stochastic"], runs["deterministic"], noisy=noisy))
@@ -67,7 +70,8 @@ def join(a: Tally, b: Tally) -> Tally:
 
 
 def _join(a: PlanTally, b: PlanTally) -> PlanTally:
-    return PlanTally(total=joined(a.total, b.total), by_robot=a.by_robot + b.by_robot, ends=a.ends + b.ends,
+    met = None if a.met is None or b.met is None else a.met + b.met
+    return PlanTally(total=joined(a.total, b.total), by_robot=a.by_robot + b.by_robot, ends=a.ends + b.ends, met=met,
                      charged=a.charged + b.charged, statistics={
                          key: joined(figure, b.statistics[key]) for key, figure in a.statistics.items()
                          if key in b.statistics})
@@ -83,8 +87,8 @@ def scenario_of(
         facts.plans[name], estimate(plan.total),
         {robot: float(earned) / count for robot, earned in zip(robots, plan.by_robot, strict=True)},
         {end: int(times) for end, times in zip(ENDS, plan.ends, strict=True)}, plan.charged / count,
-        {key: estimate(figure) for key, figure in plan.statistics.items()})
-        for name, plan in tally.plans.items()}
+        {key: estimate(figure) for key, figure in plan.statistics.items()},
+        None if plan.met is None else plan.met.means) for name, plan in tally.plans.items()}
     return UnitScenario(
         name=facts.name, availability=facts.availability, plans=plans,
         vss=vss_figures(facts, plans, estimate(tally.difference)), vss_mean_value=facts.vss_mean_value,
@@ -97,7 +101,7 @@ def stored_tally(tally: Tally) -> StoredTally:
     return StoredTally(difference=stored_figure(tally.difference), plans={
         name: StoredPlan(
             total=stored_figure(plan.total), by_robot=tuple(plan.by_robot.tolist()), ends=tuple(plan.ends.tolist()),
-            charged=tuple(plan.charged.tolist()),
+            charged=tuple(plan.charged.tolist()), met=None if plan.met is None else StoredMet(**vars(plan.met)),
             statistics={key: stored_figure(figure) for key, figure in plan.statistics.items()})
         for name, plan in tally.plans.items()})
 
@@ -107,6 +111,7 @@ def tally_from(stored: StoredTally) -> Tally:
     return Tally(difference=figure_from(stored.difference), plans={
         name: PlanTally(total=figure_from(plan.total), by_robot=np.array(plan.by_robot),
                         ends=np.array(plan.ends), charged=np.array(plan.charged),
+                        met=None if plan.met is None else MetTally(**vars(plan.met)),
                         statistics={key: figure_from(figure) for key, figure in plan.statistics.items()})
         for name, plan in stored.plans.items()})
 

@@ -290,3 +290,16 @@ def test_what_does_not_fit_is_an_error_of_its_line(
         said = " ".join(capsys.readouterr().err.split())
         assert f"world.yaml:{line}: {key}: " in said
         assert says in said
+
+
+@pytest.mark.parametrize(("text", "error"), [
+    (SHARED.replace("slots: 2", "slots: 20"), sb.NoRoomForSlots), (FULL.replace(", slots: 2", ""), sb.NoRoomForBerths)])
+def test_what_does_not_fit_has_an_error_of_its_own_in_python(
+    text: str, error: type[sb.SvaBenchError], tmp_path: Path
+) -> None:
+    world = world_of(tmp_path, text)
+    for function in (sb.travel_times, sb.make_instance, sb.run):
+        with pytest.raises(error, match="no room for"):
+            function(world)
+        with pytest.raises(BadFile, match=r"world\.yaml:[0-9]+: sites\..*no room for"):
+            function(tmp_path / "world.yaml")

@@ -49,6 +49,7 @@ def travel_times(
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
             with the line.
         NeverArrives: If the figures of a robot don't let it follow a path.
+        NoRoomForBerths, NoRoomForSlots: If robots that meet don't fit about base or station; of a file as above.
         BadFile, BadInput: If something is wrong with the file, or with a value.
         ValueError: If an argument is of a wrong type.
 
@@ -81,6 +82,7 @@ def fuel_costs(
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
             with the line.
         NeverArrives: If the figures of a robot don't let it follow a path.
+        NoRoomForBerths, NoRoomForSlots: If robots that meet don't fit about base or station; of a file as above.
         BadFile, BadInput: If something is wrong with the file, or with a value.
         ValueError: If an argument is of a wrong type.
 
@@ -117,6 +119,7 @@ def make_instance(
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
             with the line.
         NeverArrives: If the figures of a robot don't let it follow a path.
+        NoRoomForBerths, NoRoomForSlots: If robots that meet don't fit about base or station; of a file as above.
         BadFile, BadInput: If something is wrong with the file, or with a value.
         ValueError: If an argument is of a wrong type.
     """

@@ -65,6 +65,7 @@ def plan(
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
             with the line.
         NeverArrives: If the figures of a robot don't let it follow a path.
+        NoRoomForBerths, NoRoomForSlots: If robots that meet don't fit about base or station; of a file as above.
         BadFile, BadInput: If something is wrong with a file, or with a value, or two don't go together.
         ValueError: If an argument is of a wrong type.
         KeyboardInterrupt: On Ctrl-C; the best plan so far is not kept.

@@ -73,8 +73,7 @@ def run(
         seed: Seed of failures and noise; plans don't depend on it.
         trials: Trials of each plan in each scenario.
         rollouts: Noise draws; trial t has number t mod ``rollouts``.
-        fidelity: The twin alone (``kinematic``), physics once per noise draw (``rollout``), or every trial in
-            ``physics``.
+        fidelity: The twin alone (``kinematic``), physics once a noise draw (``rollout``), or each trial (``physics``).
         planner: OMPL planner of the paths.
         scenario: Only this scenario, or these; by default all.
         margin: Planning costs are twin times x (1 + margin), 0 to 1; by default the world's.
@@ -106,6 +105,7 @@ def run(
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
             with the line.
         NeverArrives: If the figures of a robot don't let it follow a path.
+        NoRoomForBerths, NoRoomForSlots: If robots that meet don't fit about base or station; of a file as above.
         BadFile, BadInput: If something is wrong with the file, or with a value, or two don't go together.
         WorkerLost: If a worker process died.
         ValueError: If an argument is of a wrong type.
@@ -155,6 +155,7 @@ def execute(
         UnreachableSite: If a robot cannot get from the base to a site of a ``World``; of its file, ``BadFile`` says so
             with the line.
         NeverArrives: If the figures of a robot don't let it follow a path.
+        NoRoomForBerths, NoRoomForSlots: If robots that meet don't fit about base or station; of a file as above.
         BadFile, BadInput: If something is wrong with a file, or with a value.
         WorkerLost: If a worker process died.
         ValueError: If an argument is of a wrong type.
