@@ -13,7 +13,7 @@ from sva_bench.batch.shards import Reactions
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import drives_ahead
 from sva_bench.execution.orders import planned_legs
-from sva_bench.study.costs import grounds_of, reach_of
+from sva_bench.study.costs import reach_of
 from sva_bench.study.options import Options, reactions_of, settings_of
 from sva_bench.study.planning import Planned, own_cases
 from sva_bench.study.recourse import refuse_trials_beyond_memory

@@ -10,21 +10,15 @@ from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.report.compared_reactions import given_reacting, reaction_lines
+from sva_bench.report.reaction_shares import DOUBTED, doubted, lead_pct, recourse_pct, tell, vss_pct, without_pct
 from sva_bench.report.reaction_wording import (
-    DOUBTED,
     GivenReacting,
     Reacting,
     changed,
     doubles,
-    doubted,
-    lead_pct,
     reacting,
     reaction_answers,
     reaction_assumptions,
-    recourse_pct,
-    tell,
-    vss_pct,
-    without_pct,
 )
 from sva_bench.report.wording import listed, with_interval
 

@@ -11,24 +11,26 @@ from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.compared_reactions import given_answers, given_reacting
 from sva_bench.report.page import figure, heading, note, sentence, table, text
-from sva_bench.report.reaction_wording import (
+from sva_bench.report.reaction_shares import (
     DOUBTED,
+    doubted,
+    lead_pct,
+    of_best_pct,
+    recourse_pct,
+    tell,
+    value_without,
+    vss_pct,
+    without_pct,
+)
+from sva_bench.report.reaction_wording import (
     Answer,
     AnyReacting,
     Reacting,
     assumptions_of,
     definitions,
     doubles,
-    doubted,
-    lead_pct,
-    of_best_pct,
     reacting,
     reaction_answers,
-    recourse_pct,
-    tell,
-    value_without,
-    vss_pct,
-    without_pct,
 )
 from sva_bench.report.wording import adjusted, with_interval
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -75,6 +74,35 @@ class Found:
     whole: frozenset[Key]
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Group:
+    """Sums over the rows of one plan, robot and end; a field is named as Arrow names its column."""
+
+    scenario: str
+    planner: str
+    policy: str
+    news: str
+    robot: str
+    end: str
+    weighted_incentive_sum: float
+    weighted_lost_sum: float
+    weighted_value_sum: float
+    trial_count: int
+    trial_min: int
+    weight_sum: float
+    weight_min: float
+    weight_max: float
+    history_min: int
+    history_max: int
+    stops_reached_min: int
+    stops_reached_max: int
+
+    @property
+    def key(self) -> Key:
+        """The plan and what its team does."""
+        return self.scenario, self.planner, self.policy, self.news
+
+
 class _Sums:
     """Sums over the rows of one plan, as they are read."""
 
@@ -85,16 +113,15 @@ class _Sums:
         self.first_history, self.last_history = 2**63, -2**63
         self.histories: dict[int, dict[str, list[IntArray]]] = {}  # numbers, by noise draw and robot
 
-    def add(self, row: Mapping[str, Any], loss_cost: float) -> None:
+    def add(self, group: _Group, loss_cost: float) -> None:
         """Add what some rows of one robot sum up to."""
-        self.rows += row["trial_count"]
-        self.weight += row["weight_sum"]
-        self.by_column["incentive"] += row["weighted_incentive_sum"] - loss_cost * row["weighted_lost_sum"]
-        self.by_column["value"] += row["weighted_value_sum"]
-        self.lightest, self.heaviest = min(self.lightest, row["weight_min"]), max(self.heaviest, row["weight_max"])
-        self.first_history = min(self.first_history, row["history_min"])
-        self.last_history = max(self.last_history, row["history_max"])
-
+        self.rows += group.trial_count
+        self.weight += group.weight_sum
+        self.by_column["incentive"] += group.weighted_incentive_sum - loss_cost * group.weighted_lost_sum
+        self.by_column["value"] += group.weighted_value_sum
+        self.lightest, self.heaviest = min(self.lightest, group.weight_min), max(self.heaviest, group.weight_max)
+        self.first_history = min(self.first_history, group.history_min)
+        self.last_history = max(self.last_history, group.history_max)
 
     def number(self, rollout: int, robot: str, histories: IntArray) -> None:
         """Add the numbers of some rows' histories."""
@@ -129,17 +156,16 @@ def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[st
     reached: dict[tuple[str, str, str], StopsReached] = {}
     lost: set[Key] = set()
     for piece in pieces_of(path, OUTCOMES, rows=rows, words=words):
-        for row in _grouped(piece):
-            key = row["scenario"], row["planner"], row["policy"], row["news"]
-            if key not in sums:
-                raise BadFile(path, None, "policy", f"summary.json has no {_named(key)}; {_AGAIN}")
-            sums[key].add(row, loss_cost[row["robot"]])
-            if row["trial_min"] == 0 and row["end"] in ("failed", "out_of_fuel", "stuck"):
-                lost.add(key)
-            if row["policy"] == "none":
-                whose = row["scenario"], row["planner"], row["robot"]
+        for group in _grouped(piece):
+            if group.key not in sums:
+                raise BadFile(path, None, "policy", f"summary.json has no {_named(group.key)}; {_AGAIN}")
+            sums[group.key].add(group, loss_cost[group.robot])
+            if group.trial_min == 0 and group.end in ("failed", "out_of_fuel", "stuck"):
+                lost.add(group.key)
+            if group.policy == "none":
+                whose = group.scenario, group.planner, group.robot
                 reached[whose] = reached.get(whose, StopsReached()).also(
-                    row["stops_reached_min"], row["stops_reached_max"], home=row["end"] == "home")
+                    group.stops_reached_min, group.stops_reached_max, home=group.end == "home")
         for key, rollout, robot, histories in _numbered(piece):
             sums[key].number(rollout, robot, histories)
     for key, claim in plans.items():
@@ -147,17 +173,17 @@ def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[st
     return Found(reached=reached, whole=frozenset(key for key, claim in plans.items() if claim.begins_whole) - lost)
 
 
-def _grouped(piece: pa.Table) -> list[dict[str, Any]]:
+def _grouped(piece: pa.Table) -> list[_Group]:
     """Sums over the rows of each plan, robot and end."""
     weight = piece.column("weight")
     for column in ("incentive", "value", "lost"):
         piece = piece.append_column(f"weighted_{column}", pc.multiply(
             weight, pc.cast(piece.column(column), pa.float64())))
-    found: list[dict[str, Any]] = piece.group_by(["scenario", "planner", "policy", "news", "robot", "end"]).aggregate([
+    found = piece.group_by(["scenario", "planner", "policy", "news", "robot", "end"]).aggregate([
         ("weighted_incentive", "sum"), ("weighted_lost", "sum"), ("weighted_value", "sum"), ("trial", "count"),
         ("trial", "min"), ("weight", "sum"), ("weight", "min"), ("weight", "max"), ("history", "min"),
         ("history", "max"), ("stops_reached", "min"), ("stops_reached", "max")]).to_pylist()
-    return found
+    return [_Group(**row) for row in found]
 
 
 def _numbered(piece: pa.Table) -> Iterator[tuple[Key, int, str, IntArray]]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from sva_bench.errors import BadFile
+from sva_bench.execution.case import Case
 from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.waits import PEOPLE
@@ -28,25 +28,38 @@ _AGAIN = "run the command in manifest.json again"
 
 def contact_table(executed: Sequence[Executed | Reacted]) -> pa.Table:
     """A row each time that a hull came to touch an obstacle on a leg."""
-    rows = [{**head, "since_s": touch.since_s, "lasts_s": touch.lasted_s, "x_m": touch.x_m, "y_m": touch.y_m,
-             "solid": touch.solid, "stuck": leg.held_by == touch.solid and touch is leg.touches[-1]}
-            for head, leg in _legs_of(executed) for touch in leg.touches]
-    return pa.Table.from_pylist(rows, schema=CONTACTS)
+    legs = [(case, leg) for case, leg in _legs_of(executed) for _ in leg.touches]
+    touches = [(leg, touch) for _, leg in _legs_of(executed) for touch in leg.touches]
+    return pa.table({
+        **_naming(legs), "since_s": [touch.since_s for _, touch in touches],
+        "lasts_s": [touch.lasted_s for _, touch in touches], "x_m": [touch.x_m for _, touch in touches],
+        "y_m": [touch.y_m for _, touch in touches], "solid": [touch.solid for _, touch in touches],
+        "stuck": [leg.held_by == touch.solid and touch is leg.touches[-1] for leg, touch in touches]}, schema=CONTACTS)
 
 
 def wait_table(executed: Sequence[Executed | Reacted]) -> pa.Table:
     """A row for each wait on a leg."""
-    rows = [{**head, "since_s": wait.since_s, "lasts_s": wait.lasts_s, "x_m": wait.x_m, "y_m": wait.y_m,
-             "cause": wait.cause} for head, leg in _legs_of(executed) for wait in leg.waits]
-    return pa.Table.from_pylist(rows, schema=WAITS)
+    legs = [(case, leg) for case, leg in _legs_of(executed) for _ in leg.waits]
+    waits = [wait for _, leg in _legs_of(executed) for wait in leg.waits]
+    return pa.table({
+        **_naming(legs), "since_s": [wait.since_s for wait in waits], "lasts_s": [wait.lasts_s for wait in waits],
+        "x_m": [wait.x_m for wait in waits], "y_m": [wait.y_m for wait in waits],
+        "cause": [wait.cause for wait in waits]}, schema=WAITS)
 
 
-def _legs_of(executed: Sequence[Executed | Reacted]) -> list[tuple[dict[str, Any], LegTime]]:
-    """Legs on which something was met, with the columns that name them."""
-    return [({"scenario": run.case.scenario.name, "planner": run.case.planner, "policy": run.case.policy,
-              "news": run.case.news, "trial": leg.trial, "rollout": leg.rollout, "robot": leg.robot, "leg": leg.leg,
-              "origin": leg.origin, "destination": leg.destination}, leg)
-            for run in executed for leg in run.legs if leg.touches or leg.waits]
+def _legs_of(executed: Sequence[Executed | Reacted]) -> list[tuple[Case, LegTime]]:
+    """Legs on which something was met, with the case that they are of."""
+    return [(run.case, leg) for run in executed for leg in run.legs if leg.touches or leg.waits]
+
+
+def _naming(legs: Sequence[tuple[Case, LegTime]]) -> dict[str, Sequence[str] | Sequence[int]]:
+    """The columns that name the leg of each row."""
+    return {
+        "scenario": [case.scenario.name for case, _ in legs], "planner": [case.planner for case, _ in legs],
+        "policy": [case.policy for case, _ in legs], "news": [case.news for case, _ in legs],
+        "trial": [leg.trial for _, leg in legs], "rollout": [leg.rollout for _, leg in legs],
+        "robot": [leg.robot for _, leg in legs], "leg": [leg.leg for _, leg in legs],
+        "origin": [leg.origin for _, leg in legs], "destination": [leg.destination for _, leg in legs]}
 
 
 def write_met(folder: Path, contacts: pa.Table, waits: pa.Table) -> None:

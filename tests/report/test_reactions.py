@@ -25,13 +25,11 @@ from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.reaction_charts import MOST_SCENARIOS
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
+from sva_bench.report.reaction_shares import DOUBTED, doubted, in_per_cent
 from sva_bench.report.reaction_wording import (
     DEFINITIONS,
-    DOUBTED,
     KNOWS,
     changed,
-    doubted,
-    in_per_cent,
     reacting,
     reaction_answers,
     reaction_assumptions,

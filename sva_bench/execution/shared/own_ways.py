@@ -20,10 +20,10 @@ from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
 from sva_bench.robot.follower import Stretch, arc_lengths, stretches
 from sva_bench.robot.model import RobotModel
-from sva_bench.travel.alternatives import alternatives, way_round
+from sva_bench.travel.alternatives import Ways as Lines
+from sva_bench.travel.alternatives import alternatives, way_round, ways_among
 from sva_bench.travel.berths import gap_of, own_world, place_berths
 from sva_bench.travel.fuel import FuelCosts
-from sva_bench.travel.roadmap import Roadmap, connecting_roadmap
 from sva_bench.world.model import World
 
 _STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goes by
@@ -67,7 +67,7 @@ class Ways:
         self._sites = [{site.name: site for site in own.sites} for own in self._own]
         self.orders: dict[tuple[Route, ...], Order | None] = {}
         self._shortest: dict[tuple[int, str, str], Cut] = {}
-        self._roadmaps: dict[int, Roadmap] = {}
+        self._lines: dict[int, Lines] = {}
         located = world.noise.localisation
         self._off_m = 0.0 if located is None else _SDS * located.sd_m
         self.gap_m = gap_of(world)
@@ -95,17 +95,17 @@ class Ways:
         if len(hops) > 1:  # a robot stops at the sites between
             return (shortest,)
         heading, times = self._sites[robot][destination].heading_rad, self._costs[robot].times
-        others = alternatives(self._roadmap(robot), times.path(origin, destination))[1:]
+        others = alternatives(self._lines_of(robot), times.path(origin, destination))[1:]
         return (shortest, *(cut(self.model(robot), (stretches(path, heading),), self.pose(robot, origin))
                             for path in others))
 
-    def _roadmap(self, robot: int) -> Roadmap:
-        if robot not in self._roadmaps:
+    def _lines_of(self, robot: int) -> Lines:
+        if robot not in self._lines:
             own = self._own[robot]
-            self._roadmaps[robot] = connecting_roadmap(
+            self._lines[robot] = ways_among(
                 own.obstacles, np.array([(site.x_m, site.y_m) for site in own.sites]),
                 self._costs[robot].times.clearance_m)
-        return self._roadmaps[robot]
+        return self._lines[robot]
 
     def shortest(self, robot: int, origin: str, destination: str) -> Cut:
         """The way of a leg that a robot takes if nobody is in its way."""
