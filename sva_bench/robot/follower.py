@@ -183,7 +183,7 @@ def control(
     path: FloatArray, arc: FloatArray, heading: float, limits: FloatArray, state: FloatArray,
     x: float, y: float, yaw: float, dt: float, stop: float,
 ) -> tuple[float, float]:
-    """One control step along one stretch.
+    """One control step along one stretch; compiled, so in one piece.
 
     On its way along the path the robot is never commanded faster than lets it stop before the stop line; standing
     before it, it stands. Turning in place it stands already.

@@ -64,7 +64,7 @@ class Itinerary:
 
     def __post_init__(self) -> None:
         if len(self.stop_s) != len(self.legs) or not all(self.legs):
-            raise ValueError(f"expected at least one way and one stop for each of {len(self.legs)} legs")
+            raise ValueError("expected at least one way and one stop for each leg")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
