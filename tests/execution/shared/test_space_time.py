@@ -312,6 +312,15 @@ def test_a_robot_holds_its_first_cell_before_it_is_ready() -> None:
     assert not order.needs[1][0].any()
 
 
+def test_of_many_orders_the_only_one_that_has_a_plan_is_found() -> None:
+    # In a row, each ready a minute after the one behind it: the foremost must be planned first, and so on.
+    places = [3, 0, 6, 2, 5, 1, 4]
+    crowd = [itinerary([(1.2 * k, 0), (20 + 1.2 * k, 0)], ready_s=60.0 * k) for k in places]
+    order = assert_safe(crowd)
+    for i in range(7):
+        assert [order.needs[i][j].any() for j in range(7)] == [place > places[i] for place in places]
+
+
 def test_robots_that_had_to_brake_near_each_other_get_clear() -> None:
     # 0.48 m apart where cells are 0.554 m: each is within the other's reach from the beginning.
     apart = [itinerary([(0, 0), (-4, 0)]), itinerary([(0.48, 0), (4, 0)])]
