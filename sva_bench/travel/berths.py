@@ -20,8 +20,9 @@ from sva_bench.errors import SvaBenchError
 from sva_bench.files.printable import counted
 from sva_bench.geometry.cells import DistanceField
 from sva_bench.geometry.clearance import CLEARANCE_MARGINS_M
+from sva_bench.travel.near_field import near_field
 from sva_bench.world.model import Site, World
-from sva_bench.world.places import Point, field_of
+from sva_bench.world.places import Point
 
 HULLS_APART_M = 0.2
 """Gap between two hulls in the middle of their cells: a cell's length, and as much for tracking errors [m]."""
@@ -32,6 +33,7 @@ _ROOM_M = 0.155  # from the hull of a robot in its berth to obstacles: more than
 _APART_M, _BASE_M, _SITE_M = 0.6, 0.25, 0.15  # from berth to berth, base and other sites, beyond hulls and their gap
 _CLOSER = (1.0, 0.5)  # shares of the first of these that are tried
 _SLOT_M, _SLOT_WITHIN_M = 0.15, 1.5  # from slot to slot, likewise; and at most from the station
+_PREFERRED_ROOM_M = 1.0  # from a hull to obstacles, beyond which one place is as good as another
 _STEP_M = 0.1  # of candidate places
 _PREFERRED_M = (0.25, 1.0, -0.25)  # what a metre from the base is worth in metres of clearance: choices that are tried
 _AROUND = 3  # lattice steps about a site within which it joins the lattice
@@ -221,7 +223,7 @@ class _Ground:
 def _ground_of(world: World) -> _Ground:
     """Where the largest of a world's robots can be, at the widest margin at which all sites are connected."""
     radius, places = max(robot.model.radius_m for robot in world.robots), [_point(site) for site in world.sites]
-    field, gap = field_of(world.obstacles), gap_of(world)
+    field, gap = near_field(world.obstacles, radius + _PREFERRED_ROOM_M), gap_of(world)
     for margin in CLEARANCE_MARGINS_M:
         ground = _Ground(field=field, radius_m=radius, gap_m=gap, margin_m=margin, base=places[0],
                          sites=np.empty((0, 2)))
@@ -244,7 +246,8 @@ def _berths(ground: _Ground, count: int, closer: float, weight: float) -> list[P
     """
     every = ground.candidates(ground.base, _WITHIN_M, ground.radius_m + _ROOM_M)
     away = np.hypot(*(every[:, :2] - ground.base).T)
-    every = every[np.argsort(np.minimum(every[:, 2], 1.0) + weight * away, kind="stable")]
+    room = np.minimum(every[:, 2], ground.radius_m + _PREFERRED_ROOM_M)
+    every = every[np.argsort(room + weight * away, kind="stable")]
     passing = ground.apart_m + PASSING_M
     every = _farther(every, [ground.base], ground.apart_m + _BASE_M)
     every = _farther(every, ground.sites.tolist(), ground.apart_m + max(_SITE_M, PASSING_M))

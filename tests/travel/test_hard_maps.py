@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -110,6 +111,15 @@ def test_no_path_leads_through_a_wall() -> None:
     paths = lattice_paths(obstacles_of(cells), clearance_checker(obstacles_of(cells), 0.3), 0.3, points, [1, 2])
     assert paths[0] is not None
     assert paths[1] is None
+
+
+def test_lattice_paths_lead_round_cylinders_that_stand_on_a_map() -> None:
+    obstacles = obstacles_of(cells_of(np.zeros((60, 60), dtype=np.bool_), 0.1))
+    obstacles = replace(obstacles, cylinders=np.array([[3.0, 3.0, 1.0], [3.0, 0.5, 0.3], [3.0, 5.5, 0.2]]))
+    points = np.array([[1.0, 3.0], [5.0, 3.0]])
+    path = lattice_paths(obstacles, clearance_checker(obstacles, 0.3), 0.3, points, [1])[0]
+    assert path is not None
+    assert path_clearance(obstacles, path) >= 0.3 - 1e-6
 
 
 def test_a_crowd_of_corners_is_joined_by_the_lattice(monkeypatch: pytest.MonkeyPatch) -> None:

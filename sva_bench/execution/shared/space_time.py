@@ -32,8 +32,8 @@ def plan_order(itineraries: Sequence[Itinerary], gap_m: float) -> Order | None:
     """The order of the plan with the least robot time: the sum of when the robots' last stops end.
 
     Every order of priority is planned for few robots, and a fixed choice and its neighbours for many; among plans of
-    equal sum the first counts, by the robots' numbers. A robot holds its first cell
-    from the beginning, before it is ready too, and its last one for good; a robot without legs holds its place always.
+    equal sum the first counts, by the robots' numbers. A robot holds its first cell from the beginning, before it is
+    ready too, and its last one for good; a robot without legs holds its place always.
 
     Args:
         itineraries: What each robot has yet to drive, at least one.
@@ -79,6 +79,7 @@ class _Search:
         self._planned: list[int] = []
         self._best: _Plan | None = None
         self._order: tuple[int, ...] = ()
+        self._stranded: int | None = None  # the robot that had no way in the order tried last
         self._least = math.inf
         for number, itinerary in enumerate(itineraries):
             if not itinerary.legs:
@@ -93,6 +94,12 @@ class _Search:
             self._drop(number)
         tried = 0
         for order in _orders(self._driving):
+            self._try(order)
+            tried += 1
+        order = tuple(self._driving)
+        while len(order) > _ALL_ORDERS and tried < _MOST_ORDERS and not self._order and self._stranded is not None:
+            # Whoever has no way among those before it must go before them.
+            order = (self._stranded, *(number for number in order if number != self._stranded))
             self._try(order)
             tried += 1
         while len(self._driving) > _ALL_ORDERS and tried < _MOST_ORDERS and self._order:
@@ -115,7 +122,10 @@ class _Search:
         for number in order[common:]:
             # With nobody else driving a robot is as early as in any plan.
             least = sum(float(self._ends[n]) if n in self._planned else self._alone[n] for n in self._driving)
-            if least >= self._least - _SAVED_S or not math.isfinite(self._plan(number)):
+            if least >= self._least - _SAVED_S:
+                return False
+            if not math.isfinite(self._plan(number)):
+                self._stranded = number
                 return False
             self._planned.append(number)
         total = sum(float(self._ends[n]) for n in self._driving)
