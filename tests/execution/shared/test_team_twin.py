@@ -104,6 +104,21 @@ def test_a_hold_stops_a_robot_where_it_is_for_as_long_as_it_lasts(disturbance: D
     assert leg.clock_s == pytest.approx(leg.driving_s + wait.lasts_s)
 
 
+def test_a_long_leg_with_many_holds_keeps_every_pose_and_every_wait() -> None:
+    # More of each than there is room for to begin with.
+    tour: Tour = [[(0.0, 0.0), (60.0, 0.0)]]
+    driver = TeamTwin(members_of([tour]), traced=True)
+    driver.assign(0, lane_of(cuts_of(tour)), None)
+    driver.start_leg(0, 0.0, math.inf, [Hold(along_m=1.0 + k, lasts_s=0.5, cause=f"door {k}") for k in range(50)])
+    assert driver.run().kind == "arrived"
+    leg = driver.leg(0)
+    assert [wait.hold for wait in leg.waits] == [f"door {k}" for k in range(50)]
+    assert [wait.x_m for wait in leg.waits] == pytest.approx([1.0 + k for k in range(50)], abs=0.4)  # from braking on
+    assert len(leg.pose) > 1500
+    assert (np.diff(leg.since_s) > 0).all()
+    assert np.diff(leg.pose[:, 0]).max() < 0.65 / 20 + 1e-6
+
+
 @pytest.mark.parametrize("along_m", [0.0, 4.0, 99.0])
 def test_a_hold_at_either_end_of_a_leg_is_served_too(along_m: float) -> None:
     driver = TeamTwin(members_of([AHEAD]))
