@@ -95,7 +95,8 @@ def ways_of(models: Sequence[RobotModel], lanes: Sequence[Lane | None],
         needs: For each robot and each other one, the cell that the other must have reached before each of its cells;
             ``None`` = it has no gates.
     """
-    flat = [_NOTHING if lane is None else _flattened(lane, model) for lane, model in zip(lanes, models, strict=True)]
+    flat = [_flattened(lane, model) if lane is not None and lane.cuts else _NOTHING
+            for lane, model in zip(lanes, models, strict=True)]
     vertices = np.cumsum([0, *(len(part.path) for part in flat)]).tolist()
     numbers = np.cumsum([0, *(len(part.stretches) for part in flat)]).tolist()
     stretches = np.concatenate([part.stretches for part in flat])

@@ -338,6 +338,25 @@ def test_a_dropped_robot_is_waited_for_by_nobody_and_stays_where_it_was() -> Non
         assert [len(mission.legs[robot]) for robot in range(3)].count(2) == 2
 
 
+def test_a_robot_that_stays_where_it_is_has_a_lane_without_legs_and_is_in_the_way() -> None:
+    # It stands beside the way of another, within reach of its hull: no order, for it never leaves.
+    beside, clear = (2.0, 0.2), (2.0, 2.0)
+    moving = Itinerary(radius_m=MODEL.radius_m, legs=tuple((each,) for each in cuts_of(AHEAD)), stop_s=(0.0,),
+                       ready_s=0.0, place_m=(0.0, 0.0))
+    for place, kinds in ((clear, ["arrived", "idle"]), (beside, ["touch", "arrived", "idle"])):
+        order = plan_order([moving, Itinerary(radius_m=MODEL.radius_m, legs=(), stop_s=(), ready_s=0.0,
+                                              place_m=place)], 0.2)
+        assert (order is None) == (place == beside)
+        driver = TeamTwin([*members_of([AHEAD]), Member(model=MODEL, start=(*place, 0.0))])
+        driver.assign(0, lane_of(cuts_of(AHEAD)) if order is None else order.lanes[0],
+                      None if order is None else order.needs[0])
+        driver.assign(1, None if order is None else order.lanes[1], None if order is None else order.needs[1])
+        driver.start_leg(0, 0.0, math.inf, ())
+        assert [driver.run().kind for _ in kinds] == kinds
+        with pytest.raises(ValueError, match="no leg left"):
+            driver.start_leg(1, 0.0, math.inf, ())
+
+
 def test_time_in_which_all_stand_is_passed_over() -> None:
     # An hour at a stop and an hour at a hold are not driven through: ten million control steps would take a second.
     driver = TeamTwin(members_of([AHEAD]))
