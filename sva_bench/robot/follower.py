@@ -179,14 +179,21 @@ def _turn(error: float, rate: float, dt: float, limits: FloatArray) -> float:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
+def _before_line(left: float, limits: FloatArray) -> float:
+    """Speed from which a robot stops before its stop line, which is ``left`` ahead; then it stands."""
+    if left > _SEARCH_M + LOOKAHEAD_M:  # farther than any robot brakes
+        return math.inf
+    return math.sqrt(2.0 * _LINE_BRAKING * limits[2] * max(left - BEFORE_LINE_M, 0.0))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def control(
     path: FloatArray, arc: FloatArray, heading: float, limits: FloatArray, state: FloatArray,
     x: float, y: float, yaw: float, dt: float, stop: float,
 ) -> tuple[float, float]:
     """One control step along one stretch; compiled, so in one piece.
 
-    On its way along the path the robot is never commanded faster than lets it stop before the stop line; standing
-    before it, it stands. Turning in place it stands already.
+    On its way along the path the robot is never faster than lets it stop before the stop line; before it, it stands.
 
     Args:
         path: Vertices of the stretch [m], shape (n, 2).
@@ -231,10 +238,7 @@ def control(
                      limits[1] / bend)
         wanted = min(max(wanted, min(_CREEP_M_S, limits[0])), left / dt)
         free = _rate_limited(speed, wanted, limits[2] * dt)
-        room = stop - BEFORE_LINE_M - s
-        if room < _SEARCH_M + LOOKAHEAD_M:
-            wanted = min(wanted, math.sqrt(2.0 * _LINE_BRAKING * limits[2] * max(room, 0.0)))
-        speed = _rate_limited(speed, wanted, limits[2] * dt)
+        speed = _rate_limited(speed, min(wanted, _before_line(stop - s, limits)), limits[2] * dt)
         held = 1.0 if speed < free else 0.0
         rate = _rate_limited(rate, speed * curvature, 2.0 * limits[3] * dt)
     if phase == TURN_TO_HEADING:

@@ -135,6 +135,48 @@ def test_control_is_a_pure_function_of_pose_and_state() -> None:
     assert answers[0] == answers[1]
 
 
+# The stop line
+
+
+def to_the_line(model: RobotModel, line_m: float, steps: int = 1200) -> tuple[FloatArray, FloatArray]:
+    """Arc and speed, and whether the line held the robot, at each step of an ideal robot that drives ahead."""
+    path, state, x, speed = np.array([[0.0, 0], [9, 0]]), new_state(), 0.0, 0.0
+    seen = []
+    for _ in range(steps):
+        speed, _ = control(path, arc_lengths(path), 0.0, model.limits, state, x, 0.0, 0.0, STEP_S, line_m)
+        x += speed * STEP_S
+        seen.append((x, speed, state[4]))
+    found = np.array(seen)
+    return found[:, :2], found[:, 2]
+
+
+@pytest.mark.parametrize("model", MODELS, ids=by_model)
+@pytest.mark.parametrize("line_m", [0.05, 0.4, 2.0])
+def test_a_robot_stops_two_centimetres_before_its_stop_line_and_stands(model: RobotModel, line_m: float) -> None:
+    moved, held = to_the_line(model, line_m)
+    assert moved[:, 0].max() == pytest.approx(line_m - 0.02, abs=2e-3)
+    assert moved[-60:, 1].max() == 0.0  # it stands; it doesn't creep
+    assert np.abs(np.diff(moved[:, 1])).max() <= model.acceleration_m_s2 * STEP_S + 1e-12
+    assert held[-60:].all()
+    assert not held[0]  # coming up to speed it would have been as fast without
+
+
+@pytest.mark.parametrize("model", MODELS, ids=by_model)
+def test_a_robot_at_or_beyond_its_stop_line_does_not_set_off(model: RobotModel) -> None:
+    for line_m in (0.02, 0.0, -1.0, -math.inf):
+        moved, held = to_the_line(model, line_m, 30)
+        assert moved.max() == 0.0
+        assert held[1:].all()  # the first step turns towards the path
+
+
+@pytest.mark.parametrize("model", MODELS, ids=by_model)
+def test_a_line_far_ahead_holds_nobody(model: RobotModel) -> None:
+    free, held = to_the_line(model, NO_LINE, 120)
+    far, _ = to_the_line(model, 60.0, 120)
+    assert np.array_equal(free, far)
+    assert not held.any()
+
+
 # The twin
 
 

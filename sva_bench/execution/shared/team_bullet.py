@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from types import TracebackType
 
 import numpy as np
 
+from sva_bench.arrays import FloatArray
 from sva_bench.choices import Fault
 from sva_bench.execution.engines.bullet import BulletTeam
 from sva_bench.execution.shared.driver import LegSoFar, Member
 from sva_bench.execution.shared.motion import TeamMotion
 from sva_bench.execution.shared.state import STANDS
-from sva_bench.execution.shared.ticks import GO, IS_STUCK, TOUCH, drive_on, moved, stop_robot
+from sva_bench.execution.shared.ticks import FREE_M, GO, IS_STUCK, TOUCH, drive_on, moved, stop_robot
 from sva_bench.execution.shared.ways import Ways
 from sva_bench.execution.touch import Touch, solid_at
 from sva_bench.geometry.obstacles import Obstacles
@@ -37,6 +39,7 @@ class TeamBullet(TeamMotion):
         self._obstacles = obstacles
         self._met_s: list[list[float]] = [[] for _ in members]  # driving time of the leg at each touch
         self._before = [0] * len(members)  # touches before the leg
+        self._encounters: set[tuple[int, int]] = set()  # pairs that touch, or are hardly apart again
         self._world = BulletTeam(obstacles, [(member.model, member.start, member.disturbance) for member in members])
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
@@ -76,10 +79,24 @@ class TeamBullet(TeamMotion):
             for robot in world.faults():
                 if robots["doing"][robot] != STANDS:
                     stop_robot(robots, robot, IS_STUCK)
-            if met:
-                for pair in met:
-                    notes.touched[pair] = True
+            if self._encountered(met, poses):
                 return TOUCH
+
+    def _encountered(self, met: Sequence[tuple[int, int]], poses: FloatArray) -> bool:
+        """Note pairs that came to touch, once for an encounter however often they lose touch; whether there are any."""
+        near = self._notes.near
+        came = False
+        for robot, other in self._encounters:
+            hulls = self._members[robot].model.radius_m + self._members[other].model.radius_m
+            if math.dist(poses[robot, :2], poses[other, :2]) > hulls + FREE_M:
+                near[robot, other] = False
+        for pair in met:
+            came = came or not near[pair]
+            self._notes.touched[pair] = self._notes.touched[pair] or not near[pair]
+            near[pair] = True
+            self._encounters.add(pair)
+        self._encounters = {pair for pair in self._encounters if near[pair]}
+        return came
 
     def _note_touches(self) -> None:
         """Note the driving time of touches that are new."""

@@ -35,11 +35,12 @@ GO, EVENT, TOUCH, REST, NOBODY, DEADLOCK, FULL = 0, 1, 2, 3, 4, 5, 6
 anything to do; robots wait for each other; waits or poses need more room."""
 HAS_ARRIVED, HAS_ENDED, IS_STUCK = 1, 2, 3
 """What happens to a robot."""
+FREE_M = 0.01
+"""Between hulls that touched, from which on they may touch again [m]."""
 
 _DT = 1.0 / CONTROL_HZ
 _SAME_S = 1e-9  # rounding of clocks
 _KEPT_STEPS = 3  # from one kept pose to the next: 20 Hz
-_FREE_M = 0.01  # between hulls that touched, from which on they may touch again
 _SPARE = 4  # waits for which there is always room
 
 
@@ -137,7 +138,7 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
                 if apart < hulls * hulls:
                     if not near[j, i]:
                         near[j, i] = touched[j, i] = came = True
-                elif near[j, i] and apart > (hulls + _FREE_M) ** 2:
+                elif near[j, i] and apart > (hulls + FREE_M) ** 2:
                     near[j, i] = False
         if came:
             return TOUCH

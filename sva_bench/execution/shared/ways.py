@@ -81,8 +81,8 @@ class _Flat(NamedTuple):
     first_stretch: IntArray
 
 
-_flat: weakref.WeakKeyDictionary[Lane, dict[str, _Flat]] = weakref.WeakKeyDictionary()
-"""By robot model: trials of the same order share their lanes."""
+_flat: weakref.WeakKeyDictionary[Lane, dict[tuple[float, float], _Flat]] = weakref.WeakKeyDictionary()
+"""By what patience with a robot depends on, its greatest speed and turn rate: trials of an order share their lanes."""
 
 
 def ways_of(models: Sequence[RobotModel], lanes: Sequence[Lane | None],
@@ -95,7 +95,8 @@ def ways_of(models: Sequence[RobotModel], lanes: Sequence[Lane | None],
         needs: For each robot and each other one, the cell that the other must have reached before each of its cells;
             ``None`` = it has no gates.
     """
-    flat = [_NOTHING if lane is None else _flattened(lane, model) for lane, model in zip(lanes, models, strict=True)]
+    flat = [_flattened(lane, model) if lane is not None and lane.cuts else _NOTHING
+            for lane, model in zip(lanes, models, strict=True)]
     vertices = np.cumsum([0, *(len(part.path) for part in flat)]).tolist()
     numbers = np.cumsum([0, *(len(part.stretches) for part in flat)]).tolist()
     stretches = np.concatenate([part.stretches for part in flat])
@@ -117,9 +118,9 @@ def ways_of(models: Sequence[RobotModel], lanes: Sequence[Lane | None],
 
 
 def _flattened(lane: Lane, model: RobotModel) -> _Flat:
-    known = _flat.setdefault(lane, {})
-    if model.name in known:
-        return known[model.name]
+    known, key = _flat.setdefault(lane, {}), (model.followed_speed_m_s, model.max_turn_rad_s)
+    if key in known:
+        return known[key]
     paths, arcs, records, firsts, vertex = [], [], [], [0], 0
     for cut in lane.cuts:
         way_m = 0.0
@@ -133,9 +134,9 @@ def _flattened(lane: Lane, model: RobotModel) -> _Flat:
                 way_m += float(stretch.arc[-1])
                 vertex += len(stretch.path)
         firsts.append(len(records))
-    known[model.name] = _Flat(path=np.ascontiguousarray(np.concatenate(paths)), arc=np.concatenate(arcs),
-                              stretches=np.array(records, dtype=STRETCH), first_stretch=np.array(firsts))
-    return known[model.name]
+    known[key] = _Flat(path=np.ascontiguousarray(np.concatenate(paths)), arc=np.concatenate(arcs),
+                       stretches=np.array(records, dtype=STRETCH), first_stretch=np.array(firsts))
+    return known[key]
 
 
 _NOTHING = _Flat(path=np.empty((0, 2)), arc=np.empty(0), stretches=np.empty(0, dtype=STRETCH),

@@ -1,4 +1,4 @@
-"""Teams in one PyBullet world: a robot alone is as ever, several agree with their twins, touches are told."""
+"""Teams in one PyBullet world: one robot is as ever, several agree with their twins, and what they touch is told."""
 
 from __future__ import annotations
 

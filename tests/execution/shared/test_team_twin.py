@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sva_bench.execution.shared.driver import Hold, Member
-from sva_bench.execution.shared.lanes import Cut
+from sva_bench.execution.shared.lanes import Cut, Itinerary, cut
+from sva_bench.execution.shared.space_time import plan_order
 from sva_bench.execution.shared.team_twin import TeamTwin
 from sva_bench.robot.disturbance import UNDISTURBED, Disturbance, ErrorField
 from sva_bench.robot.follower import CONTROL_HZ, stretches
@@ -102,6 +103,21 @@ def test_a_hold_stops_a_robot_where_it_is_for_as_long_as_it_lasts(disturbance: D
     assert stood == pytest.approx(2.0, abs=0.12 if disturbance is NOISY else 0.01)
     assert leg.driving_s == pytest.approx(alone.leg(0).driving_s, abs=1.0)
     assert leg.clock_s == pytest.approx(leg.driving_s + wait.lasts_s)
+
+
+def test_a_long_leg_with_many_holds_keeps_every_pose_and_every_wait() -> None:
+    # More of each than there is room for to begin with.
+    tour: Tour = [[(0.0, 0.0), (60.0, 0.0)]]
+    driver = TeamTwin(members_of([tour]), traced=True)
+    driver.assign(0, lane_of(cuts_of(tour)), None)
+    driver.start_leg(0, 0.0, math.inf, [Hold(along_m=1.0 + k, lasts_s=0.5, cause=f"door {k}") for k in range(50)])
+    assert driver.run().kind == "arrived"
+    leg = driver.leg(0)
+    assert [wait.hold for wait in leg.waits] == [f"door {k}" for k in range(50)]
+    assert [wait.x_m for wait in leg.waits] == pytest.approx([1.0 + k for k in range(50)], abs=0.4)  # from braking on
+    assert len(leg.pose) > 1500
+    assert (np.diff(leg.since_s) > 0).all()
+    assert np.diff(leg.pose[:, 0]).max() < 0.65 / 20 + 1e-6
 
 
 @pytest.mark.parametrize("along_m", [0.0, 4.0, 99.0])
@@ -223,37 +239,79 @@ def test_two_teams_drive_alike_to_the_bit() -> None:
     assert ends[0] == ends[1]
 
 
-@pytest.mark.parametrize("at_s", [0.5, 4.0, 9.0, 17.0])
+def begun_with_a_timer(name: str, at_s: float, disturbance: Disturbance) -> Mission:
+    """A mission of a test's tours, and a robot far away that ends after a time, at which the team is stopped for it."""
+    tours, order = TOURS[name], ORDERS[name]
+    far: Tour = [[(100.0, 0.0), (100.0 + at_s, 0.0)]]
+    mission = Mission(TeamTwin(members_of([*tours, far], [disturbance] * len(tours) + [UNDISTURBED])), order.lanes,
+                      stop_s=1.0)
+    driver = mission.driver
+    for robot, lane in enumerate(order.lanes):
+        driver.assign(robot, lane, [*order.needs[robot], np.zeros(len(lane.enter_s), dtype=np.int64)])
+        mission.legs[robot] = []
+        driver.start_leg(robot, 0.0, math.inf, ())
+    driver.assign(len(tours), lane_of(cuts_of(far)), None)
+    driver.start_leg(len(tours), 0.0, at_s, ())
+    assert mission.go_on().kind == "ended"
+    assert driver.clock_s == pytest.approx(at_s, abs=TICK_S)
+    return mission
+
+
+def at_rest(mission: Mission) -> list[int]:
+    """Brake the team until it rests; who arrived meanwhile."""
+    arrived = []
+    mission.driver.brake(on=True)
+    while (happening := mission.driver.run()).kind == "arrived":
+        arrived.append(happening.robot)
+        mission.legs[happening.robot].append(mission.driver.leg(happening.robot))
+    assert happening.kind == "rest"
+    return arrived
+
+
+@pytest.mark.parametrize("at_s", [0.5, 2.0, 4.0, 7.0, 9.5, 13.0])
 @pytest.mark.parametrize("name", TOURS)
 def test_the_brake_brings_all_to_rest_within_their_gates_and_then_they_go_on(name: str, at_s: float) -> None:
-    tours, order = TOURS[name], ORDERS[name]
-    mission = Mission(TeamTwin(members_of(tours, [NOISY] * len(tours))), order.lanes, stop_s=1.0)
-    mission.begin(order)
-    driver = mission.driver
-    before = [driver.pose(robot) for robot in range(len(tours))]
-    while driver.clock_s < at_s:
-        if mission.go_on(until_s=at_s).kind == "idle":
-            break
-    driver.brake(on=True)
-    happening, arrived = driver.run(), []
-    while happening.kind == "arrived":
-        arrived.append(happening.robot)
-        mission.legs[happening.robot].append(driver.leg(happening.robot))
-        happening = driver.run()
-    assert happening.kind in ("rest", "idle")
-    stood = [driver.pose(robot) for robot in range(len(tours))]
-    assert before != stood
-    assert driver.run().kind == happening.kind  # nothing moves
-    assert [driver.pose(robot) for robot in range(len(tours))] == stood
-    for robot, needs in enumerate(order.needs):
-        for other, need in enumerate(needs):
-            assert driver.cell(other) >= need[driver.cell(robot)] or other == robot
+    mission, order = begun_with_a_timer(name, at_s, NOISY), ORDERS[name]
+    driver, robots = mission.driver, range(len(order.lanes))
+    braked_s, before = driver.clock_s, [driver.arc_m(robot) for robot in robots]
+    arrived = at_rest(mission)
+    assert driver.clock_s - braked_s < 1.2  # from 0.65 m/s at 0.8 m/s2, and a delay
+    stood = [driver.pose(robot) for robot in robots]
+    assert all(driver.arc_m(robot) - before[robot] < 0.4 for robot in robots)
+    assert driver.run().kind == "rest"
+    assert [driver.pose(robot) for robot in robots] == stood
+    for robot in robots:
+        for other in robots:
+            assert other == robot or driver.cell(other) >= order.needs[robot][other][driver.cell(robot)]
     driver.brake(on=False)
-    for robot, legs in mission.legs.items():
-        if robot in arrived and len(legs) < len(order.lanes[robot].cuts):
+    for robot in arrived:
+        if len(mission.legs[robot]) < len(order.lanes[robot].cuts):
             driver.start_leg(robot, driver.clock_s, math.inf, ())
     assert mission.go_on().kind == "idle"
-    assert [len(legs) for legs in mission.legs.values()] == [len(lane.cuts) for lane in order.lanes]
+    assert [len(mission.legs[robot]) for robot in robots] == [len(lane.cuts) for lane in order.lanes]
+
+
+@pytest.mark.parametrize("at_s", [2.0, 4.0, 7.0])
+def test_from_rest_robots_take_other_lanes_in_another_order(at_s: float) -> None:
+    mission = begun_with_a_timer("crossing", at_s, UNDISTURBED)
+    driver = mission.driver
+    at_rest(mission)
+    new = [(cut(MODEL, (stretches(np.array([driver.pose(robot)[:2], place]), 0.0),), driver.pose(robot)),)
+           for robot, place in enumerate([(-4.0, -1.0), (-4.0, 1.0)])]
+    order = plan_order([Itinerary(radius_m=MODEL.radius_m, legs=(legs,), stop_s=(0.0,), ready_s=driver.clock_s,
+                                  place_m=driver.pose(robot)[:2]) for robot, legs in enumerate(new)], 0.2)
+    assert order is not None
+    again = Mission(driver, order.lanes)
+    driver.brake(on=False)
+    for robot, lane in enumerate(order.lanes):
+        driver.assign(robot, lane, [*order.needs[robot], np.zeros(len(lane.enter_s), dtype=np.int64)])
+        again.legs[robot] = []
+        assert (driver.cell(robot), driver.arc_m(robot), driver.leg(robot).driving_s) == (0, 0.0, 0.0)
+    for robot in (0, 1):
+        driver.start_leg(robot, driver.clock_s, math.inf, ())
+    assert again.go_on().kind == "idle"
+    assert again.ends_s == pytest.approx(order.ends_s, abs=2.0)
+    assert math.dist(driver.pose(0)[:2], (-4.0, -1.0)) < 0.05
 
 
 def test_a_dropped_robot_is_waited_for_by_nobody_and_stays_where_it_was() -> None:
@@ -278,6 +336,25 @@ def test_a_dropped_robot_is_waited_for_by_nobody_and_stays_where_it_was() -> Non
         assert kind == "idle"
         assert mission.driver.pose(first) == place
         assert [len(mission.legs[robot]) for robot in range(3)].count(2) == 2
+
+
+def test_a_robot_that_stays_where_it_is_has_a_lane_without_legs_and_is_in_the_way() -> None:
+    # It stands beside the way of another, within reach of its hull: no order, for it never leaves.
+    beside, clear = (2.0, 0.2), (2.0, 2.0)
+    moving = Itinerary(radius_m=MODEL.radius_m, legs=tuple((each,) for each in cuts_of(AHEAD)), stop_s=(0.0,),
+                       ready_s=0.0, place_m=(0.0, 0.0))
+    for place, kinds in ((clear, ["arrived", "idle"]), (beside, ["touch", "arrived", "idle"])):
+        order = plan_order([moving, Itinerary(radius_m=MODEL.radius_m, legs=(), stop_s=(), ready_s=0.0,
+                                              place_m=place)], 0.2)
+        assert (order is None) == (place == beside)
+        driver = TeamTwin([*members_of([AHEAD]), Member(model=MODEL, start=(*place, 0.0))])
+        driver.assign(0, lane_of(cuts_of(AHEAD)) if order is None else order.lanes[0],
+                      None if order is None else order.needs[0])
+        driver.assign(1, None if order is None else order.lanes[1], None if order is None else order.needs[1])
+        driver.start_leg(0, 0.0, math.inf, ())
+        assert [driver.run().kind for _ in kinds] == kinds
+        with pytest.raises(ValueError, match="no leg left"):
+            driver.start_leg(1, 0.0, math.inf, ())
 
 
 def test_time_in_which_all_stand_is_passed_over() -> None:
