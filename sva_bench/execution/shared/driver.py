@@ -79,6 +79,9 @@ class LegSoFar:
         waits: Its waits, in order.
         since_s: Time since the leg was to begin, of each pose [s], shape (k,).
         pose: x, y [m], yaw [rad], shape (k, 3); only of drivers that trace.
+        at: Where the robot is.
+        holds_over: How many of its holds are over.
+        hold_left_s: How long the one at which it stands lasts yet [s]; ``None`` = it stands at none.
         touches: What its hull touched on it, in physics.
     """
 
@@ -87,6 +90,9 @@ class LegSoFar:
     waits: tuple[LegWait, ...]
     since_s: FloatArray
     pose: FloatArray
+    at: Pose
+    holds_over: int = 0
+    hold_left_s: float | None = None
     touches: tuple[Touch, ...] = ()
 
 

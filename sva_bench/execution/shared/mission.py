@@ -66,6 +66,7 @@ class SharedMission:
                 player.cuts = list(order.lanes[number].cuts)
                 driver.assign(number, order.lanes[number], order.needs[number])
         self._planned = tuple(tuple(player.cuts) for player in self._players)
+        self._starts = tuple(driver.pose(player.number) for player in self._players)
         for player in self._players:
             if player.active:
                 player.at = player.mission.site
@@ -79,6 +80,7 @@ class SharedMission:
             names=tuple(self._names), contacts=self._contacts,
             robots=tuple(player.mission.outcome() for player in self._players),
             stops=tuple(tuple(player.stops) for player in self._players), detours=self._detours, cuts=self._planned,
+            starts=self._starts,
             driven=tuple(driven_by(player) for player in self._players),
             replanned=self._replanned or any(player.down for player in self._players),
             trails=tuple(tuple(player.trail) for player in self._players))

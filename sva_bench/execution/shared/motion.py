@@ -132,7 +132,8 @@ class TeamMotion:
         return LegSoFar(
             driving_s=driving_s, clock_s=float(record["ready_s"]) + driving_s + waited_s,
             waits=tuple(self._wait(robot, entry) for entry in notes.waits[robot, :record["wait_count"]].tolist()),
-            since_s=kept[:, 0] * _DT, pose=kept[:, 1:].copy())
+            since_s=kept[:, 0] * _DT, pose=kept[:, 1:].copy(), at=self.pose(robot), holds_over=int(record["hold"]),
+            hold_left_s=float(record["hold_left"]) * _DT if record["hold_left"] >= 0 else None)
 
     def pose(self, robot: int) -> Pose:
         """Where a robot is."""

@@ -145,11 +145,11 @@ class Ways:
         x, y = left[0][0].path[0]
         return cut(self.model(robot), tuple(left), (float(x), float(y), yaw))
 
-    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc]) -> Disc | None:
-        """The first of some standing robots that is in the way."""
+    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc], more_m: float = 0.0) -> Disc | None:
+        """The first of some standing robots that is in the way, or so much nearer to it than it might be [m]."""
         for disc in discs:
             apart = np.hypot(way.place_m[:, 0] - disc.x_m, way.place_m[:, 1] - disc.y_m)
-            if float(apart.min(initial=math.inf)) < self._passes_at(robot, disc):
+            if float(apart.min(initial=math.inf)) < self._passes_at(robot, disc) + more_m:
                 return disc
         return None
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sva_bench.choices import Fault
+from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import Driven, Outcome, RobotFate
 from sva_bench.execution.rules import LegDriven, RobotMission
@@ -35,6 +36,7 @@ class TeamDriven:
         driven: What each drove.
         trails: The same over time; without poses unless traced.
         cuts: The ways that each was planned to drive at first.
+        starts: Where each stood at first, not where it believed to be.
         contacts: How many times two robots touched each other.
         detours: How many legs led round a robot that stood in the way.
         replanned: Whether anything was planned anew, or a robot stands for good away from its berth.
@@ -49,6 +51,7 @@ class TeamDriven:
     driven: tuple[Driven, ...]
     trails: tuple[Trail, ...]
     cuts: tuple[tuple[Cut, ...], ...]
+    starts: tuple[Pose, ...]
     contacts: int
     detours: int
     replanned: bool

@@ -11,6 +11,8 @@ from sva_bench.execution.rules import settle
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.players import TeamDriven
 
+_SETTLES_M = 0.01  # by which physics may move a robot that stands at a stop
+
 
 def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: Sequence[RobotFate]
             ) -> TeamDriven | None:
@@ -32,25 +34,39 @@ def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: 
         return None
     outcomes = [settle(own, driven, fate) if own.route else known
                 for own, driven, fate, known in zip(orders, whole.driven, fates, whole.robots, strict=True)]
-    for number, (own, outcome, known, fate) in enumerate(zip(orders, outcomes, whole.robots, fates, strict=True)):
-        if outcome.end_time_s == known.end_time_s and outcome.end == known.end:
+    cut = whole
+    for number, (own, outcome, fate) in enumerate(zip(orders, outcomes, fates, strict=True)):
+        if outcome.end != "failed" or fate.before_poi == 0:
             continue
-        if fate.before_poi == 0:
-            continue
-        if outcome.end != "failed" or outcome.driven_s >= fate.lifetime_s:
+        if outcome.driven_s >= fate.lifetime_s:
             return None
-        x, y, _ = ways.pose(number, own.route[outcome.stops_reached])
+        trail = whole.trails[number][:outcome.stops_reached]
+        x, y, _ = trail[-1][-1].at if trail else whole.starts[number]
         disc = Disc(x_m=x, y_m=y, radius_m=ways.model(number).radius_m, name=own.robot)
         if any(_touched(ways, j, whole, outcome.end_time_s, disc) for j in range(len(orders)) if j != number):
             return None
-    return replace(whole, robots=tuple(outcomes))
+        cut = _without_the_rest(cut, number, outcome)
+    return cut
+
+
+def _without_the_rest(mission: TeamDriven, number: int, outcome: Outcome) -> TeamDriven:
+    """A mission without the legs of a robot after the stop at which it fails."""
+    legs, driven = outcome.stops_reached, mission.driven[number]
+    driven = replace(driven, leg_s=driven.leg_s[:legs], stuck=False, fault=None,
+                     waits=tuple(wait for wait in driven.waits if wait.leg < legs),
+                     touches=tuple(touch for touch in driven.touches if touch.leg < legs))
+    return replace(
+        mission, replanned=True, **{name: (*getattr(mission, name)[:number], value, *getattr(mission, name)[number + 1:])
+                                    for name, value in (
+            ("robots", outcome), ("stops", mission.stops[number][:legs + 1]), ("driven", driven),
+            ("trails", mission.trails[number][:legs]))})
 
 
 def _touched(ways: Ways, robot: int, whole: TeamDriven, since_s: float, disc: Disc) -> bool:
     """Whether a robot that stands from some time on makes a difference to another."""
     begun = _legs_done(whole.robots[robot], since_s)
     return any(wait.leg >= begun and wait.cause == disc.name for wait in whole.driven[robot].waits) or any(
-        ways.blocked(robot, way, [disc]) is not None for way in whole.cuts[robot][begun:])
+        ways.blocked(robot, way, [disc], _SETTLES_M) is not None for way in whole.cuts[robot][begun:])
 
 
 def _legs_done(outcome: Outcome, by_s: float) -> int:

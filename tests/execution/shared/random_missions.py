@@ -49,20 +49,21 @@ def random_mission(seed: int, *, interaction: str = "shared", family: Family | N
         shapes, places = _terrain(family, size_m, seed, int(rng.integers(max(4, count), 15)), int(rng.integers(0, 3)))
     except BadInput:
         return None
-    models = ("turtlebot2", "turtlebot2", "turtlebot3_burger", "turtlebot3_waffle")
-    noise: Any = "realistic" if (bool(rng.integers(2)) if noisy is None else noisy) else {}
-    # A shut door is a wait in the middle of the way; people make robots wait anywhere.
-    if noise and rng.random() < 0.5:
-        noise = {"preset": "realistic", "people": {"per_m": 0.03, "stop_s": 4}}
-    stations = {f"r{k + 1}": {"at_m": list(place), "stop_s": float(rng.integers(0, 20))}
+    models = ("turtlebot2", "turtlebot2", "turtlebot3_burger", "turtlebot3_waffle", "create3",
+              {"like": "turtlebot2", "radius_m": 0.2, "max_speed_m_s": 0.5})
+    noise = _noise(rng) if noisy is None or noisy else {}
+    stations = {f"r{k + 1}": {"at_m": list(place), "stop_s": float(rng.integers(0, 20)),
+                              **({"charge_rate": 4} if rng.random() < 0.4 else {}),
+                              **({"slots": 2} if rng.random() < 0.3 else {})}
                 for k, place in enumerate(places.stations)}
+    passages = _passages(rng, family, size_m, places) if noise or noisy is None else {}
     document = {
-        "format": "sva-bench/world@1", "name": f"random-{seed}", "interaction": interaction, "noise": noise,
+        "format": "sva-bench/world@1", "name": f"random-{seed}", "interaction": interaction, "noise": noise, "passages": passages,
         "map": {"shapes": {"bounds_m": [0, 0, size_m, size_m], "obstacles": shapes}},
         "sites": {"base": {"at_m": list(places.base)}, "stations": stations,
                   "pois": {f"p{k + 1}": {"at_m": list(place), "stop_s": float(rng.integers(0, 6))}
                            for k, place in enumerate(places.pois)}},
-        "robots": {f"uv{k + 1}": {"model": models[int(rng.integers(4))], "availability": float(rng.uniform(0.4, 1)),
+        "robots": {f"uv{k + 1}": {"model": models[int(rng.integers(len(models)))], "availability": float(rng.uniform(0.4, 1)),
                                   "mission_limit_s": 900, "mtbf_s": 400, "idle_share": float(rng.choice([0, 0.2])),
                                   "fuel_capacity_s": float(rng.choice([60, 150, 1000])),
                                   "incentives": {f"p{i + 1}": 10 for i in range(len(places.pois))}}
@@ -84,6 +85,31 @@ def random_mission(seed: int, *, interaction: str = "shared", family: Family | N
     case = Case(scenario=world.scenarios[0], planner="random", plan=Plan(routes=routes))
     return Ready(world=world, costs=costs, case=case,
                  orders=tuple(orders_of(world, case, planned_legs(world, costs, [case]))))
+
+
+def _noise(rng: np.random.Generator) -> dict[str, Any]:
+    """All noise, all but localisation, little or none; people make robots wait anywhere."""
+    noise: dict[str, Any] = {"preset": "realistic"}
+    match int(rng.integers(4)):
+        case 0:
+            return {}
+        case 1:
+            noise["localisation"] = None
+        case 2:
+            noise["localisation"] = {"sd_m": float(rng.uniform(0.01, 0.08)), "length_m": float(rng.uniform(0.3, 2))}
+    if rng.random() < 0.5:
+        noise["people"] = {"per_m": 0.03, "stop_s": 4}
+    return noise
+
+
+def _passages(rng: np.random.Generator, family: Family, size_m: float, places: Places) -> dict[str, Any]:
+    """A passage that is often shut: the narrow door, or a line between two sites; or none."""
+    if rng.random() < 0.5:
+        return {}
+    ends = [[size_m / 2, size_m / 2 - 0.6], [size_m / 2, size_m / 2 + 0.6]]
+    if family != "doors":
+        ends = [list(place) for place in places.pois[:2]]
+    return {"gate": {"at_m": ends, "blocked": 0.5, "wait_s": float(rng.integers(3, 25))}}
 
 
 def _terrain(family: Family, size_m: float, seed: int, pois: int, stations: int) -> tuple[list[Any], Places]:
