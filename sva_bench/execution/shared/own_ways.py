@@ -15,7 +15,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.legs import Leg
-from sva_bench.execution.shared.lanes import Cut, Order, cut
+from sva_bench.execution.shared.lanes import CELL_M, Cut, Order, cut
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
 from sva_bench.robot.follower import Stretch, arc_lengths, stretches
@@ -145,10 +145,20 @@ class Ways:
         x, y = left[0][0].path[0]
         return cut(self.model(robot), tuple(left), (float(x), float(y), yaw))
 
-    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc], more_m: float = 0.0) -> Disc | None:
-        """The first of some standing robots that is in the way, or so much nearer to it than it might be [m]."""
+    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc], *, more_m: float = 0.0, passed_m: float = 0.0
+                ) -> Disc | None:
+        """The first of some standing robots that is in the way.
+
+        Args:
+            robot: The robot's position in its team.
+            way: The way.
+            discs: Who stands for good.
+            more_m: How much farther than it has to be a way is to be from them [m].
+            passed_m: How much of the way is behind it [m].
+        """
+        place_m = way.place_m[max(int(passed_m / CELL_M) - 1, 0):]
         for disc in discs:
-            apart = np.hypot(way.place_m[:, 0] - disc.x_m, way.place_m[:, 1] - disc.y_m)
+            apart = np.hypot(place_m[:, 0] - disc.x_m, place_m[:, 1] - disc.y_m)
             if float(apart.min(initial=math.inf)) < self._passes_at(robot, disc) + more_m:
                 return disc
         return None

@@ -111,6 +111,8 @@ class Onward:
         needs: Its gate.
         detours: How many of its legs lead round somebody.
         kept_off: Who keeps it from a stop, or from going on.
+        on_its_way: Whether its first leg is what is left of the one that it was on.
+        begun_m: From where along that [m].
     """
 
     ahead: tuple[str, ...]
@@ -118,6 +120,8 @@ class Onward:
     needs: tuple[IntArray, ...]
     detours: int
     kept_off: str = ""
+    on_its_way: bool = False
+    begun_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -126,6 +130,7 @@ class _Wayout:
     legs: tuple[tuple[Cut, ...], ...]
     detours: int
     kept_off: str
+    on_its_way: bool = False
 
 
 def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> list[Onward]:
@@ -185,14 +190,14 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
         nothing = np.zeros(len(order.needs[k][k]), dtype=np.int64)
         needs = tuple(order.needs[k][place[other.number]] if other.number in place else nothing for other in team)
         onward.append(Onward(ahead=out.ahead, lane=order.lanes[k], needs=needs, detours=out.detours,
-                             kept_off=out.kept_off))
+                             kept_off=out.kept_off, on_its_way=out.on_its_way, begun_m=robot.arc_m or 0.0))
     return onward
 
 
 def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
     """A robot's ways to what is left of its stops; those that it can't get to are left out."""
     number, here, at, legs, ahead = robot.number, robot.pose, robot.site, [], []
-    detours, kept_off = 0, ""
+    detours, kept_off, on_its_way = 0, "", False
     sites = (robot.site, *robot.ahead)
     for k, site in enumerate(robot.ahead):
         if k == 0 and robot.arc_m is not None:
@@ -211,6 +216,7 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
                 kept_off = kept_off or ("no way on" if blocker is None else blocker.name)
                 continue
             free, detours = (round_it,), detours + 1
+        on_its_way = on_its_way or (k == 0 and free == candidates and bool(robot.cuts))
         legs.append(free)
         ahead.append(site)
         x, y = free[0].leg[-1][-1].path[-1]
@@ -218,4 +224,4 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
         at = ways.site_at(number, site, free[0])
     if not ahead or ahead[-1] != robot.ahead[-1]:
         return _Wayout(ahead=(), legs=(), detours=0, kept_off=kept_off)  # it can't get home
-    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), detours=detours, kept_off=kept_off)
+    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), detours=detours, kept_off=kept_off, on_its_way=on_its_way)
