@@ -140,8 +140,8 @@ class SharedMission:
         seed, rollout = self._noise_index
         back_m = self._ways.model(player.number).radius_m + _BACK_M
         ends, leg = self._ways.hops(player.number, player.stops[-2], player.stops[-1]), player.cuts[0].leg
-        if len(ends) != len(leg):  # a way round leads to the stop at once
-            ends = [(player.stops[-2], player.stops[-1])]
+        if len(ends) != len(leg):  # a way round leads to the stop at once, or by way of a place aside
+            ends = [(player.stops[-2], player.stops[-1])] * len(leg)
         player.holds, way_m = [], 0.0
         for hop, between in zip(leg, ends, strict=True):
             for wait in waits_on(hop, between, noise, passages, seed, rollout, player.number, back_m):
@@ -259,6 +259,7 @@ class SharedMission:
         mission = player.mission
         self._detours += then.detours
         if then.lane is None:
+            self._driver.assign(player.number, None, None)  # what it drove is among its parts
             self._stop_for_good(player, stuck=True, held_by=then.kept_off)
             return
         mission.kept_off = mission.kept_off or then.kept_off
