@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise, repeat
 
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import HELD_S, Assignment, RobotFate, Wait
@@ -20,7 +20,7 @@ from sva_bench.execution.shared.lanes import Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
 from sva_bench.execution.shared.players import BRAKING, Player, TeamDriven, driven_by
-from sva_bench.execution.waits import HopWait, waits_on
+from sva_bench.execution.waits import waits_on
 from sva_bench.world.model import World
 
 DEADLOCK = "deadlock"
@@ -120,23 +120,39 @@ class SharedMission:
             fuel_s=max(mission.tank_s * capacity - driven_s - share * waited_s, 0.0))
 
     def _holds(self, player: Player) -> list[Hold]:
-        """What a robot meets on what is left of its leg."""
+        """What a robot meets on its leg, or on what is left of it.
+
+        On what is left of its way it meets what it has not met yet, and stands out what it was standing at. On a way
+        that was planned anew it may meet others, but stands at a passage no longer than it is shut.
+        """
+        if player.parts and player.on_its_way:
+            part = player.parts[-1]
+            left = player.holds[part.holds_over:]
+            if left and part.hold_left_s is not None:
+                left = [replace(left[0], lasts_s=part.hold_left_s), *left[1:]]
+            player.holds = [replace(hold, along_m=max(hold.along_m - player.begun_m, 0.0)) for hold in left]
+            return player.holds
         noise, passages = self._world.noise, self._world.passages
         if noise.people is None and not passages:
             return []
+        served = {passage.name: sum(wait.lasts_s for part in player.parts for wait in part.waits
+                                    if wait.hold == passage.name) for passage in passages}
         seed, rollout = self._noise_index
         back_m = self._ways.model(player.number).radius_m + _BACK_M
-        ends = self._ways.hops(player.number, player.stops[-2], player.stops[-1])
-        left = player.cuts[0].leg  # the last of its hops; where they were planned anew, one in place of all
-        met: list[tuple[float, HopWait]] = []
-        way_m = 0.0
-        for hop, between in zip(left, ends[-len(left):], strict=True):
-            met += [(way_m + wait.along_m, wait) for wait in waits_on(
-                hop, between, noise, passages, seed, rollout, player.number, back_m)]
+        ends, leg = self._ways.hops(player.number, player.stops[-2], player.stops[-1]), player.cuts[0].leg
+        if len(ends) != len(leg):  # a way round leads to the stop at once, or by way of a place aside
+            ends = [(player.stops[-2], player.stops[-1])] * len(leg)
+        player.holds, way_m = [], 0.0
+        for hop, between in zip(leg, ends, strict=True):
+            for wait in waits_on(hop, between, noise, passages, seed, rollout, player.number, back_m):
+                over_s = min(served.get(wait.cause, 0.0), wait.lasts_s)
+                if over_s > 0:
+                    served[wait.cause] -= over_s
+                if wait.lasts_s > over_s:
+                    player.holds.append(Hold(along_m=way_m + wait.along_m, lasts_s=wait.lasts_s - over_s,
+                                             cause=wait.cause))
             way_m += sum(float(stretch.arc[-1]) for stretch in hop)
-        served = {wait.hold for part in player.parts for wait in part.waits}
-        return [Hold(along_m=along_m, lasts_s=wait.lasts_s, cause=wait.cause) for along_m, wait in met
-                if wait.cause not in served]
+        return player.holds
 
     def _arrive(self, player: Player) -> None:
         """A robot is where its leg ends."""
@@ -208,8 +224,9 @@ class SharedMission:
         """Whether a robot stands where another still has to pass."""
         x, y, _ = self._driver.pose(down.number)
         disc = Disc(x_m=x, y_m=y, radius_m=self._ways.model(down.number).radius_m, name=self._names[down.number])
-        return any(self._ways.blocked(player.number, way, [disc]) is not None
-                   for player in self._players if player.active for way in player.cuts)
+        return any(self._ways.blocked(player.number, way, [disc], passed_m=passed_m) is not None
+                   for player in self._players if player.active for way, passed_m in zip(
+                       player.cuts, chain([self._driver.arc_m(player.number)], repeat(0.0)), strict=False))
 
     def _go_on(self) -> None:
         """All stand: plan the rest anew."""
@@ -220,7 +237,7 @@ class SharedMission:
                 player.parts.append(self._driver.leg(player.number))
         onward = plan_onward(self._ways, [self._present(player) for player in self._players], self._driver.clock_s)
         moving = [(player, then) for player, then in zip(self._players, onward, strict=True) if player.active]
-        for player, then in moving:
+        for player, then in sorted(moving, key=lambda both: both[1].lane is None):  # who stands, stands in no one's way
             self._take_up(player, then)
         for player, _ in moving:
             if player.active:
@@ -242,10 +259,11 @@ class SharedMission:
         mission = player.mission
         self._detours += then.detours
         if then.lane is None:
+            self._driver.assign(player.number, None, None)  # what it drove is among its parts
             self._stop_for_good(player, stuck=True, held_by=then.kept_off)
             return
         mission.kept_off = mission.kept_off or then.kept_off
         mission.give(then.ahead)
         player.stops[-1] = then.ahead[0]
-        player.cuts = list(then.lane.cuts)
+        player.cuts, player.on_its_way, player.begun_m = list(then.lane.cuts), then.on_its_way, then.begun_m
         self._driver.assign(player.number, then.lane, then.needs)

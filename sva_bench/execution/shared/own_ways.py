@@ -15,7 +15,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.legs import Leg
-from sva_bench.execution.shared.lanes import Cut, Order, cut
+from sva_bench.execution.shared.lanes import CELL_M, Cut, Order, cut
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
 from sva_bench.robot.follower import Stretch, arc_lengths, stretches
@@ -30,6 +30,7 @@ _STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goe
 _ROUNDING_M = 0.01
 _SDS = 3.0  # of a localisation error that both robots may have
 _BESIDE = tuple((ring, k) for ring in (0.52, 0.62) for k in range(8))  # places beside a site that is taken
+_MOST_ASIDE = 5  # places for a robot to step aside to that are tried
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -145,10 +146,20 @@ class Ways:
         x, y = left[0][0].path[0]
         return cut(self.model(robot), tuple(left), (float(x), float(y), yaw))
 
-    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc], more_m: float = 0.0) -> Disc | None:
-        """The first of some standing robots that is in the way, or so much nearer to it than it might be [m]."""
+    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc], *, more_m: float = 0.0, passed_m: float = 0.0
+                ) -> Disc | None:
+        """The first of some standing robots that is in the way.
+
+        Args:
+            robot: The robot's position in its team.
+            way: The way.
+            discs: Who stands for good.
+            more_m: How much farther than it has to be a way is to be from them [m].
+            passed_m: How much of the way is behind it [m].
+        """
+        place_m = way.place_m[max(int(passed_m / CELL_M) - 1, 0):]
         for disc in discs:
-            apart = np.hypot(way.place_m[:, 0] - disc.x_m, way.place_m[:, 1] - disc.y_m)
+            apart = np.hypot(place_m[:, 0] - disc.x_m, place_m[:, 1] - disc.y_m)
             if float(apart.min(initial=math.inf)) < self._passes_at(robot, disc) + more_m:
                 return disc
         return None
@@ -165,18 +176,51 @@ class Ways:
         Returns:
             The way; ``None`` if there is none.
         """
-        x, y, heading = self.pose(robot, destination)
-        model, clearance = self.model(robot), self._costs[robot].times.clearance_m
-        around = np.array([(disc.x_m, disc.y_m, self._passes_at(robot, disc) - clearance + _ROUNDING_M)
-                           for disc in discs]).reshape(-1, 3)
+        path = self._path_to(robot, begin[:2], destination, discs)
+        heading = self.pose(robot, destination)[2]
+        return None if path is None else cut(self.model(robot), (stretches(path, heading),), begin)
+
+    def aside(self, robot: int, begin: Pose, destination: str, discs: Sequence[Disc]) -> tuple[Cut, ...]:
+        """Ways to a site by way of a place where a robot can let others pass: its berth, or a site near by.
+
+        Args:
+            robot, begin, destination, discs: As of ``round``.
+        """
+        berth, *others = self._own[robot].sites
+        others.sort(key=lambda site: math.dist(begin[:2], (site.x_m, site.y_m)))
+        heading = self.pose(robot, destination)[2]
+        found: list[Cut] = []
+        for site in (berth, *others):
+            place = site.x_m, site.y_m
+            if site.name == destination or len(found) == _MOST_ASIDE or self._taken(robot, place, discs):
+                continue
+            there = self._path(robot, begin[:2], place, discs)
+            on = None if there is None else self._path_to(robot, place, destination, discs)
+            if there is not None and on is not None:
+                found.append(cut(self.model(robot), (
+                    stretches(there, site.heading_rad), stretches(on, heading)), begin))
+        return tuple(found)
+
+    def _path_to(self, robot: int, begin: tuple[float, float], destination: str, discs: Sequence[Disc]
+                 ) -> FloatArray | None:
+        """A path round standing robots to a site or beside it."""
+        x, y, _ = self.pose(robot, destination)
         taken = self._taken(robot, (x, y), discs)
         beside = [(x + ring * math.cos(k * math.pi / 4), y + ring * math.sin(k * math.pi / 4)) for ring, k in _BESIDE]
         for place in beside if taken else [(x, y)]:
             if not self._taken(robot, place, discs):
-                path = way_round(self._own[robot].obstacles, np.array(begin[:2]), np.array(place), clearance, around)
+                path = self._path(robot, begin, place, discs)
                 if path is not None:
-                    return cut(model, (stretches(path, heading),), begin)
+                    return path
         return None
+
+    def _path(self, robot: int, begin: tuple[float, float], end: tuple[float, float], discs: Sequence[Disc]
+              ) -> FloatArray | None:
+        """A path round standing robots to a place."""
+        clearance = self._costs[robot].times.clearance_m
+        around = np.array([(disc.x_m, disc.y_m, self._passes_at(robot, disc) - clearance + _ROUNDING_M)
+                           for disc in discs]).reshape(-1, 3)
+        return way_round(self._own[robot].obstacles, np.array(begin), np.array(end), clearance, around)
 
     def _taken(self, robot: int, place: tuple[float, float], discs: Sequence[Disc]) -> bool:
         """Whether somebody stands too near to a place."""

@@ -111,6 +111,8 @@ class Onward:
         needs: Its gate.
         detours: How many of its legs lead round somebody.
         kept_off: Who keeps it from a stop, or from going on.
+        on_its_way: Whether its first leg is what is left of the one that it was on.
+        begun_m: From where along that [m].
     """
 
     ahead: tuple[str, ...]
@@ -118,6 +120,8 @@ class Onward:
     needs: tuple[IntArray, ...]
     detours: int
     kept_off: str = ""
+    on_its_way: bool = False
+    begun_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -126,13 +130,15 @@ class _Wayout:
     legs: tuple[tuple[Cut, ...], ...]
     detours: int
     kept_off: str
+    on_its_way: bool = False
 
 
 def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> list[Onward]:
     """Plan the rest of a mission from where everybody stands.
 
-    Robots that stand for good are driven round. If the others can't all go on, those stay where they are, as few as
-    it takes by trying one after the other, without which they can.
+    Robots that stand for good are driven round. If the others can't all go on, they may step aside first, to their
+    berths or to sites near by. If that doesn't help, those stay where they are, as few as it takes by trying one after
+    the other, without which they can.
 
     Args:
         ways: The ways of the robots.
@@ -142,27 +148,25 @@ def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> list[Onwar
     discs = [_disc(ways, robot) for robot in team if robot.down]
     held: set[int] = set()
     while True:
-        found = _tried(ways, team, discs, held, now_s)
-        if found is not None:
-            return found
-        moving = [robot for robot in team if robot.ahead and robot.number not in held]
-        for robot in moving:
-            found = _tried(ways, team, discs, held | {robot.number}, now_s)
-            if found is not None:
-                return found
-        held.add(moving[-1].number)
+        moving = [robot.number for robot in team if robot.ahead and robot.number not in held]
+        for more in ((), *((number,) for number in moving)):
+            for aside in (False, True):
+                found = _tried(ways, team, discs, held.union(more), now_s, aside=aside)
+                if found is not None:
+                    return found
+        held.add(moving[-1])
 
 
 def _disc(ways: Ways, robot: Present) -> Disc:
     return Disc(x_m=robot.pose[0], y_m=robot.pose[1], radius_m=ways.model(robot.number).radius_m, name=robot.name)
 
 
-def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set[int], now_s: float
-           ) -> list[Onward] | None:
-    """The rest of a mission with some robots held; ``None`` if the others can't go on."""
+def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set[int], now_s: float,
+           *, aside: bool) -> list[Onward] | None:
+    """The rest of a mission with some robots held; ``None`` if the others can't go on, stepping aside or not."""
     around = [*discs, *(_disc(ways, robot) for robot in team if robot.number in held)]
     wayouts = [_Wayout(ahead=(), legs=(), detours=0, kept_off="") if not robot.ahead or robot.number in held
-               else _way_out(ways, robot, around) for robot in team]
+               else _way_out(ways, robot, around, aside=aside) for robot in team]
     itineraries, planned = [], []
     for robot, out in zip(team, wayouts, strict=True):
         if robot.down or robot.number in held:
@@ -184,15 +188,18 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
             continue
         nothing = np.zeros(len(order.needs[k][k]), dtype=np.int64)
         needs = tuple(order.needs[k][place[other.number]] if other.number in place else nothing for other in team)
-        onward.append(Onward(ahead=out.ahead, lane=order.lanes[k], needs=needs, detours=out.detours,
-                             kept_off=out.kept_off))
+        usual = order.lanes[k].cuts[0] is out.legs[0][0]
+        onward.append(Onward(
+            ahead=out.ahead, lane=order.lanes[k], needs=needs, kept_off=out.kept_off, begun_m=robot.arc_m or 0.0,
+            detours=out.detours + (out.on_its_way and not usual), on_its_way=out.on_its_way and usual))
     return onward
 
 
-def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
+def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc], *, aside: bool) -> _Wayout:
     """A robot's ways to what is left of its stops; those that it can't get to are left out."""
-    number, here, at, legs, ahead = robot.number, robot.pose, robot.site, [], []
-    detours, kept_off = 0, ""
+    number, here, at, ahead = robot.number, robot.pose, robot.site, []
+    legs: list[tuple[Cut, ...]] = []
+    detours, kept_off, on_its_way = 0, "", False
     sites = (robot.site, *robot.ahead)
     for k, site in enumerate(robot.ahead):
         if k == 0 and robot.arc_m is not None:
@@ -211,11 +218,12 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
                 kept_off = kept_off or ("no way on" if blocker is None else blocker.name)
                 continue
             free, detours = (round_it,), detours + 1
-        legs.append(free)
+        on_its_way = on_its_way or (k == 0 and free == candidates and bool(robot.cuts))
+        legs.append((*free, *ways.aside(number, here, site, discs)) if aside and not legs else free)
         ahead.append(site)
         x, y = free[0].leg[-1][-1].path[-1]
         here = float(x), float(y), free[0].leg[-1][-1].heading_rad
         at = ways.site_at(number, site, free[0])
     if not ahead or ahead[-1] != robot.ahead[-1]:
         return _Wayout(ahead=(), legs=(), detours=0, kept_off=kept_off)  # it can't get home
-    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), detours=detours, kept_off=kept_off)
+    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), detours=detours, kept_off=kept_off, on_its_way=on_its_way)

@@ -11,7 +11,7 @@ from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import Driven, Outcome, RobotFate
 from sva_bench.execution.rules import LegDriven, RobotMission
-from sva_bench.execution.shared.driver import LegSoFar
+from sva_bench.execution.shared.driver import Hold, LegSoFar
 from sva_bench.execution.shared.lanes import Cut
 from sva_bench.mission.plan import Route
 
@@ -77,6 +77,8 @@ class Player:
         stops: Stops that it was sent to, the base first.
         at: The site where it made its last stop; ``None`` = beside one that was taken.
         cuts: The ways of its legs from here on, the one that it is on first.
+        holds: What it meets on the leg that it is on, as planned last.
+        on_its_way: Whether that is what is left of the leg as planned before, from ``begun_m`` along that [m].
         parts: What it drove of the leg that it is on before that was planned anew.
         legs: The legs that are over.
         trail: What it drove of each of them.
@@ -90,6 +92,9 @@ class Player:
     stops: list[str]
     at: str | None = None
     cuts: list[Cut] = field(default_factory=list)
+    holds: list[Hold] = field(default_factory=list)
+    on_its_way: bool = False
+    begun_m: float = 0.0
     parts: list[LegSoFar] = field(default_factory=list)
     legs: list[LegDriven] = field(default_factory=list)
     trail: list[tuple[LegSoFar, ...]] = field(default_factory=list)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
 from sva_bench.execution.rules import settle
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.players import TeamDriven
 
+_T = TypeVar("_T")
 _SETTLES_M = 0.01  # by which physics may move a robot that stands at a stop
 
 
@@ -56,17 +58,22 @@ def _without_the_rest(mission: TeamDriven, number: int, outcome: Outcome) -> Tea
                      waits=tuple(wait for wait in driven.waits if wait.leg < legs),
                      touches=tuple(touch for touch in driven.touches if touch.leg < legs))
     return replace(
-        mission, replanned=True, **{name: (*getattr(mission, name)[:number], value, *getattr(mission, name)[number + 1:])
-                                    for name, value in (
-            ("robots", outcome), ("stops", mission.stops[number][:legs + 1]), ("driven", driven),
-            ("trails", mission.trails[number][:legs]))})
+        mission, replanned=True, robots=_put(mission.robots, number, outcome),
+        driven=_put(mission.driven, number, driven),
+        stops=_put(mission.stops, number, mission.stops[number][:legs + 1]),
+        trails=_put(mission.trails, number, mission.trails[number][:legs]))
+
+
+def _put(values: tuple[_T, ...], number: int, value: _T) -> tuple[_T, ...]:
+    """The same with another value at one place."""
+    return (*values[:number], value, *values[number + 1:])
 
 
 def _touched(ways: Ways, robot: int, whole: TeamDriven, since_s: float, disc: Disc) -> bool:
     """Whether a robot that stands from some time on makes a difference to another."""
     begun = _legs_done(whole.robots[robot], since_s)
     return any(wait.leg >= begun and wait.cause == disc.name for wait in whole.driven[robot].waits) or any(
-        ways.blocked(robot, way, [disc], _SETTLES_M) is not None for way in whole.cuts[robot][begun:])
+        ways.blocked(robot, way, [disc], more_m=_SETTLES_M) is not None for way in whole.cuts[robot][begun:])
 
 
 def _legs_done(outcome: Outcome, by_s: float) -> int:
