@@ -83,6 +83,7 @@ class Present:
         ready_s: When it can go on [s].
         burnt_s: Fuel burnt since it was filled [s].
         cuts: The ways of its legs as planned, the one that it is on first.
+        around: Of each of these, whether it leads another way than the shortest.
         arc_m: How far along its leg it stands [m]; ``None`` at a stop.
         down: Whether it stands for good.
         name: Its name.
@@ -96,6 +97,7 @@ class Present:
     ready_s: float
     burnt_s: float
     cuts: tuple[Cut, ...]
+    around: tuple[bool, ...]
     arc_m: float | None
     down: bool
     name: str
@@ -109,14 +111,14 @@ class Onward:
         ahead: Its stops.
         lane: Its lane; ``None`` = it stays where it is for good.
         needs: Its gate.
-        detours: How many of its legs lead round somebody.
+        around: Of each of its legs, whether it leads another way than the shortest.
         kept_off: Who keeps it from a stop, or from going on.
     """
 
     ahead: tuple[str, ...]
     lane: Lane | None
     needs: tuple[IntArray, ...]
-    detours: int
+    around: tuple[bool, ...]
     kept_off: str = ""
 
 
@@ -124,7 +126,7 @@ class Onward:
 class _Wayout:
     ahead: tuple[str, ...]
     legs: tuple[tuple[Cut, ...], ...]
-    detours: int
+    around: tuple[bool, ...]
     kept_off: str
 
 
@@ -161,7 +163,7 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
            ) -> list[Onward] | None:
     """The rest of a mission with some robots held; ``None`` if the others can't go on."""
     around = [*discs, *(_disc(ways, robot) for robot in team if robot.number in held)]
-    wayouts = [_Wayout(ahead=(), legs=(), detours=0, kept_off="") if not robot.ahead or robot.number in held
+    wayouts = [_Wayout(ahead=(), legs=(), around=(), kept_off="") if not robot.ahead or robot.number in held
                else _way_out(ways, robot, around) for robot in team]
     itineraries, planned = [], []
     for robot, out in zip(team, wayouts, strict=True):
@@ -180,11 +182,11 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
         k = place.get(robot.number)
         if k is None or not out.legs:
             by = "" if not robot.ahead else out.kept_off or "no way on"
-            onward.append(Onward(ahead=(), lane=None, needs=(), detours=0, kept_off=by))
+            onward.append(Onward(ahead=(), lane=None, needs=(), around=(), kept_off=by))
             continue
         nothing = np.zeros(len(order.needs[k][k]), dtype=np.int64)
         needs = tuple(order.needs[k][place[other.number]] if other.number in place else nothing for other in team)
-        onward.append(Onward(ahead=out.ahead, lane=order.lanes[k], needs=needs, detours=out.detours,
+        onward.append(Onward(ahead=out.ahead, lane=order.lanes[k], needs=needs, around=out.around,
                              kept_off=out.kept_off))
     return onward
 
@@ -192,15 +194,18 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
 def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
     """A robot's ways to what is left of its stops; those that it can't get to are left out."""
     number, here, at, legs, ahead = robot.number, robot.pose, robot.site, [], []
-    detours, kept_off = 0, ""
+    around: list[bool] = []
+    kept_off = ""
     sites = (robot.site, *robot.ahead)
     for k, site in enumerate(robot.ahead):
+        led_round = False
         if k == 0 and robot.arc_m is not None:
+            led_round = robot.around[0]
             candidates: tuple[Cut, ...] = (ways.rest(number, robot.cuts[0].leg, robot.arc_m, robot.pose[2]),)
         elif at is None:
             candidates = ()
         elif at == sites[k] and k < len(robot.cuts):
-            candidates = (robot.cuts[k],)
+            candidates, led_round = (robot.cuts[k],), robot.around[k]
         else:
             candidates = (ways.shortest(number, at, site),)
         free = tuple(way for way in candidates if ways.blocked(number, way, discs) is None)
@@ -210,12 +215,13 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
                 blocker = next((ways.blocked(number, way, discs) for way in candidates), None)
                 kept_off = kept_off or ("no way on" if blocker is None else blocker.name)
                 continue
-            free, detours = (round_it,), detours + 1
+            free, led_round = (round_it,), True
         legs.append(free)
         ahead.append(site)
+        around.append(led_round)
         x, y = free[0].leg[-1][-1].path[-1]
         here = float(x), float(y), free[0].leg[-1][-1].heading_rad
         at = ways.site_at(number, site, free[0])
     if not ahead or ahead[-1] != robot.ahead[-1]:
-        return _Wayout(ahead=(), legs=(), detours=0, kept_off=kept_off)  # it can't get home
-    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), detours=detours, kept_off=kept_off)
+        return _Wayout(ahead=(), legs=(), around=(), kept_off=kept_off)  # it can't get home
+    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), around=tuple(around), kept_off=kept_off)

@@ -36,7 +36,7 @@ class TeamDriven:
         trails: The same over time; without poses unless traced.
         cuts: The ways that each was planned to drive at first.
         contacts: How many times two robots touched each other.
-        detours: How many legs led round a robot that stood in the way.
+        led_round: Of each leg that a robot drove, whether it led another way than the shortest, because of others.
         replanned: Whether anything was planned anew, or a robot stands for good away from its berth.
         in_physics: Whether physics drove it.
         twin_s: Driving time by the twin [s], where physics drove to check it; else ``None``.
@@ -50,11 +50,16 @@ class TeamDriven:
     trails: tuple[Trail, ...]
     cuts: tuple[tuple[Cut, ...], ...]
     contacts: int
-    detours: int
+    led_round: tuple[tuple[bool, ...], ...]
     replanned: bool
     in_physics: bool = False
     twin_s: float | None = None
     traced: bool = False
+
+    @property
+    def detours(self) -> int:
+        """How many legs led another way than the shortest, because of other robots."""
+        return sum(map(sum, self.led_round))
 
     @property
     def waited_s(self) -> float:
@@ -74,8 +79,10 @@ class Player:
         stops: Stops that it was sent to, the base first.
         at: The site where it made its last stop; ``None`` = beside one that was taken.
         cuts: The ways of its legs from here on, the one that it is on first.
+        around: Of each of these, whether it leads another way than the shortest.
         parts: What it drove of the leg that it is on before that was planned anew.
         legs: The legs that are over.
+        led_round: Of each of them, whether it led another way than the shortest.
         trail: What it drove of each of them.
         down: Whether it stands for good away from its berth.
         fault: Why it got stuck where nothing held it.
@@ -87,8 +94,10 @@ class Player:
     stops: list[str]
     at: str | None = None
     cuts: list[Cut] = field(default_factory=list)
+    around: list[bool] = field(default_factory=list)
     parts: list[LegSoFar] = field(default_factory=list)
     legs: list[LegDriven] = field(default_factory=list)
+    led_round: list[bool] = field(default_factory=list)
     trail: list[tuple[LegSoFar, ...]] = field(default_factory=list)
     down: bool = False
     fault: Fault | None = None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
+from sva_bench.execution.outcome import Assignment, Driven, Outcome, RobotFate
 from sva_bench.execution.rules import settle
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.players import TeamDriven
@@ -43,7 +43,24 @@ def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: 
         disc = Disc(x_m=x, y_m=y, radius_m=ways.model(number).radius_m, name=own.robot)
         if any(_touched(ways, j, whole, outcome.end_time_s, disc) for j in range(len(orders)) if j != number):
             return None
-    return replace(whole, robots=tuple(outcomes))
+    begun = [_begun(driven, outcome) for driven, outcome in zip(whole.driven, outcomes, strict=True)]
+    return replace(whole, robots=tuple(outcomes), led_round=tuple(
+        flags[:legs] for flags, legs in zip(whole.led_round, begun, strict=True)), driven=tuple(
+        _first_legs(driven, legs) for driven, legs in zip(whole.driven, begun, strict=True)))
+
+
+def _begun(driven: Driven, outcome: Outcome) -> int:
+    """Legs that a robot began."""
+    return outcome.stops_reached if outcome.end == "failed" else len(driven.leg_s)
+
+
+def _first_legs(driven: Driven, legs: int) -> Driven:
+    """What a robot drove until it failed at a stop."""
+    if legs == len(driven.leg_s):
+        return driven
+    return replace(driven, leg_s=driven.leg_s[:legs], stuck=False,
+                   touches=tuple(touch for touch in driven.touches if touch.leg < legs),
+                   waits=tuple(wait for wait in driven.waits if wait.leg < legs))
 
 
 def _touched(ways: Ways, robot: int, whole: TeamDriven, since_s: float, disc: Disc) -> bool:
