@@ -95,6 +95,7 @@ NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payloa
 NOISE_NAMES: tuple[NoiseName, ...] = get_args(NoiseName)
 MetName = Literal["waits", "detours", "collisions"]
 """What robots of one world do to each other, by the names under which its effects are reported."""
+MET_NAMES: tuple[MetName, ...] = get_args(MetName)
 SourceName = Literal[NoiseName, MetName, "interplay"]
 """What the ledger of sources is divided into: the noise, other robots, and what is due to no source by itself."""
 NoisePreset = Literal["realistic"]
