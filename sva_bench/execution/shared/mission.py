@@ -41,16 +41,18 @@ class SharedMission:
         order: The plan in space and time; ``None`` = nobody coordinates them.
         driver: The team in motion.
         noise_index: Seed and number of the noise draw, for what robots meet on their ways.
+        alone: Whether robots neither heed nor touch each other.
     """
 
     def __init__(
         self, world: World, ways: Ways, orders: Sequence[Assignment], fates: Sequence[RobotFate],
         drawn: Sequence[NoiseDraw], order: Order | None, driver: TeamDriver, noise_index: tuple[int, int],
+        *, alone: bool = False,
     ) -> None:
         self._world, self._ways, self._driver, self._noise_index = world, ways, driver, noise_index
-        self._coordinated = order is not None
+        self._coordinated, self._alone = order is not None, alone
         self._braking = self._replanned = False
-        self._contacts = self._detours = 0
+        self._contacts = 0
         self._names = [own.robot for own in orders]
         self._players = [
             Player(number=number, mission=RobotMission(own, fate), drawn=mine, stops=list(own.route[:1]))
@@ -64,6 +66,8 @@ class SharedMission:
                 driver.assign(number, uncoordinated(player.cuts), None)
             else:
                 player.cuts = list(order.lanes[number].cuts)
+                player.around = [way is not ways.shortest(number, a, b)
+                                 for way, (a, b) in zip(player.cuts, pairwise(route), strict=True)]
                 driver.assign(number, order.lanes[number], order.needs[number])
         self._planned = tuple(tuple(player.cuts) for player in self._players)
         self._starts = tuple(driver.pose(player.number) for player in self._players)
@@ -79,8 +83,8 @@ class SharedMission:
         return TeamDriven(
             names=tuple(self._names), contacts=self._contacts,
             robots=tuple(player.mission.outcome() for player in self._players),
-            stops=tuple(tuple(player.stops) for player in self._players), detours=self._detours, cuts=self._planned,
-            starts=self._starts,
+            stops=tuple(tuple(player.stops) for player in self._players), cuts=self._planned, starts=self._starts,
+            led_round=tuple(tuple(player.led_round) for player in self._players),
             driven=tuple(driven_by(player) for player in self._players),
             replanned=self._replanned or any(player.down for player in self._players),
             trails=tuple(tuple(player.trail) for player in self._players))
@@ -159,7 +163,7 @@ class SharedMission:
         self._finish(player)
         if player.active:
             player.at = self._ways.site_at(player.number, player.stops[-1], player.cuts[0])
-            player.cuts = player.cuts[1:]
+            player.cuts, player.around = player.cuts[1:], player.around[1:]
             self._depart(player)
         elif player.mission.end in ("home", "late") or player.mission.kept_off:
             player.cuts = []
@@ -179,6 +183,7 @@ class SharedMission:
                         tuple(touches), tuple(waits), held_by)
         player.mission.drive(leg._replace(time_s=math.inf) if over else leg)
         player.legs.append(leg)
+        player.led_round.append(player.around[0] if player.around else False)
         player.trail.append(tuple(parts))
         player.parts = []
 
@@ -206,6 +211,8 @@ class SharedMission:
 
     def _touch(self, one: Player, other: Player) -> None:
         """Two hulls touched: of robots that nobody coordinates, that is the end of both."""
+        if self._alone:
+            return
         self._contacts += 1
         if not self._coordinated:
             for player, met in ((one, other), (other, one)):
@@ -252,12 +259,12 @@ class SharedMission:
             number=number, orders=mission.orders, pose=self._driver.pose(number), down=player.down,
             site=player.at if at_stop else None, ahead=mission.ahead if player.active else (),
             ready_s=mission.clock_s, burnt_s=mission.burnt_s + driven_s, cuts=tuple(player.cuts),
+            around=tuple(player.around),
             arc_m=None if at_stop else arc_m, name=self._names[number])
 
     def _take_up(self, player: Player, then: Onward) -> None:
         """Give a robot new orders, which it takes up where it stands."""
         mission = player.mission
-        self._detours += then.detours
         if then.lane is None:
             self._driver.assign(player.number, None, None)  # what it drove is among its parts
             self._stop_for_good(player, stuck=True, held_by=then.kept_off)
@@ -265,5 +272,6 @@ class SharedMission:
         mission.kept_off = mission.kept_off or then.kept_off
         mission.give(then.ahead)
         player.stops[-1] = then.ahead[0]
-        player.cuts, player.on_its_way, player.begun_m = list(then.lane.cuts), then.on_its_way, then.begun_m
+        player.cuts, player.around = list(then.lane.cuts), list(then.around)
+        player.on_its_way, player.begun_m = then.on_its_way, then.begun_m
         self._driver.assign(player.number, then.lane, then.needs)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,7 @@ from sva_bench.execution.legs import Leg
 from sva_bench.execution.shared.lanes import CELL_M, Cut, Order, cut
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
-from sva_bench.robot.follower import Stretch, arc_lengths, stretches
+from sva_bench.robot.follower import CONTROL_HZ, Stretch, arc_lengths, stretches
 from sva_bench.robot.model import RobotModel
 from sva_bench.travel.alternatives import Ways as Lines
 from sva_bench.travel.alternatives import alternatives, way_round, ways_among
@@ -28,6 +28,7 @@ from sva_bench.world.model import World
 
 _STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goes by
 _ROUNDING_M = 0.01
+_STEP_S = 1.0 / CONTROL_HZ
 _SDS = 3.0  # of a localisation error that both robots may have
 _BESIDE = tuple((ring, k) for ring in (0.52, 0.62) for k in range(8))  # places beside a site that is taken
 _MOST_ASIDE = 5  # places for a robot to step aside to that are tried
@@ -91,14 +92,14 @@ class Ways:
         return list(pairwise(self._costs[robot].chain(origin, destination)))
 
     def candidates(self, robot: int, origin: str, destination: str) -> tuple[Cut, ...]:
-        """The ways of a leg, the shortest first."""
+        """The ways of a leg, the shortest first; nobody is led another one unless others are in the way."""
         shortest, hops = self.shortest(robot, origin, destination), self.hops(robot, origin, destination)
         if len(hops) > 1:  # a robot stops at the sites between
             return (shortest,)
         heading, times = self._sites[robot][destination].heading_rad, self._costs[robot].times
         others = alternatives(self._lines_of(robot), times.path(origin, destination))[1:]
-        return (shortest, *(cut(self.model(robot), (stretches(path, heading),), self.pose(robot, origin))
-                            for path in others))
+        return (shortest, *(_no_sooner(cut(self.model(robot), (stretches(path, heading),), self.pose(robot, origin)),
+                                       shortest.lasts_s) for path in others))
 
     def _lines_of(self, robot: int) -> Lines:
         if robot not in self._lines:
@@ -234,6 +235,14 @@ class Ways:
     def _passes_at(self, robot: int, disc: Disc) -> float:
         """How near a robot's middle may come to that of one that stands [m]."""
         return self.model(robot).radius_m + disc.radius_m + _STANDS_OFF_M + self._off_m
+
+
+def _no_sooner(way: Cut, lasts_s: float) -> Cut:
+    """A way of a leg, planned to take longer than the shortest one does even where turns are fewer on it."""
+    if way.lasts_s > lasts_s:
+        return way
+    longer = (lasts_s + _STEP_S) / way.lasts_s
+    return replace(way, enter_s=way.enter_s * longer, lasts_s=way.lasts_s * longer)
 
 
 def _from(stretch: Stretch, arc_m: float) -> Stretch:

@@ -83,6 +83,7 @@ class Present:
         ready_s: When it can go on [s].
         burnt_s: Fuel burnt since it was filled [s].
         cuts: The ways of its legs as planned, the one that it is on first.
+        around: Of each of these, whether it leads another way than the shortest.
         arc_m: How far along its leg it stands [m]; ``None`` at a stop.
         down: Whether it stands for good.
         name: Its name.
@@ -96,6 +97,7 @@ class Present:
     ready_s: float
     burnt_s: float
     cuts: tuple[Cut, ...]
+    around: tuple[bool, ...]
     arc_m: float | None
     down: bool
     name: str
@@ -109,7 +111,7 @@ class Onward:
         ahead: Its stops.
         lane: Its lane; ``None`` = it stays where it is for good.
         needs: Its gate.
-        detours: How many of its legs lead round somebody.
+        around: Of each of its legs, whether it leads another way than the shortest.
         kept_off: Who keeps it from a stop, or from going on.
         on_its_way: Whether its first leg is what is left of the one that it was on.
         begun_m: From where along that [m].
@@ -118,7 +120,7 @@ class Onward:
     ahead: tuple[str, ...]
     lane: Lane | None
     needs: tuple[IntArray, ...]
-    detours: int
+    around: tuple[bool, ...]
     kept_off: str = ""
     on_its_way: bool = False
     begun_m: float = 0.0
@@ -128,7 +130,7 @@ class Onward:
 class _Wayout:
     ahead: tuple[str, ...]
     legs: tuple[tuple[Cut, ...], ...]
-    detours: int
+    around: tuple[bool, ...]
     kept_off: str
     on_its_way: bool = False
 
@@ -165,7 +167,7 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
            *, aside: bool) -> list[Onward] | None:
     """The rest of a mission with some robots held; ``None`` if the others can't go on, stepping aside or not."""
     around = [*discs, *(_disc(ways, robot) for robot in team if robot.number in held)]
-    wayouts = [_Wayout(ahead=(), legs=(), detours=0, kept_off="") if not robot.ahead or robot.number in held
+    wayouts = [_Wayout(ahead=(), legs=(), around=(), kept_off="") if not robot.ahead or robot.number in held
                else _way_out(ways, robot, around, aside=aside) for robot in team]
     itineraries, planned = [], []
     for robot, out in zip(team, wayouts, strict=True):
@@ -184,14 +186,14 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
         k = place.get(robot.number)
         if k is None or not out.legs:
             by = "" if not robot.ahead else out.kept_off or "no way on"
-            onward.append(Onward(ahead=(), lane=None, needs=(), detours=0, kept_off=by))
+            onward.append(Onward(ahead=(), lane=None, needs=(), around=(), kept_off=by))
             continue
         nothing = np.zeros(len(order.needs[k][k]), dtype=np.int64)
         needs = tuple(order.needs[k][place[other.number]] if other.number in place else nothing for other in team)
         usual = order.lanes[k].cuts[0] is out.legs[0][0]
         onward.append(Onward(
             ahead=out.ahead, lane=order.lanes[k], needs=needs, kept_off=out.kept_off, begun_m=robot.arc_m or 0.0,
-            detours=out.detours + (out.on_its_way and not usual), on_its_way=out.on_its_way and usual))
+            around=(out.around[0] or not usual, *out.around[1:]), on_its_way=out.on_its_way and usual))
     return onward
 
 
@@ -199,15 +201,18 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc], *, aside: bool) 
     """A robot's ways to what is left of its stops; those that it can't get to are left out."""
     number, here, at, ahead = robot.number, robot.pose, robot.site, []
     legs: list[tuple[Cut, ...]] = []
-    detours, kept_off, on_its_way = 0, "", False
+    around: list[bool] = []
+    kept_off, on_its_way = "", False
     sites = (robot.site, *robot.ahead)
     for k, site in enumerate(robot.ahead):
+        led_round = False
         if k == 0 and robot.arc_m is not None:
+            led_round = robot.around[0]
             candidates: tuple[Cut, ...] = (ways.rest(number, robot.cuts[0].leg, robot.arc_m, robot.pose[2]),)
         elif at is None:
             candidates = ()
         elif at == sites[k] and k < len(robot.cuts):
-            candidates = (robot.cuts[k],)
+            candidates, led_round = (robot.cuts[k],), robot.around[k]
         else:
             candidates = (ways.shortest(number, at, site),)
         free = tuple(way for way in candidates if ways.blocked(number, way, discs) is None)
@@ -217,13 +222,15 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc], *, aside: bool) 
                 blocker = next((ways.blocked(number, way, discs) for way in candidates), None)
                 kept_off = kept_off or ("no way on" if blocker is None else blocker.name)
                 continue
-            free, detours = (round_it,), detours + 1
+            free, led_round = (round_it,), True
         on_its_way = on_its_way or (k == 0 and free == candidates and bool(robot.cuts))
         legs.append((*free, *ways.aside(number, here, site, discs)) if aside and not legs else free)
         ahead.append(site)
+        around.append(led_round)
         x, y = free[0].leg[-1][-1].path[-1]
         here = float(x), float(y), free[0].leg[-1][-1].heading_rad
         at = ways.site_at(number, site, free[0])
     if not ahead or ahead[-1] != robot.ahead[-1]:
-        return _Wayout(ahead=(), legs=(), detours=0, kept_off=kept_off)  # it can't get home
-    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), detours=detours, kept_off=kept_off, on_its_way=on_its_way)
+        return _Wayout(ahead=(), legs=(), around=(), kept_off=kept_off)  # it can't get home
+    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), around=tuple(around), kept_off=kept_off,
+                   on_its_way=on_its_way)

@@ -61,7 +61,8 @@ def _without_the_rest(mission: TeamDriven, number: int, outcome: Outcome) -> Tea
         mission, replanned=True, robots=_put(mission.robots, number, outcome),
         driven=_put(mission.driven, number, driven),
         stops=_put(mission.stops, number, mission.stops[number][:legs + 1]),
-        trails=_put(mission.trails, number, mission.trails[number][:legs]))
+        trails=_put(mission.trails, number, mission.trails[number][:legs]),
+        led_round=_put(mission.led_round, number, mission.led_round[number][:legs]))
 
 
 def _put(values: tuple[_T, ...], number: int, value: _T) -> tuple[_T, ...]:
