@@ -37,6 +37,7 @@ class TeamRun:
         drawn: How each differs from its model.
         order: The plan in space and time; ``None`` = nobody coordinates them.
         noise_index: Seed and number of the noise draw, for what robots meet on their ways.
+        switches: Whether robots may be let go before others that are late.
     """
 
     world: World
@@ -46,6 +47,7 @@ class TeamRun:
     drawn: Sequence[NoiseDraw]
     order: Order | None
     noise_index: tuple[int, int]
+    switches: bool = True
 
 
 def drive_team(run: TeamRun, fidelity: Fidelity, *, traced: bool) -> TeamDriven:
@@ -78,7 +80,7 @@ def _pose(pose: FloatArray) -> tuple[float, float, float]:
 def _played(run: TeamRun, driver: TeamDriver, *, traced: bool) -> TeamDriven:
     with driver:
         return replace(SharedMission(run.world, run.ways, run.orders, run.fates, run.drawn, run.order, driver,
-                                     run.noise_index).play(), traced=traced)
+                                     run.noise_index, switches=run.switches).play(), traced=traced)
 
 
 def _in_physics(run: TeamRun, members: Sequence[Member], twin: TeamDriven, *, traced: bool) -> TeamDriven:

@@ -15,6 +15,7 @@ from sva_bench.execution.outcome import Assignment
 from sva_bench.execution.shared.lanes import Cut, Itinerary, Lane, Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.space_time import plan_order
+from sva_bench.execution.shared.switching import Switching
 from sva_bench.mission.plan import Route
 
 
@@ -128,7 +129,7 @@ class _Wayout:
     kept_off: str
 
 
-def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> list[Onward]:
+def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> tuple[list[Onward], Switching]:
     """Plan the rest of a mission from where everybody stands.
 
     Robots that stand for good are driven round. If the others can't all go on, those stay where they are, as few as
@@ -138,6 +139,9 @@ def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> list[Onwar
         ways: The ways of the robots.
         team: The robots.
         now_s: Mission clock [s].
+
+    Returns:
+        What each robot is to do, and the order of those that go on.
     """
     discs = [_disc(ways, robot) for robot in team if robot.down]
     held: set[int] = set()
@@ -158,7 +162,7 @@ def _disc(ways: Ways, robot: Present) -> Disc:
 
 
 def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set[int], now_s: float
-           ) -> list[Onward] | None:
+           ) -> tuple[list[Onward], Switching] | None:
     """The rest of a mission with some robots held; ``None`` if the others can't go on."""
     around = [*discs, *(_disc(ways, robot) for robot in team if robot.number in held)]
     wayouts = [_Wayout(ahead=(), legs=(), detours=0, kept_off="") if not robot.ahead or robot.number in held
@@ -186,7 +190,7 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
         needs = tuple(order.needs[k][place[other.number]] if other.number in place else nothing for other in team)
         onward.append(Onward(ahead=out.ahead, lane=order.lanes[k], needs=needs, detours=out.detours,
                              kept_off=out.kept_off))
-    return onward
+    return onward, Switching(order.crossings, planned)
 
 
 def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
 from sva_bench.execution.rules import settle
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.players import TeamDriven
 
+_Any = TypeVar("_Any")
 _SETTLES_M = 0.01  # by which physics may move a robot that stands at a stop
 
 
@@ -38,8 +40,8 @@ def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: 
     for number, (own, outcome, fate) in enumerate(zip(orders, outcomes, fates, strict=True)):
         if outcome.end != "failed" or fate.before_poi == 0:
             continue
-        if outcome.driven_s >= fate.lifetime_s:
-            return None
+        if outcome.driven_s >= fate.lifetime_s or whole.asked_s >= outcome.end_time_s - 1.0 / 60.0:
+            return None  # without it another answer might have been given
         trail = whole.trails[number][:outcome.stops_reached]
         x, y, _ = trail[-1][-1].at if trail else whole.starts[number]
         disc = Disc(x_m=x, y_m=y, radius_m=ways.model(number).radius_m, name=own.robot)
@@ -56,10 +58,14 @@ def _without_the_rest(mission: TeamDriven, number: int, outcome: Outcome) -> Tea
                      waits=tuple(wait for wait in driven.waits if wait.leg < legs),
                      touches=tuple(touch for touch in driven.touches if touch.leg < legs))
     return replace(
-        mission, replanned=True, **{name: (*getattr(mission, name)[:number], value, *getattr(mission, name)[number + 1:])
-                                    for name, value in (
-            ("robots", outcome), ("stops", mission.stops[number][:legs + 1]), ("driven", driven),
-            ("trails", mission.trails[number][:legs]))})
+        mission, replanned=True, robots=_with(mission.robots, number, outcome),
+        driven=_with(mission.driven, number, driven),
+        stops=_with(mission.stops, number, mission.stops[number][:legs + 1]),
+        trails=_with(mission.trails, number, mission.trails[number][:legs]))
+
+
+def _with(row: tuple[_Any, ...], number: int, value: _Any) -> tuple[_Any, ...]:
+    return (*row[:number], value, *row[number + 1:])
 
 
 def _touched(ways: Ways, robot: int, whole: TeamDriven, since_s: float, disc: Disc) -> bool:

@@ -58,12 +58,14 @@ def random_mission(seed: int, *, interaction: str = "shared", family: Family | N
                 for k, place in enumerate(places.stations)}
     passages = _passages(rng, family, size_m, places) if noise or noisy is None else {}
     document = {
-        "format": "sva-bench/world@1", "name": f"random-{seed}", "interaction": interaction, "noise": noise, "passages": passages,
+        "format": "sva-bench/world@1", "name": f"random-{seed}", "interaction": interaction, "noise": noise,
+        "passages": passages,
         "map": {"shapes": {"bounds_m": [0, 0, size_m, size_m], "obstacles": shapes}},
         "sites": {"base": {"at_m": list(places.base)}, "stations": stations,
                   "pois": {f"p{k + 1}": {"at_m": list(place), "stop_s": float(rng.integers(0, 6))}
                            for k, place in enumerate(places.pois)}},
-        "robots": {f"uv{k + 1}": {"model": models[int(rng.integers(len(models)))], "availability": float(rng.uniform(0.4, 1)),
+        "robots": {f"uv{k + 1}": {"model": models[int(rng.integers(len(models)))],
+                                  "availability": float(rng.uniform(0.4, 1)),
                                   "mission_limit_s": 900, "mtbf_s": 400, "idle_share": float(rng.choice([0, 0.2])),
                                   "fuel_capacity_s": float(rng.choice([60, 150, 1000])),
                                   "incentives": {f"p{i + 1}": 10 for i in range(len(places.pois))}}
