@@ -14,6 +14,7 @@ from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.choices import Fault, HappeningKind
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.shared.lanes import Lane
+from sva_bench.execution.shared.switching import Standing
 from sva_bench.execution.touch import Touch
 from sva_bench.robot.disturbance import UNDISTURBED, Disturbance
 from sva_bench.robot.model import RobotModel
@@ -102,7 +103,8 @@ class Happening:
 
     Attributes:
         kind: ``arrived``: a robot ended its leg; ``ended``: its driving time or its fuel is used up; ``stuck``;
-            ``touch``: two robots touch; ``rest``: all stand that were to brake; ``idle``: nobody has a leg to drive;
+            ``touch``: two robots touch; ``waits``: a robot asks to go first;
+            ``rest``: all stand that were to brake; ``idle``: nobody has a leg to drive;
             ``deadlock``: robots wait for each other for good, which is a fault of the order.
         clock_s: When [s].
         robot: Its number; of ``rest``, ``idle`` and ``deadlock`` -1.
@@ -146,6 +148,18 @@ class TeamDriver(Protocol):
             fuel_s: It stops for good as well when driving and the idle share of waiting come to so much [s].
             idle_share: Share of the fuel of driving that it burns while it waits.
         """
+        ...
+
+    def regate(self, robot: int, needs: Sequence[IntArray]) -> None:
+        """Give a robot in motion other gates; those that it has passed, or can't brake before, are no other."""
+        ...
+
+    def ask(self, every_s: float) -> None:
+        """Let robots that wait for others ask after each so much of waiting [s]; 0 = never."""
+        ...
+
+    def standing(self, robot: int) -> Standing:
+        """Where a robot is on its lane."""
         ...
 
     def drop(self, robot: int) -> None:

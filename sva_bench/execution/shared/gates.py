@@ -81,6 +81,8 @@ def wait(robot: Robot, waits: FloatArray, cause: int, steps: int) -> None:
     """
     driven_s = robot.hops_s + robot.steps * _DT
     robot.waited += steps
+    if cause >= 0:
+        robot.asked += steps
     last = robot.wait_count - 1
     if last < 0 or waits[last, CAUSE] != cause or driven_s - waits[last, LAST_S] > _ONE_WAIT_S:
         last += 1

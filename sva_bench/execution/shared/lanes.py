@@ -11,6 +11,7 @@ from numba import njit
 from sva_bench.arrays import FloatArray, IntArray, frozen, frozen_int
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.legs import Leg
+from sva_bench.execution.shared.crossings import Crossings
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, NO_LINE, control, new_state
 from sva_bench.robot.model import RobotModel
 from sva_bench.robot.twin import advance, patience_steps
@@ -99,11 +100,13 @@ class Order:
         needs: ``needs[i][j][a]``: the cell of its lane that robot j must have entered before robot i may enter its cell
             a; 0 = none. Never decreasing in a; shape (cells of i,) each.
         ends_s: Planned end of each robot's last stop on the mission's clock [s], shape (robots,).
+        crossings: The groups of cells that ``needs`` follow from.
     """
 
     lanes: tuple[Lane, ...]
     needs: tuple[tuple[IntArray, ...], ...]
     ends_s: FloatArray
+    crossings: Crossings
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ends_s", frozen(self.ends_s, (len(self.lanes),)))

@@ -20,6 +20,7 @@ from sva_bench.execution.shared.lanes import Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
 from sva_bench.execution.shared.players import BRAKING, Player, TeamDriven, driven_by
+from sva_bench.execution.shared.switching import ASK_S, Switching
 from sva_bench.execution.waits import waits_on
 from sva_bench.world.model import World
 
@@ -42,17 +43,21 @@ class SharedMission:
         driver: The team in motion.
         noise_index: Seed and number of the noise draw, for what robots meet on their ways.
         alone: Whether robots neither heed nor touch each other.
+        switches: Whether robots may be let go before others that are late.
     """
 
     def __init__(
         self, world: World, ways: Ways, orders: Sequence[Assignment], fates: Sequence[RobotFate],
         drawn: Sequence[NoiseDraw], order: Order | None, driver: TeamDriver, noise_index: tuple[int, int],
-        *, alone: bool = False,
+        *, alone: bool = False, switches: bool = True,
     ) -> None:
         self._world, self._ways, self._driver, self._noise_index = world, ways, driver, noise_index
         self._coordinated, self._alone = order is not None, alone
         self._braking = self._replanned = False
-        self._contacts = 0
+        self._contacts = self._switched = 0
+        self._asked_s = -math.inf
+        self._switching = None if order is None else Switching(order.crossings, range(len(orders)))
+        driver.ask(ASK_S if switches and order is not None else 0.0)
         self._names = [own.robot for own in orders]
         self._players = [
             Player(number=number, mission=RobotMission(own, fate), drawn=mine, stops=list(own.route[:1]))
@@ -87,7 +92,8 @@ class SharedMission:
             led_round=tuple(tuple(player.led_round) for player in self._players),
             driven=tuple(driven_by(player) for player in self._players),
             replanned=self._replanned or any(player.down for player in self._players),
-            trails=tuple(tuple(player.trail) for player in self._players))
+            trails=tuple(tuple(player.trail) for player in self._players), asked_s=self._asked_s,
+            switched=self._switched)
 
     def _take(self, happening: Happening) -> None:
         """React to what happened."""
@@ -102,12 +108,24 @@ class SharedMission:
                 self._stop_for_good(player, stuck=True, held_by=player.fault or self._held_by(player.number))
             case "touch":
                 self._touch(player, self._players[happening.other])
+            case "waits":
+                self._ask(player, happening.clock_s)
             case "rest":
                 self._go_on()
             case "deadlock":
                 for waiting in self._players:
                     if waiting.active:
                         self._stop_for_good(waiting, stuck=True, held_by=DEADLOCK)
+
+    def _ask(self, player: Player, clock_s: float) -> None:
+        """A robot waits for others: it goes first if that is better."""
+        if self._switching is None or self._braking or not player.active:
+            return
+        self._asked_s = clock_s
+        turned = self._switching.ask(player.number, self._driver.standing, [other.down for other in self._players])
+        self._switched += bool(turned)
+        for number in turned:
+            self._driver.regate(number, self._switching.needs(number, len(self._players)))
 
     def _depart(self, player: Player) -> None:
         """Send a robot to its next stop, for when its present one is over."""
@@ -242,7 +260,8 @@ class SharedMission:
         for player in self._players:
             if player.active and self._driver.leg(player.number).clock_s > player.mission.clock_s:
                 player.parts.append(self._driver.leg(player.number))
-        onward = plan_onward(self._ways, [self._present(player) for player in self._players], self._driver.clock_s)
+        onward, self._switching = plan_onward(
+            self._ways, [self._present(player) for player in self._players], self._driver.clock_s)
         moving = [(player, then) for player, then in zip(self._players, onward, strict=True) if player.active]
         for player, then in sorted(moving, key=lambda both: both[1].lane is None):  # who stands, stands in no one's way
             self._take_up(player, then)

@@ -17,12 +17,15 @@ from sva_bench.execution.shared.lanes import Lane
 from sva_bench.execution.shared.state import (
     BRAKED,
     READY,
+    STANDS,
     longer,
     nothing_noted,
     robots_at_rest,
     team_of,
 )
+from sva_bench.execution.shared.switching import Standing
 from sva_bench.execution.shared.ticks import (
+    ASKS,
     DEADLOCK,
     FULL,
     HAS_ARRIVED,
@@ -35,10 +38,13 @@ from sva_bench.execution.shared.ticks import (
 )
 from sva_bench.execution.shared.ways import Places, Ways, ways_of
 from sva_bench.robot.disturbance import FEATURES
-from sva_bench.robot.follower import CONTROL_HZ
+from sva_bench.robot.follower import BEFORE_LINE_M, CONTROL_HZ
 
 _DT = 1.0 / CONTROL_HZ
-_OF_A_ROBOT: Mapping[int, HappeningKind] = {HAS_ARRIVED: "arrived", HAS_ENDED: "ended", IS_STUCK: "stuck"}
+_BRAKING = 0.7  # share of its acceleration that a robot is sure to brake with: 0.85 at a line, less noise of gains
+_SPARE_M = 0.1  # beyond its braking distance: slip
+_OF_A_ROBOT: Mapping[int, HappeningKind] = {HAS_ARRIVED: "arrived", HAS_ENDED: "ended", IS_STUCK: "stuck",
+                                              ASKS: "waits"}
 _OF_ALL: Mapping[int, HappeningKind] = {REST: "rest", NOBODY: "idle", DEADLOCK: "deadlock"}
 
 
@@ -98,6 +104,18 @@ class TeamMotion:
             self._notes.holds[robot, k] = hold.along_m, round(hold.lasts_s * CONTROL_HZ)
         begin_leg(self._robots, robot, self._placed[1].first_stretch[robot][number])
 
+    def regate(self, robot: int, needs: Sequence[IntArray]) -> None:
+        """Give a robot in motion other gates on its lane."""
+        self._needs[robot] = needs
+        (ways, places), record = self._placed, self._robots[robot]
+        first = places.need_row[robot]
+        ways.need[first:first + places.cells[robot]] = np.column_stack(needs)
+        record["open_to"] = min(int(record["open_to"]), int(record["cell"]))
+
+    def ask(self, every_s: float) -> None:
+        """Let robots that wait for others ask after each so much of waiting [s]; 0 = never."""
+        self._teams["asks"] = round(every_s * CONTROL_HZ)
+
     def drop(self, robot: int) -> None:
         """A robot failed: it stands where it is, and nobody waits for it any more."""
         stop_robot(self._robots, robot, 0)
@@ -151,6 +169,20 @@ class TeamMotion:
         """The cell of its lane that a robot is in."""
         return int(self._robots[robot]["cell"])
 
+    def standing(self, robot: int) -> Standing:
+        """Where a robot is on its lane."""
+        record, now_s = self._robots[robot], self.clock_s
+        if record["doing"] in (STANDS, READY):
+            ready_s = float(record["ready_s"]) if record["doing"] == READY else now_s
+            return Standing(cell=int(record["cell"]), free_s=max(ready_s, now_s), drives=False, stops_m=0.0)
+        acceleration, delay = float(record["limits"][2]), int(record["delay"])
+        under_way = [float(record["follow"][2]), *record["queue"][:delay, 0].tolist()]
+        # A control step at its fastest, and what its stop line is kept off by.
+        speed = max(under_way) + acceleration * _DT
+        stops_m = speed ** 2 / (2 * _BRAKING * acceleration) + speed * (delay + 1) * _DT + BEFORE_LINE_M
+        return Standing(cell=int(record["cell"]), free_s=now_s + max(int(record["hold_left"]), 0) * _DT, drives=True,
+                        stops_m=stops_m + (_SPARE_M if max(under_way) > 0 else 0.0))
+
     def fault(self, robot: int) -> Fault | None:  # noqa: ARG002 - twins have none
         """Why a robot drives no more though nothing holds it."""
         return None
@@ -197,7 +229,8 @@ class TeamMotion:
         for robot in np.flatnonzero(events).tolist():
             kind = _OF_A_ROBOT[int(events[robot])]
             events[robot] = 0
-            return Happening(kind=kind, clock_s=self.leg(robot).clock_s, robot=robot)
+            clock_s = self.clock_s if kind == "waits" else self.leg(robot).clock_s
+            return Happening(kind=kind, clock_s=clock_s, robot=robot)
         for robot, other in np.argwhere(touched).tolist():
             touched[robot, other] = False
             return Happening(kind="touch", clock_s=self.clock_s, robot=robot, other=other)

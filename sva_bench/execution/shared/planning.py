@@ -15,6 +15,7 @@ from sva_bench.execution.outcome import Assignment
 from sva_bench.execution.shared.lanes import Cut, Itinerary, Lane, Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.space_time import plan_order
+from sva_bench.execution.shared.switching import Switching
 from sva_bench.mission.plan import Route
 
 
@@ -135,7 +136,7 @@ class _Wayout:
     on_its_way: bool = False
 
 
-def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> list[Onward]:
+def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> tuple[list[Onward], Switching]:
     """Plan the rest of a mission from where everybody stands.
 
     Robots that stand for good are driven round. If the others can't all go on, they may step aside first, to their
@@ -146,6 +147,9 @@ def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> list[Onwar
         ways: The ways of the robots.
         team: The robots.
         now_s: Mission clock [s].
+
+    Returns:
+        What each robot is to do, and the order of those that go on.
     """
     discs = [_disc(ways, robot) for robot in team if robot.down]
     held: set[int] = set()
@@ -164,7 +168,7 @@ def _disc(ways: Ways, robot: Present) -> Disc:
 
 
 def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set[int], now_s: float,
-           *, aside: bool) -> list[Onward] | None:
+           *, aside: bool) -> tuple[list[Onward], Switching] | None:
     """The rest of a mission with some robots held; ``None`` if the others can't go on, stepping aside or not."""
     around = [*discs, *(_disc(ways, robot) for robot in team if robot.number in held)]
     wayouts = [_Wayout(ahead=(), legs=(), around=(), kept_off="") if not robot.ahead or robot.number in held
@@ -194,7 +198,7 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
         onward.append(Onward(
             ahead=out.ahead, lane=order.lanes[k], needs=needs, kept_off=out.kept_off, begun_m=robot.arc_m or 0.0,
             around=(out.around[0] or not usual, *out.around[1:]), on_its_way=out.on_its_way and usual))
-    return onward
+    return onward, Switching(order.crossings, planned)
 
 
 def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc], *, aside: bool) -> _Wayout:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,6 +44,8 @@ class TeamDriven:
         in_physics: Whether physics drove it.
         twin_s: Driving time by the twin [s], where physics drove to check it; else ``None``.
         traced: Whether poses were kept.
+        asked_s: When a robot last asked to go first [s].
+        switched: How many times one was let go first.
     """
 
     names: tuple[str, ...]
@@ -58,6 +61,8 @@ class TeamDriven:
     in_physics: bool = False
     twin_s: float | None = None
     traced: bool = False
+    asked_s: float = -math.inf
+    switched: int = 0
 
     @property
     def detours(self) -> int:

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from random import Random
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
-from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.arrays import BoolArray, FloatArray
 from sva_bench.execution.shared.conflicts import Runs, Strips, runs_of, strips_of
-from sva_bench.execution.shared.earliest import plan_earliest
+from sva_bench.execution.shared.crossings import crossings_of
+from sva_bench.execution.shared.earliest import SPARE_S, plan_earliest
+from sva_bench.execution.shared.flips import flipped
 from sva_bench.execution.shared.lanes import Itinerary, Lane, Order
 
 _ALL_ORDERS = 5  # robots up to which every order of priority is tried,
@@ -32,7 +32,8 @@ def plan_order(itineraries: Sequence[Itinerary], gap_m: float) -> Order | None:
     """The order of the plan with the least robot time: the sum of when the robots' last stops end.
 
     Every order of priority is planned for few robots, and a fixed choice and its neighbours for many; among plans of
-    equal sum the first counts, by the robots' numbers. A robot holds its first cell from the beginning, before it is
+    equal sum the first counts, by the robots' numbers. Then it is changed who passes first where two meet, as long as
+    that saves time. A robot holds its first cell from the beginning, before it is
     ready too, and its last one for good; a robot without legs holds its place always.
 
     Args:
@@ -174,51 +175,32 @@ def _moved(order: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
 def _order_of(itineraries: Sequence[Itinerary], search: _Search, plan: _Plan) -> Order:
     """The lanes of a plan, and what each robot must wait for."""
     strips, runs = search.strips, search.runs
-    # Number of each chosen cell in its robot's lane.
-    number = np.zeros(len(strips.place_m), dtype=np.int64)
-    lanes, cells = [], []
-    for robot, itinerary in enumerate(itineraries):
+    chosen, cells = [], []
+    for robot in range(len(itineraries)):
         legs = range(strips.legs[robot], strips.legs[robot + 1])
-        ways = [next(way for way in range(strips.leg[leg], strips.leg[leg + 1]) if plan.chosen[way]) for leg in legs]
-        mine = np.concatenate([np.arange(strips.first[way], strips.first[way + 1]) for way in ways])
-        number[mine] = np.arange(len(mine))
-        sizes = [int(strips.first[way + 1] - strips.first[way]) for way in ways] if itinerary.legs else []
-        enter = plan.enter[mine]
+        chosen.append([next(way for way in range(strips.leg[leg], strips.leg[leg + 1]) if plan.chosen[way])
+                       for leg in legs])
+        cells.append(np.concatenate([np.arange(strips.first[way], strips.first[way + 1]) for way in chosen[-1]]))
+    crossings = crossings_of(cells, strips.robot, strips.lasts_s, runs.start, runs.way, runs.low, runs.high,
+                             plan.chosen, plan.enter)
+    ready_s = np.array([itinerary.ready_s for itinerary in itineraries])
+    better = flipped(crossings, ready_s, SPARE_S)
+    enter_s, ends_s = plan.enter[np.concatenate(cells)], plan.ends
+    if better is not None:
+        second, enter_s = better
+        crossings = replace(crossings, second=second)
+        enter_s[crossings.first[:-1]], last = ready_s, crossings.first[1:] - 1
+        ends_s = np.where([bool(itinerary.legs) for itinerary in itineraries],
+                          enter_s[last] + crossings.stay_s[last], ready_s)
+    lanes = []
+    for robot, (itinerary, ways, mine) in enumerate(zip(itineraries, chosen, cells, strict=True)):
+        enter = enter_s[crossings.first[robot]:crossings.first[robot + 1]].copy()
         enter[0] = itinerary.ready_s
-        cuts = tuple(itinerary.legs[k][way - strips.leg[leg]] for k, (leg, way) in enumerate(
-            zip(legs, ways, strict=True))) if itinerary.legs else ()
+        leg = strips.legs[robot]
+        cuts = tuple(itinerary.legs[k][way - strips.leg[leg + k]] for k, way in enumerate(ways)) \
+            if itinerary.legs else ()
+        sizes = [int(strips.first[way + 1] - strips.first[way]) for way in ways]
         lanes.append(Lane(cuts=cuts, first_cell=np.cumsum([0, *sizes]) if cuts else np.array([1]), enter_s=enter,
                           place_m=strips.place_m[mine]))
-        cells.append(mine)
-    needs = tuple(tuple(row) for row in (
-        _needs(mine, len(itineraries), number, strips.robot, runs.start, runs.way, runs.low, runs.high, plan.chosen,
-               plan.enter) for mine in cells))
-    return Order(lanes=tuple(lanes), needs=needs, ends_s=plan.ends)
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _needs(
-    mine: IntArray, robots: int, number: IntArray, robot: IntArray, start: IntArray, way: NDArray[np.int32],
-    low: NDArray[np.int32], high: NDArray[np.int32], chosen: BoolArray, enter: FloatArray,
-) -> IntArray:
-    """The cell of each robot's lane that it must have entered before this one may enter a cell, shape (robots, cells).
-
-    Args:
-        mine: Cells of this robot's lane.
-        robots: Number of robots.
-        number: Number of each cell in its robot's lane.
-        robot: Robot of each way.
-        start, way, low, high: ``Runs``.
-        chosen: Which ways are driven.
-        enter: When each cell is entered [s].
-    """
-    needs = np.zeros((robots, len(mine)), dtype=np.int64)
-    for a in range(len(mine)):
-        if a > 0:
-            needs[:, a] = needs[:, a - 1]
-        for run in range(start[mine[a]], start[mine[a] + 1]):
-            # A run lies wholly before this robot's stay in the cell, or wholly after it.
-            if chosen[way[run]] and enter[low[run]] < enter[mine[a]]:
-                j = robot[way[run]]
-                needs[j, a] = max(needs[j, a], number[high[run]] + 1)
-    return needs
+    needs = crossings.by_lane(crossings.needs(crossings.second))
+    return Order(lanes=tuple(lanes), needs=needs, ends_s=ends_s, crossings=crossings)

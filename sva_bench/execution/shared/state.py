@@ -60,6 +60,7 @@ class Robot(Protocol):
         driving_s, fuel_s: Driving time, and fuel, after which it ends.
         idle: Share of fuel that it burns waiting.
         waited: Control steps of waiting on its leg.
+        asked: Control steps of waiting for other robots since it last asked to go first.
         wait_count, pose_count: How many waits and poses were kept.
         checked_m, checked_rad, checked_steps: Arc and yaw when it was last checked for being stuck, and steps on the
             way since.
@@ -106,6 +107,7 @@ class Robot(Protocol):
     fuel_s: float
     idle: float
     waited: int
+    asked: int
     wait_count: int
     pose_count: int
     checked_m: float
@@ -121,12 +123,14 @@ class Team(Protocol):
         braking: Whether all are to brake.
         traced: Whether poses are kept.
         checked: Whether stuck robots are looked for.
+        asks: Control steps of waiting for other robots after which one asks to go first; 0 = none does.
     """
 
     now: int
     braking: bool
     traced: bool
     checked: bool
+    asks: int
 
 
 _SHAPES = {"limits": (4,), "waves": (8, FEATURES), "pose": (3,), "follow": (5,), "queue": (MOST_DELAY, 2)}
@@ -183,7 +187,7 @@ def robots_at_rest(members: Sequence[Member]) -> Records:
 
 def team_of(*, traced: bool, checked: bool) -> Records:
     """The record of a team at the start of a mission, shape (1,)."""
-    return np.array([(0, False, traced, checked)], dtype=TEAM)
+    return np.array([(0, False, traced, checked, 0)], dtype=TEAM)
 
 
 def nothing_noted(robots: int, *, traced: bool) -> Notes:

@@ -33,7 +33,7 @@ from sva_bench.robot.twin import advance, delayed
 GO, EVENT, TOUCH, REST, NOBODY, DEADLOCK, FULL = 0, 1, 2, 3, 4, 5, 6
 """Why compiled code comes back: not at all; something happened to a robot, to a pair; all rest that brake; nobody has
 anything to do; robots wait for each other; waits or poses need more room."""
-HAS_ARRIVED, HAS_ENDED, IS_STUCK = 1, 2, 3
+HAS_ARRIVED, HAS_ENDED, IS_STUCK, ASKS = 1, 2, 3, 4
 """What happens to a robot."""
 FREE_M = 0.01
 """Between hulls that touched, from which on they may touch again [m]."""
@@ -106,7 +106,9 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
                                 break
                         elif _is_held(robot, stretch, holds[i], waits[i], why):
                             break
-                robot.commanded = robot.event == 0
+                if robot.event == 0 and team.asks > 0 and robot.asked >= team.asks:
+                    robot.event, robot.asked = ASKS, 0
+                robot.commanded = robot.event == 0 or robot.event == ASKS
             happened = happened or robot.event != 0
             busy = busy or robot.doing != STANDS
             still = still and robot.at_rest
@@ -117,7 +119,7 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
         if not busy:
             return NOBODY
         if still:
-            steps = 1 if team.braking or stale else _steps_to_wait(robots, team)
+            steps = 1 if team.braking or stale else _steps_to_wait(robots, team, waits)
             stale = False
             _pass_over(robots, team, waits, abs(steps))
             if team.braking:
@@ -291,7 +293,7 @@ def _hardly_moved(robot: Robot, yaw: float) -> bool:
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _steps_to_wait(robots: Records, team: Team) -> int:
+def _steps_to_wait(robots: Records, team: Team, waits: FloatArray) -> int:
     """Control steps until something changes though nobody moves; -1 = nothing ever does."""
     least = -1
     for i in range(len(robots)):
@@ -309,6 +311,10 @@ def _steps_to_wait(robots: Records, team: Team) -> int:
             steps = dry if steps < 0 else min(steps, dry)
         if steps >= 0:
             least = max(steps, 1) if least < 0 else min(least, max(steps, 1))
+    for i in range(len(robots) if team.asks > 0 else 0):
+        robot = robots[i]
+        if robot.doing != STANDS and robot.wait_count > 0 and waits[i, robot.wait_count - 1, CAUSE] >= 0:
+            least = min(least, max(team.asks - robot.asked, 1))
     return least
 
 

@@ -40,8 +40,8 @@ def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: 
     for number, (own, outcome, fate) in enumerate(zip(orders, outcomes, fates, strict=True)):
         if outcome.end != "failed" or fate.before_poi == 0:
             continue
-        if outcome.driven_s >= fate.lifetime_s:
-            return None
+        if outcome.driven_s >= fate.lifetime_s or whole.asked_s >= outcome.end_time_s - 1.0 / 60.0:
+            return None  # without it another answer might have been given
         trail = whole.trails[number][:outcome.stops_reached]
         x, y, _ = trail[-1][-1].at if trail else whole.starts[number]
         disc = Disc(x_m=x, y_m=y, radius_m=ways.model(number).radius_m, name=own.robot)
