@@ -94,7 +94,7 @@ def test_all_come_home_when_nobody_fails(name: str) -> None:
     for rollout in range(2):
         mission = sound(name, rollout=rollout)
         assert {outcome.end for outcome in mission.robots} == {"home"}
-        assert not mission.detours
+        assert not mission.replanned
 
 
 @pytest.mark.parametrize("name", PLACES)
