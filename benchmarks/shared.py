@@ -11,6 +11,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +88,7 @@ def plan(robots: int, pois: int, least_s: float) -> None:
     taken = []
     for _ in range(3):
         ways_s, ways = processor_s(lambda: Ways(world, costs))
-        order_s, order = processor_s(lambda ways=ways: first_order(ways, task.orders, (True,) * robots))
+        order_s, order = processor_s(partial(first_order, ways, task.orders, (True,) * robots))
         assert order is not None
         taken.append((ways_s + order_s, ways_s, order_s))
     total_s, ways_s, order_s = min(taken)
