@@ -9,6 +9,9 @@ from typing import Any
 import pytest
 
 from sva_bench.execution.outcome import RobotFate
+from sva_bench.execution.shared import mission as mission_module
+from sva_bench.execution.shared import planning
+from sva_bench.execution.shared.planning import Onward
 from sva_bench.execution.shared.players import TeamDriven
 from sva_bench.mission.plan import Route
 from sva_bench.travel.berths import NoRoomForBerths
@@ -146,3 +149,34 @@ def test_more_robots_than_fit_are_refused() -> None:
     with pytest.raises(NoRoomForBerths):
         mission_in(world(((6, 3, 7.6, 6), (1.1, 3.9, 2.2, 4.2)), 8, {"p1": (11, 3)}, base=(1.2, 0.9)),
                    routes(*[("p1",)] * 8))
+
+
+def held_s(mission: TeamDriven, robot: int, leg: int) -> float:
+    """How long people held a robot on a leg [s]."""
+    return sum(wait.lasts_s for wait in mission.driven[robot].waits if wait.leg == leg and wait.cause == "people")
+
+
+def test_who_goes_on_after_all_braked_meets_the_same_people_as_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[list[Onward]] = []
+
+    def heard(*arguments: Any) -> list[Onward]:
+        told.append(planning.plan_onward(*arguments))
+        return told[-1]
+
+    monkeypatch.setattr(mission_module, "plan_onward", heard)
+    ready = mission_in(world((), 4, {"a": (11, 1), "b": (11, 5), "c": (6, 5.3), "d": (6, 0.7)}, noise={
+        "people": {"per_m": 0.6, "stop_s": 1.5}}), routes(("a", "c"), ("b", "d"), ("c", "a"), ("d", "b")))
+    whole = played(ready, 0, [RobotFate()] * 4, 0)
+    compared = 0
+    for k in range(16):
+        told.clear()
+        fates = [RobotFate(lifetime_s=whole.robots[0].driven_s * (k + 0.5) / 16), *[RobotFate()] * 3]
+        mission = played(ready, 0, fates, 0)
+        assert not broken(ready, mission)
+        for robot in range(1, 4):
+            for leg, parts in enumerate(mission.trails[robot]):
+                if len(parts) > 1 and len(told) == 1 and told[0][robot].on_its_way:
+                    # A hold lasts a number of control steps, and so does what is left of it.
+                    assert held_s(mission, robot, leg) == pytest.approx(held_s(whole, robot, leg), abs=0.1)
+                    compared += held_s(whole, robot, leg) > 2
+    assert compared >= 6
