@@ -116,7 +116,8 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
         if not busy:
             return NOBODY
         if still:
-            steps = 1 if team.braking else _steps_to_wait(robots, team, waits)
+            steps = 1 if team.braking or team.regated else _steps_to_wait(robots, team, waits)
+            team.regated = False
             _pass_over(robots, team, waits, abs(steps))
             if team.braking:
                 return REST

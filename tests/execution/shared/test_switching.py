@@ -20,6 +20,7 @@ from sva_bench.execution.shared.planning import first_order
 from sva_bench.execution.shared.switching import ASK_S, Standing, Switching
 from sva_bench.execution.shared.team_bullet import TeamBullet
 from sva_bench.execution.shared.team_twin import TeamTwin
+from sva_bench.execution.shared.truncation import cut_off
 from sva_bench.robot.disturbance import Disturbance
 from sva_bench.world.noise import People
 from tests.execution.shared.crowds import itinerary
@@ -180,6 +181,26 @@ def test_a_robot_that_the_order_does_not_know_is_not_let_go_first() -> None:
     switching = Switching(order.crossings, (0, 2))
     assert switching.ask(1, lambda _: Standing(0, 0.0, drives=False, stops_m=0.0), [False] * 3) == ()
     assert not switching.needs(0, 3)[1].any()
+
+
+def test_a_mission_is_not_cut_off_where_a_robot_asked_after_the_failure() -> None:
+    # Without the robot that failed, the answer might have been another one.
+    for seed in range(6):
+        ready = random_mission(seed, noisy=False)
+        if ready is None:
+            continue
+        ways, sure = ways_of(ready), [RobotFate() for _ in ready.orders]
+        whole = replace(played(ready, seed, sure, 0), asked_s=-math.inf)
+        for number, own in enumerate(ready.orders):
+            fates = [*sure[:number], RobotFate(sum(own.is_poi(site) for site in own.route)), *sure[number + 1:]]
+            cut = cut_off(ways, ready.orders, whole, fates)
+            if cut is None or cut.robots[number].end != "failed" or cut.robots[number].end_time_s < 2.0:
+                continue
+            failed_s = cut.robots[number].end_time_s
+            assert cut_off(ways, ready.orders, replace(whole, asked_s=failed_s + 1.0), fates) is None
+            assert cut_off(ways, ready.orders, replace(whole, asked_s=failed_s - 1.0), fates) is not None
+            return
+    pytest.fail("nothing to cut off")
 
 
 def test_whole_missions_wait_less_with_an_order_that_may_switch_and_keep_all_laws() -> None:
