@@ -13,14 +13,16 @@ from sva_bench.execution.shared.crossings import Crossings, foresee, set_needs
 TOGETHER = 3
 """Groups of a pair that are changed together: one, two, up to so many, then all that are left."""
 _SAVES_S = 1e-3  # what a change must save
-_WORK = 100_000_000  # cells, times robots, that are looked at in all
+_WORK = 100_000_000  # cells, times robots, that are looked at in all,
+_THROUGH = 30_000_000  # and how many may be in going through all orders
 
 
 def flipped(crossings: Crossings, ready_s: FloatArray, spare_s: float) -> tuple[IntArray, FloatArray] | None:
     """Change the order of a plan as long as that saves robot time.
 
     Only a change of what somebody waits for can save anything. The best of these is made, alone or together with those
-    that the same two robots meet at next, and then the best after it.
+    that the same two robots meet at next, and then the best after it; where none is left, two changes at once are
+    tried. Of few groups all orders are gone through.
 
     Args:
         crossings: The groups, with the order of a plan.
@@ -34,8 +36,10 @@ def flipped(crossings: Crossings, ready_s: FloatArray, spare_s: float) -> tuple[
     second, needs = crossings.second.copy(), crossings.needs(crossings.second)
     enter_s = np.full(len(crossings.stay_s), -math.inf)
     at, free_s = np.zeros(len(first) - 1, dtype=np.int64), ready_s + crossings.stay_s[first[:-1]]
-    saved_s = _flip(first, crossings.stay_s, crossings.pair, crossings.start, crossings.waits, crossings.cell,
-                    crossings.beyond, crossings.begins, second, needs, at, free_s, spare_s, enter_s)
+    groups = (crossings.pair, crossings.start, crossings.waits, crossings.cell, crossings.beyond, crossings.begins)
+    saved_s = _flip(first, crossings.stay_s, *groups, second, needs, at, free_s, spare_s, enter_s)
+    if 2.0 ** len(second) * needs.size <= _THROUGH:
+        saved_s += _go_through(first, crossings.stay_s, *groups, second, needs, at, free_s, spare_s, enter_s)
     return (second, enter_s) if saved_s > 0 else None
 
 
@@ -100,6 +104,35 @@ def _flip(
                 set_needs(group, first, pair, start, waits, cell, beyond, second, needs)
         total = foresee(first, stay_s, needs, at, free_s, gone, spare_s, enter_s)
     return float(begun - total)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _go_through(
+    first: IntArray, stay_s: FloatArray, pair: IntArray, start: IntArray, waits: IntArray, cell: IntArray,
+    beyond: IntArray, begins: IntArray, second: IntArray, needs: IntArray, at: IntArray, free_s: FloatArray,
+    spare_s: float, enter_s: FloatArray,
+) -> float:
+    """Go through all orders, one group changed at a time (Gray's code), and keep the best; as of ``_flip``."""
+    gone, groups = np.zeros(len(first) - 1, dtype=np.bool_), len(pair)
+    begun = best = foresee(first, stay_s, needs, at, free_s, gone, spare_s, enter_s)
+    kept, then_s = second.copy(), enter_s.copy()
+    for number in range(1, 2 ** groups):
+        group = 0
+        while number >> group & 1 == 0:
+            group += 1
+        second[group] = 1 - second[group]
+        set_needs(group, first, pair, start, waits, cell, beyond, second, needs)
+        possible = True
+        for other in range(groups):
+            late = second[other]
+            possible = possible and begins[other, late] > at[pair[other, late]]
+        if possible:
+            found = foresee(first, stay_s, needs, at, free_s, gone, spare_s, then_s)
+            if found < best - _SAVES_S:
+                best = found
+                kept[:], enter_s[:] = second, then_s
+    second[:] = kept
+    return float(begun - best)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

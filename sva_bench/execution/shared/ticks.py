@@ -119,8 +119,8 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
         if not busy:
             return NOBODY
         if still:
-            steps = 1 if team.braking or stale else _steps_to_wait(robots, team, waits)
-            stale = False
+            steps = 1 if team.braking or stale or team.regated else _steps_to_wait(robots, team, waits)
+            stale = team.regated = False
             _pass_over(robots, team, waits, abs(steps))
             if team.braking:
                 return REST

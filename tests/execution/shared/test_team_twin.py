@@ -339,6 +339,27 @@ def test_a_dropped_robot_is_waited_for_by_nobody_and_stays_where_it_was() -> Non
         assert [len(mission.legs[robot]) for robot in range(3)].count(2) == 2
 
 
+def test_who_waits_goes_on_when_the_robot_that_it_waits_for_is_dropped_while_all_stand() -> None:
+    # The first into the corridor stands at a door until it is dry; by then all others stand before the corridor.
+    order = ORDERS["corridor"]
+    first = min(range(3), key=lambda robot: order.lanes[robot].enter_s[30])
+    mission = Mission(TeamTwin(members_of(CORRIDOR)), order.lanes)
+    for robot, lane in enumerate(order.lanes):
+        mission.driver.assign(robot, lane, order.needs[robot])
+        mission.legs[robot] = []
+    for robot in range(3):
+        holds, fuel_s = ([Hold(along_m=3.0, lasts_s=900.0, cause="door")], 60.0) if robot == first else ([], math.inf)
+        mission.driver.start_leg(robot, 0.0, math.inf, holds, fuel_s=fuel_s, idle_share=0.5)
+    assert mission.go_on().kind == "ended"
+    ended_s = mission.driver.clock_s
+    mission.driver.drop(first)
+    while (happening := mission.go_on()).kind == "touch":  # they drive through it
+        pass
+    assert happening.kind == "idle"
+    assert ended_s > 90
+    assert [len(mission.legs[robot]) for robot in range(3)].count(2) == 2
+
+
 def test_a_robot_that_stays_where_it_is_has_a_lane_without_legs_and_is_in_the_way() -> None:
     # It stands beside the way of another, within reach of its hull: no order, for it never leaves.
     beside, clear = (2.0, 0.2), (2.0, 2.0)
