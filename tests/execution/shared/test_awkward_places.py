@@ -13,6 +13,7 @@ from sva_bench.execution.shared import mission as mission_module
 from sva_bench.execution.shared import planning
 from sva_bench.execution.shared.planning import Onward
 from sva_bench.execution.shared.players import TeamDriven
+from sva_bench.execution.shared.switching import Switching
 from sva_bench.mission.plan import Route
 from sva_bench.travel.berths import NoRoomForBerths
 from tests.execution.shared.invariants import broken, played
@@ -159,9 +160,10 @@ def held_s(mission: TeamDriven, robot: int, leg: int) -> float:
 def test_who_goes_on_after_all_braked_meets_the_same_people_as_without(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[list[Onward]] = []
 
-    def heard(*arguments: Any) -> list[Onward]:
-        told.append(planning.plan_onward(*arguments))
-        return told[-1]
+    def heard(*arguments: Any) -> tuple[list[Onward], Switching]:
+        onward, switching = planning.plan_onward(*arguments)
+        told.append(onward)
+        return onward, switching
 
     monkeypatch.setattr(mission_module, "plan_onward", heard)
     ready = mission_in(world((), 4, {"a": (11, 1), "b": (11, 5), "c": (6, 5.3), "d": (6, 0.7)}, noise={
