@@ -22,7 +22,7 @@ from sva_bench.execution.shared.execute import ground_of, play_all
 from sva_bench.execution.shared.players import TeamDriven
 from sva_bench.execution.shared.unfailed import unfailed_keys
 from sva_bench.execution.sources import sources_on
-from sva_bench.execution.twin_draws import TwinDraws
+from sva_bench.execution.twin_draws import TwinDraws, as_planned
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.mission.plan import Plan
 from sva_bench.report.source_table import source_section
@@ -33,11 +33,14 @@ from sva_bench.study.noise_check import check_noise
 from sva_bench.study.options import Options
 from sva_bench.study.run import measure
 from sva_bench.travel.fuel import FuelCosts
+from sva_bench.workers.pool import local_workers
+from sva_bench.world.load import load_world
 from sva_bench.world.model import World
 from sva_bench.world.noise import REALISTIC, Noise
 from tests.execution.shared.random_missions import random_mission
 from tests.worlds_for_tests import SMALL, world_of
 
+WORLDS = Path(__file__).parents[2] / "worlds"
 STATION_S = 20.0
 # Both fill up at the one station first, where each stands for 20 s: one of them waits for the other.
 QUEUE = SMALL.replace("r1: {at_m: [3.2, 5.2], stop_s: 4}", f"r1: {{at_m: [3.2, 5.2], stop_s: {STATION_S:g}}}").replace(
@@ -219,3 +222,30 @@ def test_one_robot_has_the_same_rows_shared_and_independent_and_no_source_of_oth
             assert_array_equal(getattr(ours, name), getattr(theirs, name))
     for plan in shared.summary.scenarios[0].plans.values():
         assert set(plan.sources) == {"wheels", "interplay"}
+
+
+def test_missions_are_judged_alike_by_any_number_of_workers_and_again() -> None:
+    ready = next(filter(None, (random_mission(seed, process="mission", noisy=True) for seed in range(20, 30))))
+    judged = []
+    with local_workers(2, "sva_bench.execution.execute") as executor:
+        for where in (None, executor):
+            draws = TwinDraws(ready.world, ready.costs, 3, where)
+            judged += [draws.judge(ready.case.scenario, ready.case.plan, count) for count in (5, 12, 12)]
+    for number, (bad, value) in enumerate(judged):
+        assert_array_equal(bad, judged[1][0][:len(bad)], err_msg=str(number))
+        assert_array_equal(value, judged[1][1][:len(value)], err_msg=str(number))
+
+
+def test_calibrated_costs_rise_until_nobody_is_late_by_waiting() -> None:
+    # Of S3's plan both robots come to one station at once, and the second has less time to spare than the first stands.
+    shipped = load_world(WORLDS / "warehouse.yaml")
+    world = replace(shipped, interaction="shared", noise=Noise(), scenarios=(shipped.scenario("S3"),))
+    assert not world.noisy
+    assert not as_planned(world)
+    summary = measure(world, Options(trials=4, rollouts=1, fidelity="kinematic", calibrate=0.02), None, quiet).summary
+    found = summary.scenarios[0].calibration
+    assert found is not None
+    assert (found.nominal.bad.share, found.bad.share, found.reached, found.draws) == (1.0, 0.0, True, 1)
+    assert {tried.quantile for tried in found.curve} == {None, 0.5}  # nothing varies
+    assert found.factor > 1
+    assert found.promised < found.nominal.promised
