@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import permutations
 
 import numpy as np
 import pytest
@@ -279,30 +278,6 @@ def test_a_dropped_robot_is_waited_for_by_nobody_and_stays_where_it_was() -> Non
         assert kind == "idle"
         assert mission.driver.pose(first) == place
         assert [len(mission.legs[robot]) for robot in range(3)].count(2) == 2
-
-
-@pytest.mark.parametrize("numbers", list(permutations(range(3))))
-def test_whoever_waits_for_a_dropped_robot_goes_on_at_once_whatever_their_numbers(numbers: tuple[int, ...]) -> None:
-    # The others stand at their gates when the first stops for good; robots of lower numbers have their command of that
-    # control step already.
-    tours = [CORRIDOR[k] for k in numbers]
-    order = planned(tours, 0.0)
-    first = min(range(3), key=lambda robot: order.lanes[robot].enter_s[30])
-    mission = Mission(TeamTwin(members_of(tours)), order.lanes)
-    for robot, lane in enumerate(order.lanes):
-        mission.driver.assign(robot, lane, order.needs[robot])
-        mission.legs[robot] = []
-        mission.driver.start_leg(robot, 0.0, 9.0 if robot == first else math.inf, ())
-    happening = mission.go_on()
-    assert happening.kind == "ended"
-    mission.driver.drop(first)
-    while (kind := mission.go_on().kind) == "touch":
-        pass
-    assert kind == "idle"
-    for robot in {0, 1, 2} - {first}:
-        for wait in mission.legs[robot][0].waits:
-            if wait.robot == first:
-                assert wait.since_s + wait.lasts_s <= happening.clock_s + 2 * TICK_S
 
 
 def test_time_in_which_all_stand_is_passed_over() -> None:
