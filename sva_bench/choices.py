@@ -93,6 +93,9 @@ NoiseName = Literal["wheels", "speed", "track", "localisation", "delay", "payloa
                     "floors", "contact"]
 """What the execution meets that a plan doesn't know of, by the names under which its effects are reported."""
 NOISE_NAMES: tuple[NoiseName, ...] = get_args(NoiseName)
-SourceName = Literal[NoiseName, "interplay"]
-"""What the ledger of sources is divided into: the noise, and what is due to no source by itself."""
+MetName = Literal["waits", "detours", "collisions"]
+"""What robots of one world do to each other, by the names under which its effects are reported."""
+MET_NAMES: tuple[MetName, ...] = get_args(MetName)
+SourceName = Literal[NoiseName, MetName, "interplay"]
+"""What the ledger of sources is divided into: the noise, other robots, and what is due to no source by itself."""
 NoisePreset = Literal["realistic"]

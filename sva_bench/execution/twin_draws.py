@@ -1,8 +1,8 @@
-"""Routes driven by the noisy twin under noise draws of their own, apart from those of any run."""
+"""Routes, and missions of robots that meet, driven by the noisy twin under noise draws apart from those of any run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 
@@ -14,7 +14,11 @@ from sva_bench.execution.drives import Courses, Drives, RouteKey, drive_all
 from sva_bench.execution.judging import judge_route
 from sva_bench.execution.margins import margins_of
 from sva_bench.execution.orders import orders_of, planned_legs
-from sva_bench.mission.failures import process_of
+from sva_bench.execution.outcome import Assignment
+from sva_bench.execution.shared.execute import ground_of, play_all
+from sva_bench.execution.shared.players import MissionKey, TeamDriven
+from sva_bench.execution.shared.unfailed import BAD, leavers, margins_of_missions, unfailed_keys
+from sva_bench.mission.failures import PlanningTerms, process_of
 from sva_bench.mission.plan import Plan
 from sva_bench.seeds import Stream, seed_for
 from sva_bench.travel.fuel import FuelCosts
@@ -29,7 +33,9 @@ def draws_seed(number: int) -> int:
 
 
 def as_planned(world: World) -> bool:
-    """Whether the twin drives every leg just as it was planned, with a full tank and without waiting."""
+    """Whether the twin drives every leg just as it was planned, with a full tank and without waiting for anybody."""
+    if world.meets:
+        return False
     ideal = replace(world.noise, hull_friction=0.0, payload_kg=(0.0, 0.0)) == Noise()
     return ideal and not any(passage.blocked > 0 and passage.wait_s > 0 for passage in world.passages)
 
@@ -45,11 +51,15 @@ class TwinDraws:
 
     def __init__(self, world: World, costs: Mapping[str, FuelCosts], number: int, executor: Executor | None) -> None:
         self._world, self._costs, self._executor = world, costs, executor
-        settings = Settings(seed=draws_seed(number), trials=1, rollouts=1, fidelity="kinematic", recorded=False)
-        self._courses, self._drives = Courses(world, costs, settings), Drives()
+        self._settings = Settings(
+            seed=draws_seed(number), trials=1, rollouts=1, fidelity="kinematic", recorded=False)
+        self._courses, self._drives = Courses(world, costs, self._settings), Drives()
 
     def judge(self, scenario: Scenario, plan: Plan, draws: int) -> tuple[BoolArray, FloatArray]:
         """Whether a plan's mission goes wrong, nobody failing by draw, and its mean value over failures; draw by draw.
+
+        Where robots meet, the team's missions are played. Of the value, robots wait for others as if none of these
+        failed.
 
         Args:
             scenario: Who may fail.
@@ -62,17 +72,42 @@ class TwinDraws:
         process = process_of(self._world.execute_failure)
         reliabilities = [scenario.reliability(robot) for robot in self._world.robots]
         case = Case(scenario=scenario, planner="", plan=plan)
-        leaving = [(number, order) for number, order in enumerate(
-            orders_of(self._world, case, planned_legs(self._world, self._costs, [case])))
-            if order.route and process.can_leave(reliabilities[number])]
+        orders = orders_of(self._world, case, planned_legs(self._world, self._costs, [case]))
+        terms = process.terms(reliabilities)
+        if self._world.meets:
+            return self._judge_missions(case, orders, terms, draws)
+        leaving = [(number, order) for number, order in enumerate(orders)
+                   if order.route and process.can_leave(reliabilities[number])]
         self._drive({(order.robot, order.route, draw, 0): False for _, order in leaving for draw in range(draws)})
         bad, value = np.zeros(draws, dtype=np.bool_), np.zeros(draws)
-        terms = process.terms(reliabilities)
         for number, order in leaving:
             driven = [self._drives.routes[order.robot, order.route, draw, 0] for draw in range(draws)]
             judged = judge_route(margins_of(number, order, driven), terms)
             bad, value = bad | judged.bad, value + judged.value
         return bad, value
+
+    def _judge_missions(self, case: Case, orders: Sequence[Assignment], terms: PlanningTerms, draws: int
+                        ) -> tuple[BoolArray, FloatArray]:
+        """The same where robots meet."""
+        keys = unfailed_keys(self._world, [case], orders, draws)
+        played = self._missions(orders, keys)
+        bad, value = np.zeros(draws, dtype=np.bool_), np.zeros(draws)
+        if not keys:
+            return bad, value
+        for route in margins_of_missions(orders, zip(keys, played, strict=True)):
+            if route.robot in leavers(keys[0]):
+                value = value + judge_route(route, terms).value
+        return np.array([any(outcome.end in BAD for outcome in mission.robots) for mission in played]), value
+
+    def _missions(self, orders: Sequence[Assignment], keys: Sequence[MissionKey]) -> list[TeamDriven]:
+        """Missions, played now or before."""
+        known: dict[MissionKey, TeamDriven] = {}
+        play_all(self._world, ground_of(self._world, self._costs), self._settings,
+                 [(orders, key, False) for key in keys if key not in self._drives.missions], self._executor, None,
+                 known)
+        # What they looked like is of no use here, and takes much room.
+        self._drives.missions.update({key: replace(mission, trails=(), cuts=()) for key, mission in known.items()})
+        return [self._drives.missions[key] for key in keys]
 
     def legs(self, robot: str, sites: tuple[str, ...], draws: int) -> LegSamples:
         """What each leg between sites takes a robot, by the way that plans drive it.

@@ -1,4 +1,4 @@
-"""What each source of noise did to each plan, largest first."""
+"""What each source of noise, and other robots, did to each plan, largest first."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Sequence
 
 from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
-from sva_bench.choices import SourceName
+from sva_bench.choices import MET_NAMES, SourceName
 from sva_bench.report.page import heading, note, table
 from sva_bench.report.wording import listed
 
 SOURCES_HEAD = ("scenario", "plan", "source", "value", "route times [s]")
 
 _MOST_NAMED = 3
+_OF_OTHERS = ("Waits, detours and collisions are what other robots did: with them less each one alone from its berth, "
+              "by the twin. Detours: what legs that led another way than the shortest took longer. Waits: the rest, "
+              "for robots on their ways, at stations and where one stands for good.")
 
 Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
@@ -47,8 +50,10 @@ def source_section(scenarios: Scenarios) -> list[str]:
     rows = source_rows(scenarios)
     if not rows:
         return []
-    return [heading("What each source of noise did"), note(costliest(scenarios)),
-            table(SOURCES_HEAD, rows, words=(0, 1, 2)),
+    met = any(row[2] in MET_NAMES for row in rows)
+    return [heading("What noise and other robots did" if met else "What each source of noise did"),
+            note(costliest(scenarios)), table(SOURCES_HEAD, rows, words=(0, 1, 2)),
+            *([note(_OF_OTHERS)] if met else []),
             note("Value: with the source less without it, in the same trials and noise draws, by the noisy twin; of "
                  "contact, floors and payload, executed less by the twin. Interplay: what is due to no source by "
                  "itself. The values add up to executed less expected less draws. Route times: how much longer the "
@@ -62,14 +67,16 @@ def costliest(scenarios: Scenarios) -> str:
              for source, effect in plan.sources.items() if source != "interplay"]
     most = _signed(min((cost for cost, _, _ in costs), default=0.0))
     if not most.startswith("-"):
-        return "No source of noise by itself costs any plan anything."
+        noise = not any(source in MET_NAMES for _, source, _ in costs)
+        return f"No source {'of noise ' if noise else ''}by itself costs any plan anything."
     where: dict[str, list[str]] = {}
     for cost, source, plan in costs:
         if _signed(cost) == most:
             where.setdefault(source, []).append(plan)
     if len(where) == 1:
         ((alone, plans),) = where.items()
-        return f"By itself, {alone} costs most: {most[1:]} of {_listed(plans)}."
+        alone_costs = f"themselves, {alone} cost" if alone in MET_NAMES else f"itself, {alone} costs"
+        return f"By {alone_costs} most: {most[1:]} of {_listed(plans)}."
     if len({tuple(plans) for plans in where.values()}) == 1:
         plans = next(iter(where.values()))
         return f"By themselves, {listed(list(where))} cost most, as much as each other: {most[1:]} of {_listed(plans)}."

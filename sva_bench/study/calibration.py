@@ -184,7 +184,7 @@ def _ladder_of(
     world: World, costs: Mapping[str, FuelCosts], target: Target, limits: SolveLimits, executor: Executor | None,
     progress: OnProgress,
 ) -> _Ladder:
-    """The nominal costs; then quantiles; and for a share factors on the median beyond them."""
+    """The nominal costs; then quantiles; and for a share, or where robots meet, factors on the median beyond them."""
     if as_planned(world):
         return _Ladder(world=world, limits=limits, rungs=[NOMINAL_RUNG], costs=[{}], known={})
     draws = TwinDraws(world, costs, _FOR_COSTS, executor)
@@ -195,8 +195,9 @@ def _ladder_of(
         samples[kind] = draws.legs(robot, tuple(site.name for site in world.sites),
                                     _LEG_DRAWS if world.noisy else 1)
         progress("sampling legs", number + 1, len(first))
-    rungs = [Rung(quantile=quantile) for quantile in QUANTILES]
-    if target != "best":
+    # Where robots meet and nothing is drawn, all quantiles are one.
+    rungs = [Rung(quantile=quantile) for quantile in (QUANTILES if world.noisy or not world.meets else (MEDIAN,))]
+    if target != "best" or world.meets:  # no leg by itself tells of waits for others
         beyond = _BEYOND * max(typical_excess(each, QUANTILES[-1]) for each in samples.values())
         rungs += [Rung(quantile=MEDIAN, factor=factor) for factor in _FACTORS if factor > beyond]
     return _Ladder(

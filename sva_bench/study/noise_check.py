@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from sva_bench.analysis.tightness import NoiseCheck, PlanTightness, tightness_of
@@ -10,8 +10,11 @@ from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives, drive_all
 from sva_bench.execution.execute import drives_ahead
-from sva_bench.execution.margins import margins_of_team
+from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.orders import orders_of, planned_legs
+from sva_bench.execution.shared.execute import ground_of, play_all
+from sva_bench.execution.shared.players import MissionKey, TeamDriven
+from sva_bench.execution.shared.unfailed import margins_of_missions, unfailed_keys
 from sva_bench.mission.plan import Plan, unless_interrupted
 from sva_bench.report.drawing import JudgedLeg, Kind, Overlays, draw_world
 from sva_bench.solver.two_stage import Knowledge, knowledge_of, plan_stochastic
@@ -64,14 +67,31 @@ def check_noise(
     for number, ((scenarios, name), plan) in enumerate(plans.items()):
         # A robot that may leave in one of its scenarios drives its route.
         cases = [Case(scenario=world.scenario(scenario), planner=name, plan=plan) for scenario in scenarios]
-        ahead, drives = drives_ahead(world, costs, cases, settings), Drives()
-        drive_all(ahead.chunks, drives, None, lambda done, of, k=number: progress(  # type: ignore[misc]
-            "driving routes", k * of + done, len(plans) * of))
-        ahead.courses.compose(ahead.wanted, drives)
-        orders = orders_of(world, cases[0], planned_legs(world, costs, cases))
-        found.append(tightness_of(scenarios, name, robots, limits, margins_of_team(orders, drives.routes)))
+        margins = (_of_missions if world.meets else _of_routes)(
+            world, costs, cases, settings, lambda done, of, k=number: progress(  # type: ignore[misc]
+                "driving routes", k * of + done, len(plans) * of))
+        found.append(tightness_of(scenarios, name, robots, limits, margins))
     return CheckedPlans(plans=tuple(plans.values()),
                         found=NoiseCheck(world=world.name, seed=seed, draws=draws, plans=tuple(found)))
+
+
+def _of_routes(world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings,
+               progress: Callable[[int, int], None]) -> tuple[Margins, ...]:
+    """Margins of routes that robots drive each by itself."""
+    ahead, drives = drives_ahead(world, costs, cases, settings), Drives()
+    drive_all(ahead.chunks, drives, None, progress)
+    ahead.courses.compose(ahead.wanted, drives)
+    return margins_of_team(orders_of(world, cases[0], planned_legs(world, costs, cases)), drives.routes)
+
+
+def _of_missions(world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings,
+                 progress: Callable[[int, int], None]) -> tuple[Margins, ...]:
+    """Margins of routes of robots that meet, from missions in which every robot leaves that may."""
+    orders = orders_of(world, cases[0], planned_legs(world, costs, cases))
+    keys = unfailed_keys(world, cases, orders, settings.rollouts)
+    played: dict[MissionKey, TeamDriven] = {}
+    play_all(world, ground_of(world, costs), settings, [(orders, key, False) for key in keys], None, progress, played)
+    return margins_of_missions(orders, played.items())
 
 
 def _stochastic(world: World, costs: Mapping[str, FuelCosts], progress: OnProgress

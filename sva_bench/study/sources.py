@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -19,7 +18,7 @@ from sva_bench.analysis.results import PlanResult, SourceEffect
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import NoiseName, SourceName
-from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.case import Case
 from sva_bench.execution.drives import Drives, RouteKey
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
@@ -27,7 +26,9 @@ from sva_bench.execution.orders import planned_legs
 from sva_bench.execution.outcome import Driven
 from sva_bench.execution.sources import OF_PHYSICS, ON_CLOCK_OR_TANK, sources_on, without
 from sva_bench.mission.plan import Route
-from sva_bench.travel.fuel import FuelCosts
+from sva_bench.study.effects import Effects
+from sva_bench.study.effects import Grounds as Grounds
+from sva_bench.study.met_sources import met_effects
 from sva_bench.world.model import World
 
 SummaryT = TypeVar("SummaryT", Summary, ComparisonSummary)
@@ -35,23 +36,6 @@ ScenarioT = TypeVar("ScenarioT", ScenarioSummary, ComparedScenario)
 
 _Cause = NoiseName | None
 """The source that was switched off; ``None`` = none was."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Grounds:
-    """What a run was executed with.
-
-    Attributes:
-        world, costs, settings: The world, its fuel costs, and how plans were executed.
-        executor: Where drives run; ``None`` = here.
-        drives: What was driven for the run.
-    """
-
-    world: World
-    costs: Mapping[str, FuelCosts]
-    settings: Settings
-    executor: Executor | None
-    drives: Drives
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,7 +52,9 @@ class _Twin:
 
 
 def with_sources(grounds: Grounds, summary: SummaryT, executed: Sequence[Executed]) -> SummaryT:
-    """The summary with what each source of noise did to each plan; the same where there is no noise.
+    """The summary with what each source of noise did to each plan, and other robots where they meet.
+
+    It is the same where there is neither.
 
     Args:
         grounds: What the run was executed with.
@@ -77,9 +63,21 @@ def with_sources(grounds: Grounds, summary: SummaryT, executed: Sequence[Execute
     """
     sources = sources_on(grounds.world)
     runs = [run for run in executed if run.case.role in ("stochastic", "deterministic", "calibrated", "given")]
-    if not sources:
-        return summary
     cases = [run.case for run in runs]
+    if grounds.world.meets:
+        found = met_effects(grounds, cases)
+    elif sources:
+        found = _noise_effects(grounds, cases, sources)
+    else:
+        return summary
+    return replace(summary, scenarios=tuple(_attached(scenario, found, {
+        case.planner: run for run in runs if (case := run.case).scenario.name == scenario.name})
+        for scenario in summary.scenarios))
+
+
+def _noise_effects(grounds: Grounds, cases: Sequence[Case], sources: Sequence[NoiseName]
+                   ) -> dict[tuple[str, str], Effects]:
+    """What is known of the sources of plans whose robots do not meet."""
     driven = [source for source in sources if source not in OF_PHYSICS]
     twins: dict[_Cause, _Twin] = {None: _by_twin(grounds, grounds.world, cases, {})}
     for source in driven:
@@ -87,12 +85,9 @@ def with_sources(grounds: Grounds, summary: SummaryT, executed: Sequence[Execute
         twins[source] = _by_twin(grounds, without(grounds.world, source), cases, shared)
     of_physics = next((source for source in OF_PHYSICS if source in sources), None)
     planned = planned_legs(grounds.world, grounds.costs, cases)
-    found = {(case.scenario.name, case.planner): _effects(
+    return {(case.scenario.name, case.planner): _effects(
         grounds, case, twins, planned, None if grounds.settings.fidelity == "kinematic" else of_physics)
         for case in cases}
-    return replace(summary, scenarios=tuple(_attached(scenario, found, {
-        case.planner: run for run in runs if (case := run.case).scenario.name == scenario.name})
-        for scenario in summary.scenarios))
 
 
 def _by_twin(
@@ -106,27 +101,10 @@ def _by_twin(
         (run.case.scenario.name, run.case.planner): float(np.mean(run.value.sum(axis=1))) for run in executed})
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Effects:
-    """What is known of a plan's sources before its executed value.
-
-    Attributes:
-        by_source: Of those that the twin knows.
-        of_physics: The source that what only physics knows goes by, and its seconds; ``None`` = by none.
-        twin: Mean value by the twin, with all sources.
-        rest_s: Seconds beyond the planned ones that no source has [s].
-    """
-
-    by_source: Mapping[SourceName, SourceEffect]
-    of_physics: tuple[NoiseName, float] | None
-    twin: float
-    rest_s: float
-
-
 def _effects(
     grounds: Grounds, case: Case, twins: Mapping[_Cause, _Twin], planned: Mapping[tuple[str, Route], Sequence[float]],
     of_physics: NoiseName | None,
-) -> _Effects:
+) -> Effects:
     key = case.scenario.name, case.planner
     routes = [(robot.name, case.plan.route(robot.name)) for robot in grounds.world.robots]
     taken = {source: _taken_s(twin.routes, routes) for source, twin in twins.items()}
@@ -139,7 +117,7 @@ def _effects(
     beyond_plan = taken[None] - math.fsum(
         math.fsum(planned[route]) for route in routes if _of(twins[None].routes, *route))
     rest_s = beyond_plan - math.fsum(effect.seconds for effect in by_source.values())
-    return _Effects(by_source=by_source, twin=value[None], rest_s=rest_s if of_physics else rest_s + physics_s,
+    return Effects(by_source=by_source, twin=value[None], rest_s=rest_s if of_physics else rest_s + physics_s,
                     of_physics=(of_physics, physics_s) if of_physics else None)
 
 
@@ -168,7 +146,7 @@ def _beyond_s(
 
 
 def _attached(
-    scenario: ScenarioT, found: Mapping[tuple[str, str], _Effects], runs: Mapping[str, Executed]
+    scenario: ScenarioT, found: Mapping[tuple[str, str], Effects], runs: Mapping[str, Executed]
 ) -> ScenarioT:
     """The scenario with the sources of its plans."""
     plans = {name: replace(plan, sources=_sources_of(plan, found[scenario.name, name])) if name in runs else plan
@@ -176,7 +154,7 @@ def _attached(
     return replace(scenario, plans=plans)
 
 
-def _sources_of(plan: PlanResult, effects: _Effects) -> dict[SourceName, SourceEffect]:
+def _sources_of(plan: PlanResult, effects: Effects) -> dict[SourceName, SourceEffect]:
     """All sources and the interplay, which add up to what the noise did to the plan."""
     sources = dict(effects.by_source)
     if effects.of_physics is not None:

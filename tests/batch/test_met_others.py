@@ -29,6 +29,7 @@ from sva_bench.study.options import Options, settings_of
 from sva_bench.study.run import measure
 from sva_bench.world.model import World
 from sva_bench.world.noise import LocalisationError
+from tests.batch.test_commands import rows_of
 from tests.worlds_for_tests import SMALL, world_of
 
 EIGHT = Meetings(contacts=np.array([0, 1, 0, 0, 0, 2, 0, 0]), waited_s=np.array([0, 3.5, 1, 2, 0, 0, 9, 0.5]),
@@ -131,3 +132,30 @@ def test_travel_times_are_shared_by_what_berths_depend_on_and_nothing_else(tmp_p
               job_of(replace(world, sites=(world.sites[0], station, *world.sites[2:])), 0),
               job_of(replace(world, robots=(world.robots[0], larger)), 0), job_of(replace(world, noise=unsure), 0)]
     assert len({key, *(job.key for job in others)}) == 1 + len(others)
+
+
+# Rows
+
+
+def test_rows_of_robots_that_meet_are_the_same_on_any_number_of_workers_and_after_a_crash(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    world = tmp_path / "small.yaml"
+    world.write_text(SMALL.replace("noise: {wheel_gain_sd: 0.01}", "noise: realistic\nfailure: per_leg\n"
+                                   "interaction: shared"), encoding="utf-8")
+    words = ["batch", str(world), "--seed", "0-1", "--trials", "40", "--unit-trials", "20", "--rollouts", "4",
+             "--fidelity", "kinematic", "--json", "--cache", str(tmp_path / "cache")]
+
+    def told(out: str, *more: str) -> str:
+        assert run_command_line([*words, "--out", str(tmp_path / out), *more]) == 0
+        return capsys.readouterr().out
+
+    one, two = (told(f"on-{workers}", "--workers", workers) for workers in ("1", "2"))
+    assert one == two
+    rows = rows_of(tmp_path / "on-1")
+    assert rows.equals(rows_of(tmp_path / "on-2"))
+    assert len(set(rows["end"].to_pylist())) > 1
+    sorted((tmp_path / "on-2").glob("outcomes-*.parquet"))[-1].unlink()
+    (tmp_path / "on-2" / "summary.json").unlink()
+    assert told("on-2", "--workers", "2", "--resume") == one
+    assert rows.equals(rows_of(tmp_path / "on-2"))

@@ -37,6 +37,7 @@ class TeamRun:
         drawn: How each differs from its model.
         order: The plan in space and time; ``None`` = nobody coordinates them.
         noise_index: Seed and number of the noise draw, for what robots meet on their ways.
+        alone: Whether robots neither heed nor touch each other.
         switches: Whether robots may be let go before others that are late.
     """
 
@@ -47,6 +48,7 @@ class TeamRun:
     drawn: Sequence[NoiseDraw]
     order: Order | None
     noise_index: tuple[int, int]
+    alone: bool = False
     switches: bool = True
 
 
@@ -80,7 +82,7 @@ def _pose(pose: FloatArray) -> tuple[float, float, float]:
 def _played(run: TeamRun, driver: TeamDriver, *, traced: bool) -> TeamDriven:
     with driver:
         return replace(SharedMission(run.world, run.ways, run.orders, run.fates, run.drawn, run.order, driver,
-                                     run.noise_index, switches=run.switches).play(), traced=traced)
+                                     run.noise_index, alone=run.alone, switches=run.switches).play(), traced=traced)
 
 
 def _in_physics(run: TeamRun, members: Sequence[Member], twin: TeamDriven, *, traced: bool) -> TeamDriven:

@@ -13,7 +13,7 @@ from sva_bench.choices import Fidelity
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.fate import draw_fate
-from sva_bench.execution.margins import Margins, margins_of
+from sva_bench.execution.margins import Margins
 from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.noise import draw_noise
 from sva_bench.execution.orders import orders_of, planned_legs
@@ -25,6 +25,7 @@ from sva_bench.execution.shared.planning import first_order
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.trace import leg_times, traces_of
 from sva_bench.execution.shared.truncation import cut_off
+from sva_bench.execution.shared.unfailed import margins_of_missions
 from sva_bench.files.digest import digest
 from sva_bench.mission.failures import NEVER, process_of
 from sva_bench.mission.plan import Route
@@ -56,7 +57,7 @@ def ground_of(world: World, costs: Mapping[str, FuelCosts]) -> Ground:
 
 
 @lru_cache(maxsize=2)  # a worker plays missions of one world after the other, plan by plan
-def _ways_of(ground: Ground) -> Ways:
+def ways_of(ground: Ground) -> Ways:
     return Ways(ground.world, ground.costs)
 
 
@@ -71,6 +72,7 @@ class TeamTask:
         keys: The missions.
         traced: Whether poses are kept, by mission.
         seed, fidelity: As of the settings.
+        alone: Whether robots neither heed nor touch each other.
     """
 
     world: World
@@ -80,26 +82,28 @@ class TeamTask:
     traced: tuple[bool, ...]
     seed: int
     fidelity: Fidelity
+    alone: bool = False
 
 
 def play_missions(task: TeamTask) -> tuple[TeamDriven, ...]:
     """Play the missions of a task."""
-    world, ways = task.world, _ways_of(task.ground)
+    world, ways = task.world, ways_of(task.ground)
     _, fates, _ = task.keys[0]
     leaves = tuple(fate.before_poi > 0 and bool(own.route) for fate, own in zip(fates, task.orders, strict=True))
-    order = first_order(ways, task.orders, leaves) if world.interaction == "shared" else None
+    order = first_order(ways, task.orders, leaves) if world.interaction == "shared" and not task.alone else None
     played = []
     for (_, own, rollout), traced in zip(task.keys, task.traced, strict=True):
         drawn = [draw_noise(world.noise, task.seed, rollout, number) for number in range(len(world.robots))]
         played.append(drive_team(TeamRun(
             world=world, ways=ways, orders=task.orders, fates=own, drawn=drawn, order=order,
-            noise_index=(task.seed, rollout)), task.fidelity, traced=traced))
+            noise_index=(task.seed, rollout), alone=task.alone), task.fidelity, traced=traced))
     return tuple(played)
 
 
 def execute_team(
     world: World, costs: Mapping[str, FuelCosts], cases: Sequence[Case], settings: Settings,
     executor: Executor | None, progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven],
+    ground: Ground | None = None,
 ) -> list[Executed]:
     """Execute plans over all trials, as ``execute`` does for robots that don't meet.
 
@@ -109,23 +113,35 @@ def execute_team(
     Args:
         world, costs, cases, settings, executor, progress: As of ``execute``.
         known: Missions played already; what is played now is added.
+        ground: What the robots' ways depend on; ``None`` = on this world.
     """
-    planned, ground = planned_legs(world, costs, cases), ground_of(world, costs)
-    ways = _ways_of(ground)
-    teams = [_Team(world, ways, case, orders_of(world, case, planned), settings) for case in cases]
-    _play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
-                                       for key, traced in team.unfailed().items()], executor, progress, known)
-    _play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
-                                       for key, traced in team.failed(known).items()], executor, progress, known)
+    planned, ground = planned_legs(world, costs, cases), ground or ground_of(world, costs)
+    ways = ways_of(ground)
+    teams = [Team(world, ways, case, orders_of(world, case, planned), settings) for case in cases]
+    play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
+                                      for key, traced in team.unfailed().items()], executor, progress, known)
+    play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
+                                      for key, traced in team.failed(known).items()], executor, progress, known)
     return [team.executed(costs, known) for team in teams]
 
 
-def _play_all(
+def play_all(
     world: World, ground: Ground, settings: Settings,
     wanted: Sequence[tuple[Sequence[Assignment], MissionKey, bool]], executor: Executor | None,
-    progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven],
+    progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven], *, alone: bool = False,
 ) -> None:
-    """Play missions that are not known yet."""
+    """Play missions that are not known yet.
+
+    Args:
+        world: The world that robots meet.
+        ground: What their ways depend on.
+        settings: Seed and fidelity.
+        wanted: Orders of the robots, the mission, and whether its poses are kept.
+        executor: Where missions are played; ``None`` = here.
+        progress: Called with the number of missions played and of all.
+        known: Missions played already; what is played now is added.
+        alone: Whether robots neither heed nor touch each other.
+    """
     groups: dict[tuple[tuple[Route, ...], tuple[bool, ...]], dict[MissionKey, bool]] = {}
     orders_of_routes: dict[tuple[Route, ...], Sequence[Assignment]] = {}
     for orders, key, traced in wanted:
@@ -141,7 +157,7 @@ def _play_all(
             mine = tuple(keys[first:first + _CHUNK])
             tasks.append(TeamTask(world=world, ground=ground, orders=tuple(orders_of_routes[routes]), keys=mine,
                                   traced=tuple(group[key] for key in mine), seed=settings.seed,
-                                  fidelity=settings.fidelity))
+                                  fidelity=settings.fidelity, alone=alone))
     count, of = 0, sum(len(task.keys) for task in tasks)
     for task, played in _played(tasks, executor):
         known.update(zip(task.keys, played, strict=True))
@@ -166,7 +182,7 @@ def _played(tasks: Sequence[TeamTask], executor: Executor | None
             future.cancel()
 
 
-class _Team:
+class Team:
     """The trials of one case."""
 
     def __init__(self, world: World, ways: Ways, case: Case, orders: Sequence[Assignment], settings: Settings) -> None:
@@ -210,6 +226,20 @@ class _Team:
             return None
         return cut_off(self._ways, self.orders, whole, self._fates[row])
 
+    def mission(self, row: int, known: Mapping[MissionKey, TeamDriven]) -> TeamDriven:
+        """A trial's mission, played itself or cut off one without failures."""
+        mission = known.get(self._key(row)) or self._cut_off(row, known)
+        assert mission is not None
+        return mission
+
+    def fates(self, row: int) -> tuple[RobotFate, ...]:
+        """When each robot fails in a trial."""
+        return self._fates[row]
+
+    def rollout(self, row: int) -> int:
+        """The noise draw of a trial."""
+        return int(self._fate.rollout[row])
+
     def executed(self, costs: Mapping[str, FuelCosts], known: Mapping[MissionKey, TeamDriven]) -> Executed:
         """What came of the trials."""
         found: dict[MissionKey, tuple[int, TeamDriven]] = {}
@@ -218,9 +248,7 @@ class _Team:
         for row in range(self._settings.trials):
             key = self._key(row)
             if key not in found:
-                mission = known[key] if key in known else self._cut_off(row, known)
-                assert mission is not None
-                found[key] = row, mission
+                found[key] = row, self.mission(row, known)
             kind[row] = number.setdefault(key, len(number))
         distinct = [mission for _, mission in found.values()]
         columns = [figures_of([mission.robots[k] for mission in distinct]) for k in range(len(self.orders))]
@@ -243,13 +271,7 @@ class _Team:
 
     def _margins(self, known: Mapping[MissionKey, TeamDriven]) -> tuple[Margins, ...]:
         """What each route left of fuel and time where nobody fails on the way, under each noise draw."""
-        whole: dict[int, TeamDriven] = {}
-        for row in range(self._settings.trials):
-            key = self._unfailed(row)
-            if all(fate.before_poi == NEVER for fate, own in zip(key[1], self.orders, strict=True) if own.route):
-                whole.setdefault(key[2], known[key])
-        return tuple(margins_of(number, own, [whole[rollout].driven[number] for rollout in sorted(whole)])
-                     for number, own in enumerate(self.orders) if own.route)
+        return margins_of_missions(self.orders, [(key, known[key]) for key in self.unfailed()])
 
     def _legs(self, costs: Mapping[str, FuelCosts], found: Mapping[MissionKey, tuple[int, TeamDriven]]
               ) -> tuple[LegTime, ...]:

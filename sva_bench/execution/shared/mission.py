@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise, repeat
 
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import HELD_S, Assignment, RobotFate, Wait
@@ -21,7 +21,7 @@ from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
 from sva_bench.execution.shared.players import BRAKING, Player, TeamDriven, driven_by
 from sva_bench.execution.shared.switching import ASK_S, Switching
-from sva_bench.execution.waits import HopWait, waits_on
+from sva_bench.execution.waits import waits_on
 from sva_bench.world.model import World
 
 DEADLOCK = "deadlock"
@@ -42,18 +42,19 @@ class SharedMission:
         order: The plan in space and time; ``None`` = nobody coordinates them.
         driver: The team in motion.
         noise_index: Seed and number of the noise draw, for what robots meet on their ways.
+        alone: Whether robots neither heed nor touch each other.
         switches: Whether robots may be let go before others that are late.
     """
 
     def __init__(
         self, world: World, ways: Ways, orders: Sequence[Assignment], fates: Sequence[RobotFate],
         drawn: Sequence[NoiseDraw], order: Order | None, driver: TeamDriver, noise_index: tuple[int, int],
-        *, switches: bool = True,
+        *, alone: bool = False, switches: bool = True,
     ) -> None:
         self._world, self._ways, self._driver, self._noise_index = world, ways, driver, noise_index
-        self._coordinated = order is not None
+        self._coordinated, self._alone = order is not None, alone
         self._braking = self._replanned = False
-        self._contacts = self._detours = self._switched = 0
+        self._contacts = self._switched = 0
         self._asked_s = -math.inf
         self._switching = None if order is None else Switching(order.crossings, range(len(orders)))
         driver.ask(ASK_S if switches and order is not None else 0.0)
@@ -70,6 +71,8 @@ class SharedMission:
                 driver.assign(number, uncoordinated(player.cuts), None)
             else:
                 player.cuts = list(order.lanes[number].cuts)
+                player.around = [way is not ways.shortest(number, a, b)
+                                 for way, (a, b) in zip(player.cuts, pairwise(route), strict=True)]
                 driver.assign(number, order.lanes[number], order.needs[number])
         self._planned = tuple(tuple(player.cuts) for player in self._players)
         self._starts = tuple(driver.pose(player.number) for player in self._players)
@@ -85,8 +88,8 @@ class SharedMission:
         return TeamDriven(
             names=tuple(self._names), contacts=self._contacts,
             robots=tuple(player.mission.outcome() for player in self._players),
-            stops=tuple(tuple(player.stops) for player in self._players), detours=self._detours, cuts=self._planned,
-            starts=self._starts,
+            stops=tuple(tuple(player.stops) for player in self._players), cuts=self._planned, starts=self._starts,
+            led_round=tuple(tuple(player.led_round) for player in self._players),
             driven=tuple(driven_by(player) for player in self._players),
             replanned=self._replanned or any(player.down for player in self._players),
             trails=tuple(tuple(player.trail) for player in self._players), asked_s=self._asked_s,
@@ -139,30 +142,46 @@ class SharedMission:
             fuel_s=max(mission.tank_s * capacity - driven_s - share * waited_s, 0.0))
 
     def _holds(self, player: Player) -> list[Hold]:
-        """What a robot meets on what is left of its leg."""
+        """What a robot meets on its leg, or on what is left of it.
+
+        On what is left of its way it meets what it has not met yet, and stands out what it was standing at. On a way
+        that was planned anew it may meet others, but stands at a passage no longer than it is shut.
+        """
+        if player.parts and player.on_its_way:
+            part = player.parts[-1]
+            left = player.holds[part.holds_over:]
+            if left and part.hold_left_s is not None:
+                left = [replace(left[0], lasts_s=part.hold_left_s), *left[1:]]
+            player.holds = [replace(hold, along_m=max(hold.along_m - player.begun_m, 0.0)) for hold in left]
+            return player.holds
         noise, passages = self._world.noise, self._world.passages
         if noise.people is None and not passages:
             return []
+        served = {passage.name: sum(wait.lasts_s for part in player.parts for wait in part.waits
+                                    if wait.hold == passage.name) for passage in passages}
         seed, rollout = self._noise_index
         back_m = self._ways.model(player.number).radius_m + _BACK_M
-        ends = self._ways.hops(player.number, player.stops[-2], player.stops[-1])
-        left = player.cuts[0].leg  # the last of its hops; where they were planned anew, one in place of all
-        met: list[tuple[float, HopWait]] = []
-        way_m = 0.0
-        for hop, between in zip(left, ends[-len(left):], strict=True):
-            met += [(way_m + wait.along_m, wait) for wait in waits_on(
-                hop, between, noise, passages, seed, rollout, player.number, back_m)]
+        ends, leg = self._ways.hops(player.number, player.stops[-2], player.stops[-1]), player.cuts[0].leg
+        if len(ends) != len(leg):  # a way round leads to the stop at once, or by way of a place aside
+            ends = [(player.stops[-2], player.stops[-1])] * len(leg)
+        player.holds, way_m = [], 0.0
+        for hop, between in zip(leg, ends, strict=True):
+            for wait in waits_on(hop, between, noise, passages, seed, rollout, player.number, back_m):
+                over_s = min(served.get(wait.cause, 0.0), wait.lasts_s)
+                if over_s > 0:
+                    served[wait.cause] -= over_s
+                if wait.lasts_s > over_s:
+                    player.holds.append(Hold(along_m=way_m + wait.along_m, lasts_s=wait.lasts_s - over_s,
+                                             cause=wait.cause))
             way_m += sum(float(stretch.arc[-1]) for stretch in hop)
-        served = {wait.hold for part in player.parts for wait in part.waits}
-        return [Hold(along_m=along_m, lasts_s=wait.lasts_s, cause=wait.cause) for along_m, wait in met
-                if wait.cause not in served]
+        return player.holds
 
     def _arrive(self, player: Player) -> None:
         """A robot is where its leg ends."""
         self._finish(player)
         if player.active:
             player.at = self._ways.site_at(player.number, player.stops[-1], player.cuts[0])
-            player.cuts = player.cuts[1:]
+            player.cuts, player.around = player.cuts[1:], player.around[1:]
             self._depart(player)
         elif player.mission.end in ("home", "late") or player.mission.kept_off:
             player.cuts = []
@@ -182,6 +201,7 @@ class SharedMission:
                         tuple(touches), tuple(waits), held_by)
         player.mission.drive(leg._replace(time_s=math.inf) if over else leg)
         player.legs.append(leg)
+        player.led_round.append(player.around[0] if player.around else False)
         player.trail.append(tuple(parts))
         player.parts = []
 
@@ -209,6 +229,8 @@ class SharedMission:
 
     def _touch(self, one: Player, other: Player) -> None:
         """Two hulls touched: of robots that nobody coordinates, that is the end of both."""
+        if self._alone:
+            return
         self._contacts += 1
         if not self._coordinated:
             for player, met in ((one, other), (other, one)):
@@ -227,8 +249,9 @@ class SharedMission:
         """Whether a robot stands where another still has to pass."""
         x, y, _ = self._driver.pose(down.number)
         disc = Disc(x_m=x, y_m=y, radius_m=self._ways.model(down.number).radius_m, name=self._names[down.number])
-        return any(self._ways.blocked(player.number, way, [disc]) is not None
-                   for player in self._players if player.active for way in player.cuts)
+        return any(self._ways.blocked(player.number, way, [disc], passed_m=passed_m) is not None
+                   for player in self._players if player.active for way, passed_m in zip(
+                       player.cuts, chain([self._driver.arc_m(player.number)], repeat(0.0)), strict=False))
 
     def _go_on(self) -> None:
         """All stand: plan the rest anew."""
@@ -240,7 +263,7 @@ class SharedMission:
         onward, self._switching = plan_onward(
             self._ways, [self._present(player) for player in self._players], self._driver.clock_s)
         moving = [(player, then) for player, then in zip(self._players, onward, strict=True) if player.active]
-        for player, then in moving:
+        for player, then in sorted(moving, key=lambda both: both[1].lane is None):  # who stands, stands in no one's way
             self._take_up(player, then)
         for player, _ in moving:
             if player.active:
@@ -255,17 +278,19 @@ class SharedMission:
             number=number, orders=mission.orders, pose=self._driver.pose(number), down=player.down,
             site=player.at if at_stop else None, ahead=mission.ahead if player.active else (),
             ready_s=mission.clock_s, burnt_s=mission.burnt_s + driven_s, cuts=tuple(player.cuts),
+            around=tuple(player.around),
             arc_m=None if at_stop else arc_m, name=self._names[number])
 
     def _take_up(self, player: Player, then: Onward) -> None:
         """Give a robot new orders, which it takes up where it stands."""
         mission = player.mission
-        self._detours += then.detours
         if then.lane is None:
+            self._driver.assign(player.number, None, None)  # what it drove is among its parts
             self._stop_for_good(player, stuck=True, held_by=then.kept_off)
             return
         mission.kept_off = mission.kept_off or then.kept_off
         mission.give(then.ahead)
         player.stops[-1] = then.ahead[0]
-        player.cuts = list(then.lane.cuts)
+        player.cuts, player.around = list(then.lane.cuts), list(then.around)
+        player.on_its_way, player.begun_m = then.on_its_way, then.begun_m
         self._driver.assign(player.number, then.lane, then.needs)

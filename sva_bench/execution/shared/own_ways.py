@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,10 +15,10 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.legs import Leg
-from sva_bench.execution.shared.lanes import Cut, Order, cut
+from sva_bench.execution.shared.lanes import CELL_M, Cut, Order, cut
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
-from sva_bench.robot.follower import Stretch, arc_lengths, stretches
+from sva_bench.robot.follower import CONTROL_HZ, Stretch, arc_lengths, stretches
 from sva_bench.robot.model import RobotModel
 from sva_bench.travel.alternatives import Ways as Lines
 from sva_bench.travel.alternatives import alternatives, way_round, ways_among
@@ -28,8 +28,10 @@ from sva_bench.world.model import World
 
 _STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goes by
 _ROUNDING_M = 0.01
+_STEP_S = 1.0 / CONTROL_HZ
 _SDS = 3.0  # of a localisation error that both robots may have
 _BESIDE = tuple((ring, k) for ring in (0.52, 0.62) for k in range(8))  # places beside a site that is taken
+_MOST_ASIDE = 5  # places for a robot to step aside to that are tried
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -90,14 +92,14 @@ class Ways:
         return list(pairwise(self._costs[robot].chain(origin, destination)))
 
     def candidates(self, robot: int, origin: str, destination: str) -> tuple[Cut, ...]:
-        """The ways of a leg, the shortest first."""
+        """The ways of a leg, the shortest first; nobody is led another one unless others are in the way."""
         shortest, hops = self.shortest(robot, origin, destination), self.hops(robot, origin, destination)
         if len(hops) > 1:  # a robot stops at the sites between
             return (shortest,)
         heading, times = self._sites[robot][destination].heading_rad, self._costs[robot].times
         others = alternatives(self._lines_of(robot), times.path(origin, destination))[1:]
-        return (shortest, *(cut(self.model(robot), (stretches(path, heading),), self.pose(robot, origin))
-                            for path in others))
+        return (shortest, *(_no_sooner(cut(self.model(robot), (stretches(path, heading),), self.pose(robot, origin)),
+                                       shortest.lasts_s) for path in others))
 
     def _lines_of(self, robot: int) -> Lines:
         if robot not in self._lines:
@@ -145,10 +147,20 @@ class Ways:
         x, y = left[0][0].path[0]
         return cut(self.model(robot), tuple(left), (float(x), float(y), yaw))
 
-    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc], more_m: float = 0.0) -> Disc | None:
-        """The first of some standing robots that is in the way, or so much nearer to it than it might be [m]."""
+    def blocked(self, robot: int, way: Cut, discs: Sequence[Disc], *, more_m: float = 0.0, passed_m: float = 0.0
+                ) -> Disc | None:
+        """The first of some standing robots that is in the way.
+
+        Args:
+            robot: The robot's position in its team.
+            way: The way.
+            discs: Who stands for good.
+            more_m: How much farther than it has to be a way is to be from them [m].
+            passed_m: How much of the way is behind it [m].
+        """
+        place_m = way.place_m[max(int(passed_m / CELL_M) - 1, 0):]
         for disc in discs:
-            apart = np.hypot(way.place_m[:, 0] - disc.x_m, way.place_m[:, 1] - disc.y_m)
+            apart = np.hypot(place_m[:, 0] - disc.x_m, place_m[:, 1] - disc.y_m)
             if float(apart.min(initial=math.inf)) < self._passes_at(robot, disc) + more_m:
                 return disc
         return None
@@ -165,18 +177,51 @@ class Ways:
         Returns:
             The way; ``None`` if there is none.
         """
-        x, y, heading = self.pose(robot, destination)
-        model, clearance = self.model(robot), self._costs[robot].times.clearance_m
-        around = np.array([(disc.x_m, disc.y_m, self._passes_at(robot, disc) - clearance + _ROUNDING_M)
-                           for disc in discs]).reshape(-1, 3)
+        path = self._path_to(robot, begin[:2], destination, discs)
+        heading = self.pose(robot, destination)[2]
+        return None if path is None else cut(self.model(robot), (stretches(path, heading),), begin)
+
+    def aside(self, robot: int, begin: Pose, destination: str, discs: Sequence[Disc]) -> tuple[Cut, ...]:
+        """Ways to a site by way of a place where a robot can let others pass: its berth, or a site near by.
+
+        Args:
+            robot, begin, destination, discs: As of ``round``.
+        """
+        berth, *others = self._own[robot].sites
+        others.sort(key=lambda site: math.dist(begin[:2], (site.x_m, site.y_m)))
+        heading = self.pose(robot, destination)[2]
+        found: list[Cut] = []
+        for site in (berth, *others):
+            place = site.x_m, site.y_m
+            if site.name == destination or len(found) == _MOST_ASIDE or self._taken(robot, place, discs):
+                continue
+            there = self._path(robot, begin[:2], place, discs)
+            on = None if there is None else self._path_to(robot, place, destination, discs)
+            if there is not None and on is not None:
+                found.append(cut(self.model(robot), (
+                    stretches(there, site.heading_rad), stretches(on, heading)), begin))
+        return tuple(found)
+
+    def _path_to(self, robot: int, begin: tuple[float, float], destination: str, discs: Sequence[Disc]
+                 ) -> FloatArray | None:
+        """A path round standing robots to a site or beside it."""
+        x, y, _ = self.pose(robot, destination)
         taken = self._taken(robot, (x, y), discs)
         beside = [(x + ring * math.cos(k * math.pi / 4), y + ring * math.sin(k * math.pi / 4)) for ring, k in _BESIDE]
         for place in beside if taken else [(x, y)]:
             if not self._taken(robot, place, discs):
-                path = way_round(self._own[robot].obstacles, np.array(begin[:2]), np.array(place), clearance, around)
+                path = self._path(robot, begin, place, discs)
                 if path is not None:
-                    return cut(model, (stretches(path, heading),), begin)
+                    return path
         return None
+
+    def _path(self, robot: int, begin: tuple[float, float], end: tuple[float, float], discs: Sequence[Disc]
+              ) -> FloatArray | None:
+        """A path round standing robots to a place."""
+        clearance = self._costs[robot].times.clearance_m
+        around = np.array([(disc.x_m, disc.y_m, self._passes_at(robot, disc) - clearance + _ROUNDING_M)
+                           for disc in discs]).reshape(-1, 3)
+        return way_round(self._own[robot].obstacles, np.array(begin), np.array(end), clearance, around)
 
     def _taken(self, robot: int, place: tuple[float, float], discs: Sequence[Disc]) -> bool:
         """Whether somebody stands too near to a place."""
@@ -190,6 +235,14 @@ class Ways:
     def _passes_at(self, robot: int, disc: Disc) -> float:
         """How near a robot's middle may come to that of one that stands [m]."""
         return self.model(robot).radius_m + disc.radius_m + _STANDS_OFF_M + self._off_m
+
+
+def _no_sooner(way: Cut, lasts_s: float) -> Cut:
+    """A way of a leg, planned to take longer than the shortest one does even where turns are fewer on it."""
+    if way.lasts_s > lasts_s:
+        return way
+    longer = (lasts_s + _STEP_S) / way.lasts_s
+    return replace(way, enter_s=way.enter_s * longer, lasts_s=way.lasts_s * longer)
 
 
 def _from(stretch: Stretch, arc_m: float) -> Stretch:

@@ -84,6 +84,7 @@ class Present:
         ready_s: When it can go on [s].
         burnt_s: Fuel burnt since it was filled [s].
         cuts: The ways of its legs as planned, the one that it is on first.
+        around: Of each of these, whether it leads another way than the shortest.
         arc_m: How far along its leg it stands [m]; ``None`` at a stop.
         down: Whether it stands for good.
         name: Its name.
@@ -97,6 +98,7 @@ class Present:
     ready_s: float
     burnt_s: float
     cuts: tuple[Cut, ...]
+    around: tuple[bool, ...]
     arc_m: float | None
     down: bool
     name: str
@@ -110,30 +112,36 @@ class Onward:
         ahead: Its stops.
         lane: Its lane; ``None`` = it stays where it is for good.
         needs: Its gate.
-        detours: How many of its legs lead round somebody.
+        around: Of each of its legs, whether it leads another way than the shortest.
         kept_off: Who keeps it from a stop, or from going on.
+        on_its_way: Whether its first leg is what is left of the one that it was on.
+        begun_m: From where along that [m].
     """
 
     ahead: tuple[str, ...]
     lane: Lane | None
     needs: tuple[IntArray, ...]
-    detours: int
+    around: tuple[bool, ...]
     kept_off: str = ""
+    on_its_way: bool = False
+    begun_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Wayout:
     ahead: tuple[str, ...]
     legs: tuple[tuple[Cut, ...], ...]
-    detours: int
+    around: tuple[bool, ...]
     kept_off: str
+    on_its_way: bool = False
 
 
 def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> tuple[list[Onward], Switching]:
     """Plan the rest of a mission from where everybody stands.
 
-    Robots that stand for good are driven round. If the others can't all go on, those stay where they are, as few as
-    it takes by trying one after the other, without which they can.
+    Robots that stand for good are driven round. If the others can't all go on, they may step aside first, to their
+    berths or to sites near by. If that doesn't help, those stay where they are, as few as it takes by trying one after
+    the other, without which they can.
 
     Args:
         ways: The ways of the robots.
@@ -146,27 +154,25 @@ def plan_onward(ways: Ways, team: Sequence[Present], now_s: float) -> tuple[list
     discs = [_disc(ways, robot) for robot in team if robot.down]
     held: set[int] = set()
     while True:
-        found = _tried(ways, team, discs, held, now_s)
-        if found is not None:
-            return found
-        moving = [robot for robot in team if robot.ahead and robot.number not in held]
-        for robot in moving:
-            found = _tried(ways, team, discs, held | {robot.number}, now_s)
-            if found is not None:
-                return found
-        held.add(moving[-1].number)
+        moving = [robot.number for robot in team if robot.ahead and robot.number not in held]
+        for more in ((), *((number,) for number in moving)):
+            for aside in (False, True):
+                found = _tried(ways, team, discs, held.union(more), now_s, aside=aside)
+                if found is not None:
+                    return found
+        held.add(moving[-1])
 
 
 def _disc(ways: Ways, robot: Present) -> Disc:
     return Disc(x_m=robot.pose[0], y_m=robot.pose[1], radius_m=ways.model(robot.number).radius_m, name=robot.name)
 
 
-def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set[int], now_s: float
-           ) -> tuple[list[Onward], Switching] | None:
-    """The rest of a mission with some robots held; ``None`` if the others can't go on."""
+def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set[int], now_s: float,
+           *, aside: bool) -> tuple[list[Onward], Switching] | None:
+    """The rest of a mission with some robots held; ``None`` if the others can't go on, stepping aside or not."""
     around = [*discs, *(_disc(ways, robot) for robot in team if robot.number in held)]
-    wayouts = [_Wayout(ahead=(), legs=(), detours=0, kept_off="") if not robot.ahead or robot.number in held
-               else _way_out(ways, robot, around) for robot in team]
+    wayouts = [_Wayout(ahead=(), legs=(), around=(), kept_off="") if not robot.ahead or robot.number in held
+               else _way_out(ways, robot, around, aside=aside) for robot in team]
     itineraries, planned = [], []
     for robot, out in zip(team, wayouts, strict=True):
         if robot.down or robot.number in held:
@@ -184,27 +190,33 @@ def _tried(ways: Ways, team: Sequence[Present], discs: Sequence[Disc], held: set
         k = place.get(robot.number)
         if k is None or not out.legs:
             by = "" if not robot.ahead else out.kept_off or "no way on"
-            onward.append(Onward(ahead=(), lane=None, needs=(), detours=0, kept_off=by))
+            onward.append(Onward(ahead=(), lane=None, needs=(), around=(), kept_off=by))
             continue
         nothing = np.zeros(len(order.needs[k][k]), dtype=np.int64)
         needs = tuple(order.needs[k][place[other.number]] if other.number in place else nothing for other in team)
-        onward.append(Onward(ahead=out.ahead, lane=order.lanes[k], needs=needs, detours=out.detours,
-                             kept_off=out.kept_off))
+        usual = order.lanes[k].cuts[0] is out.legs[0][0]
+        onward.append(Onward(
+            ahead=out.ahead, lane=order.lanes[k], needs=needs, kept_off=out.kept_off, begun_m=robot.arc_m or 0.0,
+            around=(out.around[0] or not usual, *out.around[1:]), on_its_way=out.on_its_way and usual))
     return onward, Switching(order.crossings, planned)
 
 
-def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
+def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc], *, aside: bool) -> _Wayout:
     """A robot's ways to what is left of its stops; those that it can't get to are left out."""
-    number, here, at, legs, ahead = robot.number, robot.pose, robot.site, [], []
-    detours, kept_off = 0, ""
+    number, here, at, ahead = robot.number, robot.pose, robot.site, []
+    legs: list[tuple[Cut, ...]] = []
+    around: list[bool] = []
+    kept_off, on_its_way = "", False
     sites = (robot.site, *robot.ahead)
     for k, site in enumerate(robot.ahead):
+        led_round = False
         if k == 0 and robot.arc_m is not None:
+            led_round = robot.around[0]
             candidates: tuple[Cut, ...] = (ways.rest(number, robot.cuts[0].leg, robot.arc_m, robot.pose[2]),)
         elif at is None:
             candidates = ()
         elif at == sites[k] and k < len(robot.cuts):
-            candidates = (robot.cuts[k],)
+            candidates, led_round = (robot.cuts[k],), robot.around[k]
         else:
             candidates = (ways.shortest(number, at, site),)
         free = tuple(way for way in candidates if ways.blocked(number, way, discs) is None)
@@ -214,12 +226,15 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
                 blocker = next((ways.blocked(number, way, discs) for way in candidates), None)
                 kept_off = kept_off or ("no way on" if blocker is None else blocker.name)
                 continue
-            free, detours = (round_it,), detours + 1
-        legs.append(free)
+            free, led_round = (round_it,), True
+        on_its_way = on_its_way or (k == 0 and free == candidates and bool(robot.cuts))
+        legs.append((*free, *ways.aside(number, here, site, discs)) if aside and not legs else free)
         ahead.append(site)
+        around.append(led_round)
         x, y = free[0].leg[-1][-1].path[-1]
         here = float(x), float(y), free[0].leg[-1][-1].heading_rad
         at = ways.site_at(number, site, free[0])
     if not ahead or ahead[-1] != robot.ahead[-1]:
-        return _Wayout(ahead=(), legs=(), detours=0, kept_off=kept_off)  # it can't get home
-    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), detours=detours, kept_off=kept_off)
+        return _Wayout(ahead=(), legs=(), around=(), kept_off=kept_off)  # it can't get home
+    return _Wayout(ahead=tuple(ahead), legs=tuple(legs), around=tuple(around), kept_off=kept_off,
+                   on_its_way=on_its_way)

@@ -12,7 +12,7 @@ from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import Driven, Outcome, RobotFate
 from sva_bench.execution.rules import LegDriven, RobotMission
-from sva_bench.execution.shared.driver import LegSoFar
+from sva_bench.execution.shared.driver import Hold, LegSoFar
 from sva_bench.execution.shared.lanes import Cut
 from sva_bench.mission.plan import Route
 
@@ -39,7 +39,7 @@ class TeamDriven:
         cuts: The ways that each was planned to drive at first.
         starts: Where each stood at first, not where it believed to be.
         contacts: How many times two robots touched each other.
-        detours: How many legs led round a robot that stood in the way.
+        led_round: Of each leg that a robot drove, whether it led another way than the shortest, because of others.
         replanned: Whether anything was planned anew, or a robot stands for good away from its berth.
         in_physics: Whether physics drove it.
         twin_s: Driving time by the twin [s], where physics drove to check it; else ``None``.
@@ -56,13 +56,18 @@ class TeamDriven:
     cuts: tuple[tuple[Cut, ...], ...]
     starts: tuple[Pose, ...]
     contacts: int
-    detours: int
+    led_round: tuple[tuple[bool, ...], ...]
     replanned: bool
     in_physics: bool = False
     twin_s: float | None = None
     traced: bool = False
     asked_s: float = -math.inf
     switched: int = 0
+
+    @property
+    def detours(self) -> int:
+        """How many legs led another way than the shortest, because of other robots."""
+        return sum(map(sum, self.led_round))
 
     @property
     def waited_s(self) -> float:
@@ -82,8 +87,12 @@ class Player:
         stops: Stops that it was sent to, the base first.
         at: The site where it made its last stop; ``None`` = beside one that was taken.
         cuts: The ways of its legs from here on, the one that it is on first.
+        holds: What it meets on the leg that it is on, as planned last.
+        on_its_way: Whether that is what is left of the leg as planned before, from ``begun_m`` along that [m].
+        around: Of each of these, whether it leads another way than the shortest.
         parts: What it drove of the leg that it is on before that was planned anew.
         legs: The legs that are over.
+        led_round: Of each of them, whether it led another way than the shortest.
         trail: What it drove of each of them.
         down: Whether it stands for good away from its berth.
         fault: Why it got stuck where nothing held it.
@@ -95,8 +104,13 @@ class Player:
     stops: list[str]
     at: str | None = None
     cuts: list[Cut] = field(default_factory=list)
+    holds: list[Hold] = field(default_factory=list)
+    on_its_way: bool = False
+    begun_m: float = 0.0
+    around: list[bool] = field(default_factory=list)
     parts: list[LegSoFar] = field(default_factory=list)
     legs: list[LegDriven] = field(default_factory=list)
+    led_round: list[bool] = field(default_factory=list)
     trail: list[tuple[LegSoFar, ...]] = field(default_factory=list)
     down: bool = False
     fault: Fault | None = None

@@ -12,7 +12,7 @@ from sva_bench.execution.rules import settle
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.players import TeamDriven
 
-_Any = TypeVar("_Any")
+_T = TypeVar("_T")
 _SETTLES_M = 0.01  # by which physics may move a robot that stands at a stop
 
 
@@ -58,21 +58,23 @@ def _without_the_rest(mission: TeamDriven, number: int, outcome: Outcome) -> Tea
                      waits=tuple(wait for wait in driven.waits if wait.leg < legs),
                      touches=tuple(touch for touch in driven.touches if touch.leg < legs))
     return replace(
-        mission, replanned=True, robots=_with(mission.robots, number, outcome),
-        driven=_with(mission.driven, number, driven),
-        stops=_with(mission.stops, number, mission.stops[number][:legs + 1]),
-        trails=_with(mission.trails, number, mission.trails[number][:legs]))
+        mission, replanned=True, robots=_put(mission.robots, number, outcome),
+        driven=_put(mission.driven, number, driven),
+        stops=_put(mission.stops, number, mission.stops[number][:legs + 1]),
+        trails=_put(mission.trails, number, mission.trails[number][:legs]),
+        led_round=_put(mission.led_round, number, mission.led_round[number][:legs]))
 
 
-def _with(row: tuple[_Any, ...], number: int, value: _Any) -> tuple[_Any, ...]:
-    return (*row[:number], value, *row[number + 1:])
+def _put(values: tuple[_T, ...], number: int, value: _T) -> tuple[_T, ...]:
+    """The same with another value at one place."""
+    return (*values[:number], value, *values[number + 1:])
 
 
 def _touched(ways: Ways, robot: int, whole: TeamDriven, since_s: float, disc: Disc) -> bool:
     """Whether a robot that stands from some time on makes a difference to another."""
     begun = _legs_done(whole.robots[robot], since_s)
     return any(wait.leg >= begun and wait.cause == disc.name for wait in whole.driven[robot].waits) or any(
-        ways.blocked(robot, way, [disc], _SETTLES_M) is not None for way in whole.cuts[robot][begun:])
+        ways.blocked(robot, way, [disc], more_m=_SETTLES_M) is not None for way in whole.cuts[robot][begun:])
 
 
 def _legs_done(outcome: Outcome, by_s: float) -> int:

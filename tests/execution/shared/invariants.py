@@ -21,6 +21,7 @@ from tests.execution.shared.random_missions import Ready
 
 TICK_S = 1.0 / CONTROL_HZ
 _GRID_S = 0.05  # as poses are kept
+_MUTUAL_S = 2.0  # for which a robot may slow down before a gate that another will open, while that waits for it
 _TICKS = 3  # by which a sum may be off: a start between two control steps, and rounding at each end
 
 
@@ -85,6 +86,26 @@ def broken(ready: Ready, mission: TeamDriven, *, physics: bool = False) -> list[
         if outcome.end == "stuck" and not physics and last is not None and last.what not in {*names, "no way on"}:
             found.append(f"{own.robot} is stuck by {last.what}")
         found += [f"{own.robot}: {said}" for said in _sums(ready, mission, number)]
+    return found + _vain_waits(mission)
+
+
+def _vain_waits(mission: TeamDriven) -> list[str]:
+    """Waits for robots that stand for good already, and of two robots for each other."""
+    found = []
+    waits: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for name, outcome in zip(mission.names, mission.robots, strict=True):
+        for event in outcome.events:
+            if event.kind == "waits":
+                waits.setdefault((name, event.what), []).append((event.time_s, event.time_s + event.lasts_s))
+    for (name, cause), spans in waits.items():
+        if cause in mission.names:
+            other = mission.robots[mission.names.index(cause)]
+            latest = max(end for _, end in spans)
+            if latest > other.end_time_s + _TICKS * TICK_S:
+                found.append(f"{name} waits for {cause} until {latest} s, {other.end} at {other.end_time_s} s")
+            found += [f"{name} and {cause} wait for each other until {min(end, its_end)} s" for begin, end in spans
+                      for its_begin, its_end in waits.get((cause, name), [])
+                      if min(end, its_end) - max(begin, its_begin) > _MUTUAL_S]
     return found
 
 

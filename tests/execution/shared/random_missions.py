@@ -16,7 +16,7 @@ from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.outcome import Assignment
 from sva_bench.files.documents import parse_yaml
 from sva_bench.generate.terrain import DENSITY, random_places, random_terrain
-from sva_bench.mission.plan import Plan
+from sva_bench.mission.plan import Plan, Route
 from sva_bench.study.costs import plan_costs
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.load import obstacles_of, world_of
@@ -64,27 +64,40 @@ def random_mission(seed: int, *, interaction: str = "shared", family: Family | N
         "sites": {"base": {"at_m": list(places.base)}, "stations": stations,
                   "pois": {f"p{k + 1}": {"at_m": list(place), "stop_s": float(rng.integers(0, 6))}
                            for k, place in enumerate(places.pois)}},
-        "robots": {f"uv{k + 1}": {"model": models[int(rng.integers(len(models)))],
-                                  "availability": float(rng.uniform(0.4, 1)),
-                                  "mission_limit_s": 900, "mtbf_s": 400, "idle_share": float(rng.choice([0, 0.2])),
-                                  "fuel_capacity_s": float(rng.choice([60, 150, 1000])),
-                                  "incentives": {f"p{i + 1}": 10 for i in range(len(places.pois))}}
-                   for k in range(count)},
+        "robots": {f"uv{k + 1}": {
+            "model": models[int(rng.integers(len(models)))], "availability": float(rng.uniform(0.4, 1)),
+            "mission_limit_s": 900, "mtbf_s": 400, "idle_share": float(rng.choice([0, 0.2])),
+            "fuel_capacity_s": float(rng.choice([60, 150, 1000])),
+            "incentives": {f"p{i + 1}": 10 for i in range(len(places.pois))}} for k in range(count)},
         "failure": process or str(rng.choice(["mission", "per_leg", "hazard"]))}
     try:
-        world = world_of(parse_yaml(json.dumps(document), Path(f"random-{seed}.yaml")))
-        costs = plan_costs(world, "prmstar", lambda *_: None)
+        world, costs = _planned(document)
     except SvaBenchError:
         return None
     pois = [poi.name for poi in world.pois]
     rng.shuffle(pois)
-    routes = {}
+    routes: dict[str, Route] = {}
     for k, robot in enumerate(world.robots):
         stops = pois[k::count][:8]
         if stations and rng.random() < 0.6:
             stops.insert(int(rng.integers(len(stops) + 1)), str(rng.choice(list(stations))))
         routes[robot.name] = ("base", *stops, "base") if stops else ()
-    case = Case(scenario=world.scenarios[0], planner="random", plan=Plan(routes=routes))
+    return _ready(world, costs, routes)
+
+
+def mission_in(document: Mapping[str, Any], routes: Mapping[str, Route]) -> Ready:
+    """A mission in a world by what its file says, but for format and name."""
+    world, costs = _planned({"format": "sva-bench/world@1", "name": "test", "interaction": "shared", **document})
+    return _ready(world, costs, routes)
+
+
+def _planned(document: Mapping[str, Any]) -> tuple[World, Mapping[str, FuelCosts]]:
+    world = world_of(parse_yaml(json.dumps(document), Path(f"{document['name']}.yaml")))
+    return world, plan_costs(world, "prmstar", lambda *_: None)
+
+
+def _ready(world: World, costs: Mapping[str, FuelCosts], routes: Mapping[str, Route]) -> Ready:
+    case = Case(scenario=world.scenarios[0], planner="test", plan=Plan(routes=dict(routes)))
     return Ready(world=world, costs=costs, case=case,
                  orders=tuple(orders_of(world, case, planned_legs(world, costs, [case]))))
 
