@@ -111,7 +111,6 @@ class TeamMotion:
         first = places.need_row[robot]
         ways.need[first:first + places.cells[robot]] = np.column_stack(needs)
         record["open_to"] = min(int(record["open_to"]), int(record["cell"]))
-        self._teams["regated"] = True
 
     def ask(self, every_s: float) -> None:
         """Let robots that wait for others ask after each so much of waiting [s]; 0 = never."""
@@ -120,7 +119,7 @@ class TeamMotion:
     def drop(self, robot: int) -> None:
         """A robot failed: it stands where it is, and nobody waits for it any more."""
         stop_robot(self._robots, robot, 0)
-        self._robots[robot]["dropped"] = self._teams["regated"] = True
+        self._robots[robot]["dropped"] = True
 
     def brake(self, on: bool) -> None:
         """Let all robots brake, or let them go on."""

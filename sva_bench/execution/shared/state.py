@@ -124,7 +124,6 @@ class Team(Protocol):
         traced: Whether poses are kept.
         checked: Whether stuck robots are looked for.
         asks: Control steps of waiting for other robots after which one asks to go first; 0 = none does.
-        regated: Whether gates may have opened since robots were given their commands.
     """
 
     now: int
@@ -132,7 +131,6 @@ class Team(Protocol):
     traced: bool
     checked: bool
     asks: int
-    regated: bool
 
 
 _SHAPES = {"limits": (4,), "waves": (8, FEATURES), "pose": (3,), "follow": (5,), "queue": (MOST_DELAY, 2)}
@@ -189,7 +187,7 @@ def robots_at_rest(members: Sequence[Member]) -> Records:
 
 def team_of(*, traced: bool, checked: bool) -> Records:
     """The record of a team at the start of a mission, shape (1,)."""
-    return np.array([(0, False, traced, checked, 0, False)], dtype=TEAM)
+    return np.array([(0, False, traced, checked, 0)], dtype=TEAM)
 
 
 def nothing_noted(robots: int, *, traced: bool) -> Notes:

@@ -63,7 +63,7 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
     team, stretches, path, arc, need = teams[0], ways.stretches, ways.path, ways.arc, ways.need
     holds, waits, poses, near, touched = notes.holds, notes.waits, notes.poses, notes.near, notes.touched
     room, kept_room = waits.shape[1] - _SPARE, poses.shape[1]
-    stale = False  # whether a robot has its command from before something happened, and may wait for one that failed
+    stale = False  # whether a robot has its command from before something happened: its gate may be open now
     for i in range(len(robots)):
         stale = stale or robots[i].commanded
     while True:
@@ -119,8 +119,8 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
         if not busy:
             return NOBODY
         if still:
-            steps = 1 if team.braking or stale or team.regated else _steps_to_wait(robots, team, waits)
-            stale = team.regated = False
+            steps = 1 if team.braking or stale else _steps_to_wait(robots, team, waits)
+            stale = False
             _pass_over(robots, team, waits, abs(steps))
             if team.braking:
                 return REST
