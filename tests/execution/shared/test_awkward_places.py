@@ -178,7 +178,7 @@ def test_who_goes_on_after_all_braked_meets_the_same_people_as_without(monkeypat
         for robot in range(1, 4):
             for leg, parts in enumerate(mission.trails[robot]):
                 if len(parts) > 1 and len(told) == 1 and told[0][robot].on_its_way:
-                    # A hold lasts a number of control steps, and so does what is left of it.
-                    assert held_s(mission, robot, leg) == pytest.approx(held_s(whole, robot, leg), abs=0.1)
+                    # A hold or two of 1.5 s more or less would show; braking may count for who is met first.
+                    assert held_s(mission, robot, leg) == pytest.approx(held_s(whole, robot, leg), abs=0.5)
                     compared += held_s(whole, robot, leg) > 2
     assert compared >= 6
