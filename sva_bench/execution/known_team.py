@@ -73,6 +73,7 @@ class KnownRobot:
         heard_s: When it first reported [s].
         visited: POIs that it reached.
         learned: Robots that it knows to be dead.
+        left_out: POIs that it was to visit and was kept from.
     """
 
     number: int
@@ -85,6 +86,7 @@ class KnownRobot:
     heard_s: float = math.inf
     visited: list[str] = field(default_factory=list)
     learned: set[int] = field(default_factory=set)
+    left_out: list[str] = field(default_factory=list)
 
 
 RobotT = TypeVar("RobotT", bound=KnownRobot)
@@ -231,7 +233,7 @@ class KnownTeam(Generic[RobotT]):
         missions = [robot.mission or RobotMission(self._team.orders[robot.number]) for robot in self.robots]
         robots = tuple(mission.outcome() for mission in missions)
         collected = {event.site for robot in robots for event in robot.events if event.kind == "collected"}
-        left_over = tuple(tuple(site for site in (*robot.visited, *mission.ahead)
+        left_over = tuple(tuple(site for site in (*robot.visited, *robot.left_out, *mission.ahead)
                                 if site in self._team.pois - collected)
                           for robot, mission in zip(self.robots, missions, strict=True))
         return TeamOutcome(

@@ -12,11 +12,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from sva_bench.arrays import IntArray
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import HELD_S, Assignment, RobotFate, Wait
 from sva_bench.execution.rules import LegDriven, RobotMission
 from sva_bench.execution.shared.driver import Happening, Hold, LegWait, TeamDriver
-from sva_bench.execution.shared.lanes import Order
+from sva_bench.execution.shared.lanes import Lane, Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
 from sva_bench.execution.shared.players import BRAKING, Player, TeamDriven, driven_by
@@ -60,11 +61,9 @@ class SharedMission:
             if not player.active:
                 driver.assign(number, None, None)
             elif order is None:
-                player.cuts = [ways.shortest(number, a, b) for a, b in pairwise(route)]
-                driver.assign(number, uncoordinated(player.cuts), None)
+                self._assign(player, uncoordinated([ways.shortest(number, a, b) for a, b in pairwise(route)]), None)
             else:
-                player.cuts = list(order.lanes[number].cuts)
-                driver.assign(number, order.lanes[number], order.needs[number])
+                self._assign(player, order.lanes[number], order.needs[number])
         self._planned = tuple(tuple(player.cuts) for player in self._players)
         for player in self._players:
             if player.active:
@@ -73,7 +72,7 @@ class SharedMission:
 
     def play(self) -> TeamDriven:
         """Play it to its end."""
-        while (happening := self._driver.run()).kind != "idle":
+        while (happening := self._driver.run(self._until_s)).kind != "idle":
             self._take(happening)
         return TeamDriven(
             names=tuple(self._names), contacts=self._contacts,
@@ -82,6 +81,11 @@ class SharedMission:
             driven=tuple(driven_by(player) for player in self._players),
             replanned=self._replanned or any(player.down for player in self._players),
             trails=tuple(tuple(player.trail) for player in self._players))
+
+    @property
+    def _until_s(self) -> float:
+        """When to look at the mission next, whatever happens [s]."""
+        return math.inf
 
     def _take(self, happening: Happening) -> None:
         """React to what happened."""
@@ -114,7 +118,7 @@ class SharedMission:
         driven_s, waited_s = player.so_far_s
         driving_s = 0.0 if mission.fails_on_leaving else mission.fate.lifetime_s - mission.driven_s - driven_s
         self._driver.start_leg(
-            player.number, ready_s, driving_s, self._holds(player), idle_share=share,
+            player.number, ready_s, driving_s, () if player.anew else self._holds(player), idle_share=share,
             fuel_s=max(mission.tank_s * capacity - driven_s - share * waited_s, 0.0))
 
     def _holds(self, player: Player) -> list[Hold]:
@@ -143,7 +147,7 @@ class SharedMission:
             player.at = self._ways.site_at(player.number, player.stops[-1], player.cuts[0])
             player.cuts = player.cuts[1:]
             self._depart(player)
-        elif player.mission.end in ("home", "late") or player.mission.kept_off:
+        elif player.mission.end in ("home", "late", "stuck"):  # stuck at home: kept off a stop
             player.cuts = []
         else:  # it ran dry while it stood at its stop
             self._stands(player)
@@ -199,8 +203,12 @@ class SharedMission:
         player.down, player.cuts = True, []
         self._driver.drop(player.number)
         if self._coordinated and not self._braking and self._in_the_way(player):
-            self._braking = self._replanned = True
-            self._driver.brake(True)
+            self._brake()
+
+    def _brake(self) -> None:
+        """Let all come to rest, to plan the rest anew."""
+        self._braking = self._replanned = True
+        self._driver.brake(True)
 
     def _in_the_way(self, down: Player) -> bool:
         """Whether a robot stands where another still has to pass."""
@@ -222,7 +230,11 @@ class SharedMission:
             self._take_up(player, then)
         for player, _ in moving:
             if player.active:
-                self._set_off(player, self._driver.clock_s if player.parts else player.mission.clock_s)
+                self._set_off(player, self._ready_s(player))
+
+    def _ready_s(self, player: Player) -> float:
+        """When a robot at rest can go on [s]."""
+        return self._driver.clock_s if player.parts else player.mission.clock_s
 
     def _present(self, player: Player) -> Present:
         mission, number = player.mission, player.number
@@ -232,7 +244,8 @@ class SharedMission:
         return Present(
             number=number, orders=mission.orders, pose=self._driver.pose(number), down=player.down,
             site=player.at if at_stop else None, ahead=mission.ahead if player.active else (),
-            ready_s=mission.clock_s, burnt_s=mission.burnt_s + driven_s, cuts=tuple(player.cuts),
+            ready_s=mission.clock_s, burnt_s=mission.burnt_s + driven_s,
+            cuts=() if player.anew else tuple(player.cuts),
             arc_m=None if at_stop else arc_m, name=self._names[number])
 
     def _take_up(self, player: Player, then: Onward) -> None:
@@ -245,5 +258,9 @@ class SharedMission:
         mission.kept_off = mission.kept_off or then.kept_off
         mission.give(then.ahead)
         player.stops[-1] = then.ahead[0]
-        player.cuts = list(then.lane.cuts)
-        self._driver.assign(player.number, then.lane, then.needs)
+        self._assign(player, then.lane, then.needs)
+
+    def _assign(self, player: Player, lane: Lane, needs: Sequence[IntArray] | None) -> None:
+        """Give a robot at rest its way from here on."""
+        player.cuts, player.anew = list(lane.cuts), False
+        self._driver.assign(player.number, lane, needs)

@@ -16,6 +16,7 @@ from sva_bench.execution.shared.driver import Happening, Hold, LegSoFar, LegWait
 from sva_bench.execution.shared.lanes import Lane
 from sva_bench.execution.shared.state import (
     BRAKED,
+    NO_END,
     READY,
     longer,
     nothing_noted,
@@ -30,6 +31,7 @@ from sva_bench.execution.shared.ticks import (
     IS_STUCK,
     NOBODY,
     REST,
+    TIME,
     begin_leg,
     stop_robot,
 )
@@ -39,7 +41,8 @@ from sva_bench.robot.follower import CONTROL_HZ
 
 _DT = 1.0 / CONTROL_HZ
 _OF_A_ROBOT: Mapping[int, HappeningKind] = {HAS_ARRIVED: "arrived", HAS_ENDED: "ended", IS_STUCK: "stuck"}
-_OF_ALL: Mapping[int, HappeningKind] = {REST: "rest", NOBODY: "idle", DEADLOCK: "deadlock"}
+_OF_ALL: Mapping[int, HappeningKind] = {REST: "rest", TIME: "time", NOBODY: "idle", DEADLOCK: "deadlock"}
+_SAME = 1e-6  # of a control step: rounding of clocks
 
 
 class TeamMotion:
@@ -107,8 +110,9 @@ class TeamMotion:
         """Let all robots brake, or let them go on."""
         self._teams["braking"] = on
 
-    def run(self) -> Happening:
-        """Drive until something happens."""
+    def run(self, until_s: float = math.inf) -> Happening:
+        """Drive until something happens, or until the first control step at or after ``until_s``."""
+        self._teams["until"] = NO_END if math.isinf(until_s) else math.ceil(until_s * CONTROL_HZ - _SAME)
         while (happened := self._told()) is None:
             code = self._until_something(self._placed[0])
             if code == FULL:

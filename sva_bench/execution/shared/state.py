@@ -22,6 +22,9 @@ MOST_DELAY = 30
 """Commands that may be under way: half a second's."""
 _WAITS, _POSES, _HOLDS = 32, 512, 4  # room to begin with
 
+NO_END = 1 << 60
+"""A control step that never comes."""
+
 Records = NDArray[Any]
 """An array of records."""
 
@@ -121,12 +124,14 @@ class Team(Protocol):
         braking: Whether all are to brake.
         traced: Whether poses are kept.
         checked: Whether stuck robots are looked for.
+        until: The control step before which it comes back at the latest.
     """
 
     now: int
     braking: bool
     traced: bool
     checked: bool
+    until: int
 
 
 _SHAPES = {"limits": (4,), "waves": (8, FEATURES), "pose": (3,), "follow": (5,), "queue": (MOST_DELAY, 2)}
@@ -183,7 +188,7 @@ def robots_at_rest(members: Sequence[Member]) -> Records:
 
 def team_of(*, traced: bool, checked: bool) -> Records:
     """The record of a team at the start of a mission, shape (1,)."""
-    return np.array([(0, False, traced, checked)], dtype=TEAM)
+    return np.array([(0, False, traced, checked, NO_END)], dtype=TEAM)
 
 
 def nothing_noted(robots: int, *, traced: bool) -> Notes:
