@@ -199,6 +199,8 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc]) -> _Wayout:
             candidates: tuple[Cut, ...] = (ways.rest(number, robot.cuts[0].leg, robot.arc_m, robot.pose[2]),)
         elif at is None:
             candidates = ()
+        elif at == site:  # stops between are left out
+            continue
         elif at == sites[k] and k < len(robot.cuts):
             candidates = (robot.cuts[k],)
         elif k >= len(robot.cuts):  # its orders are new from here on

@@ -147,7 +147,8 @@ def _told(team: Team, key: MissionKey, mission: TeamDriven) -> TeamOutcome:
     visits = [event.site for robot in mission.robots for event in robot.events
               if event.kind == "arrived" and event.site in team.pois]
     return TeamOutcome(
-        robots=mission.robots, stops=mission.stops, reactions=(), fates=key.fates, doubled=len(visits) - len(set(visits)),
+        robots=mission.robots, stops=mission.stops, reactions=(), fates=key.fates,
+        doubled=len(visits) - len(set(visits)),
         left_over=tuple(tuple(site for site in own.route if site in team.pois - collected) for own in team.orders))
 
 

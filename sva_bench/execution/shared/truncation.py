@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
+from sva_bench.execution.outcome import Assignment, Driven, Outcome, RobotFate
 from sva_bench.execution.rules import settle
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.players import TeamDriven
@@ -43,7 +43,22 @@ def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: 
         disc = Disc(x_m=x, y_m=y, radius_m=ways.model(number).radius_m, name=own.robot)
         if any(_touched(ways, j, whole, outcome.end_time_s, disc) for j in range(len(orders)) if j != number):
             return None
-    return replace(whole, robots=tuple(outcomes))
+    legs = [outcome.stops_reached if outcome.end == "failed" != known.end else len(driven.leg_s)
+            for outcome, known, driven in zip(outcomes, whole.robots, whole.driven, strict=True)]
+    return replace(
+        whole, robots=tuple(outcomes), driven=tuple(map(_first_legs, whole.driven, legs)),
+        stops=tuple(stops[:count + 1] if count < len(driven.leg_s) else stops
+                    for stops, driven, count in zip(whole.stops, whole.driven, legs, strict=True)),
+        trails=tuple(trail[:count] for trail, count in zip(whole.trails, legs, strict=True)))
+
+
+def _first_legs(driven: Driven, count: int) -> Driven:
+    """What a robot drove until it failed at a stop."""
+    if count == len(driven.leg_s):
+        return driven
+    return replace(driven, leg_s=driven.leg_s[:count], stuck=False,
+                   touches=tuple(touch for touch in driven.touches if touch.leg < count),
+                   waits=tuple(wait for wait in driven.waits if wait.leg < count))
 
 
 def _touched(ways: Ways, robot: int, whole: TeamDriven, since_s: float, disc: Disc) -> bool:
