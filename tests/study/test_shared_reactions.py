@@ -56,7 +56,7 @@ def test_reacting_is_measured_on_the_trials_of_the_run(ours: sb.Result[Summary])
     def mean(planner: str, policy: str, news: str) -> float:
         mine = [row for row in rows if (row["planner"], row["policy"], row["news"]) == (planner, policy, news)]
         assert len({row["trial"] for row in mine}) == 12
-        return sum(row["value"] for row in mine) / 12
+        return sum(float(row["value"]) for row in mine) / 12
 
     (scenario,) = ours.summary.scenarios
     assert scenario.reactions is not None
