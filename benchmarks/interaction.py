@@ -21,7 +21,7 @@ from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
 from sva_bench.execution.orders import orders_of, planned_legs
-from sva_bench.execution.shared.execute import ground_of, play_all
+from sva_bench.execution.shared.execute import Wanted, ground_of, play_all
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.unfailed import unfailed_keys
 from sva_bench.mission.plan import Plan
@@ -83,7 +83,7 @@ def _longer_pct(world: World, costs: Mapping[str, FuelCosts], case: Case, settin
     keys = unfailed_keys(world, [case], orders, settings.rollouts)
     together, alone = dict(known), dict[MissionKey, TeamDriven]()
     for missions, by_themselves in ((together, False), (alone, True)):
-        play_all(world, ground_of(world, costs), settings, [(orders, key, False) for key in keys], None, None, missions,
+        play_all(world, ground_of(world, costs), settings, [Wanted(orders, key) for key in keys], None, None, missions,
                  alone=by_themselves)
     ours, theirs = (sum(float(driven.leg_s.sum() + driven.waited_s.sum()) for key in keys
                         for driven in missions[key].driven) for missions in (together, alone))

@@ -77,7 +77,7 @@ def missions_of(world: World, costs: Mapping[str, FuelCosts], count: int, fideli
     orders = tuple(orders_of(world, case, planned_legs(world, costs, [case])))
     routes, sure = tuple(own.route for own in orders), tuple(RobotFate() for _ in orders)
     return TeamTask(world=world, ground=ground_of(world, costs), orders=orders, seed=0, fidelity=fidelity,
-                    keys=tuple((routes, sure, k) for k in range(count)), traced=(False,) * count)
+                    keys=tuple(MissionKey(routes, sure, k) for k in range(count)), traced=(False,) * count)
 
 
 def plan(robots: int, pois: int, least_s: float) -> None:

@@ -25,6 +25,7 @@ from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.outcome import Event, RobotFate, Trace
 from sva_bench.execution.shared.execute import TeamTask, ground_of, play_missions
 from sva_bench.execution.shared.own_ways import Ways
+from sva_bench.execution.shared.players import MissionKey
 from sva_bench.execution.shared.trace import traces_of
 from sva_bench.files.documents import parse_yaml
 from sva_bench.mission.plan import Plan
@@ -110,7 +111,7 @@ def filmed(scene: Scene) -> tuple[World, tuple[Trace, ...]]:
     fates = tuple(RobotFate(lifetime_s=scene.lifetime_s.get(k, math.inf)) for k in range(len(orders)))
     (mission,) = play_missions(TeamTask(
         world=world, ground=ground_of(world, costs), orders=orders, traced=(True,), seed=0, fidelity="physics",
-        keys=((tuple(own.route for own in orders), fates, 0),)))
+        keys=(MissionKey(tuple(own.route for own in orders), fates, 0),)))
     return world, traces_of(Ways(world, costs), orders, mission, [NO_WAVES] * len(orders))
 
 

@@ -77,7 +77,7 @@ Best = Literal["best"]
 """What plans are calibrated for in place of a share of bad missions: the greatest executed value."""
 EventKind = Literal["departed", "waits", "touches", "arrived", "collected", "refuelled", "failed", "out_of_fuel",
                     "late", "stuck", "home"]
-HappeningKind = Literal["arrived", "ended", "stuck", "touch", "waits", "rest", "idle", "deadlock"]
+HappeningKind = Literal["arrived", "ended", "stuck", "touch", "waits", "rest", "time", "idle", "deadlock"]
 """What a team that shares a world is stopped for."""
 DriveUnit = Literal["hops", "routes", "missions"]
 """What is driven at a time: from site to site, from base to base, or all robots of a world together."""

@@ -66,7 +66,7 @@ class ReactionsJob:
         found = react_in_scenarios(Stage(
             world=self.world, costs=self.costs, instances=self.instances, executed=executed, settings=settings,
             executor=None, drives=drives), self.options, reaction_result, lambda *_: None)
-        refuse_failed_physics([*drives.hops.values(), *drives.whole.values()])
+        refuse_failed_physics([*drives.hops.values(), *drives.whole.values(), *drives.of_missions])
         return {name: scenario.results for name, scenario in found.items()}
 
     def fits(self, result: Reactions) -> bool:

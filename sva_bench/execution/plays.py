@@ -12,7 +12,7 @@ from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.chance import Chance, Drawn, Histories
 from sva_bench.execution.fate import draw_fate
 from sva_bench.execution.known_legs import KnownLegs, Stops
-from sva_bench.execution.outcome import Assignment
+from sva_bench.execution.outcome import Assignment, RobotFate
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.rules import LegDriven
 from sva_bench.execution.settling import FIGURES, figures_of
@@ -70,7 +70,10 @@ class _Plays:
 
     def _play(self, chance: Chance, driven: Callable[[int, Stops], LegDriven]) -> _Mission:
         """Play one mission."""
-        played = play(self._team, chance, driven)
+        return self._mission(play(self._team, chance, driven))
+
+    def _mission(self, played: TeamOutcome) -> _Mission:
+        """A mission's figures."""
         left = [_worth(own, pois) for own, pois in zip(self._team.orders, played.left_over, strict=True)]
         return _Mission(figures=np.array([*figures_of(played.robots).values(), left]), doubled=played.doubled,
                         reacted=played.orders_change,
@@ -185,9 +188,12 @@ class Sampled(_Plays):
         self._used_by: list[dict[tuple[int, Stops], None]] = []
         self._final: dict[int, _Mission] = {}
 
-    def _drawn(self, fate: int) -> Drawn:
+    def _fates(self, fate: int) -> tuple[RobotFate, ...]:
         row = int(self._first[fate])
-        return Drawn([self._fate.of(row, robot) for robot in range(len(self._robots))])
+        return tuple(self._fate.of(row, robot) for robot in range(len(self._robots)))
+
+    def _drawn(self, fate: int) -> Drawn:
+        return Drawn(self._fates(fate))
 
     def begin(self, legs: KnownLegs) -> bool:
         """Play all trials on planned times."""
@@ -221,9 +227,41 @@ class Sampled(_Plays):
                 if legs.misses == misses:
                     self._final[kind] = mission
             missions.append(mission)
+        return self._rows(missions)
+
+    @property
+    def case(self) -> Case:
+        """The case."""
+        return self._case
+
+    @property
+    def team(self) -> Team:
+        """Its team."""
+        return self._team
+
+    def kind_of(self, trial: int) -> int:
+        """Which of the distinct missions a trial is."""
+        return int(self._kind_of[trial - self._settings.first])
+
+    @property
+    def kinds(self) -> list[tuple[tuple[RobotFate, ...], int]]:
+        """Fates and noise draw of each distinct mission."""
+        return [(self._fates(fate), rollout) for fate, rollout in self._kinds]
+
+    @property
+    def first(self) -> list[int]:
+        """Number of the first trial of each distinct mission."""
+        _, rows = np.unique(self._kind_of, return_index=True)
+        return [self._settings.first + row for row in rows.tolist()]
+
+    def rows_of(self, played: Sequence[TeamOutcome]) -> Rows:
+        """All trials, from what came of each distinct mission."""
+        return self._rows([self._mission(mission) for mission in played])
+
+    def _rows(self, missions: Sequence[_Mission]) -> Rows:
         trials = self._settings.trials
         return Rows(missions=missions, which=self._kind_of, rollout=self._fate.rollout,
-                     history=np.full(trials, -1), weight=np.full(trials, 1 / trials))
+                    history=np.full(trials, -1), weight=np.full(trials, 1 / trials))
 
     def reacted(self, rows: Rows) -> Reacted:
         """The rows as arrays."""

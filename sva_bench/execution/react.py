@@ -22,6 +22,8 @@ from sva_bench.execution.plays import Enumerated, Rows, Sampled
 from sva_bench.execution.policies.none import none
 from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.reacted import Reacted as Reacted
+from sva_bench.execution.reacted import missions_of
+from sva_bench.execution.shared.react import react_team, react_team_again
 from sva_bench.execution.team import Team
 from sva_bench.execution.team_trace import Played, legs_used, trace_teams, typical
 from sva_bench.execution.whole import WholeDrives
@@ -39,8 +41,8 @@ def react(
 ) -> list[Reacted]:
     """Execute plans whose teams react, all histories or all trials of each.
 
-    Histories are enumerated for all cases or for none, so that they can be compared. Missions are played again only as
-    long as legs of them are unknown.
+    Histories are enumerated for all cases or for none, so that they can be compared; for none where robots meet.
+    Missions are played again only as long as legs of them are unknown.
 
     Args:
         world: The world.
@@ -58,6 +60,10 @@ def react(
     drives = Drives() if drives is None else drives
     legs = KnownLegs(world, costs, settings)
     teams = [_team(world, costs, case, policy, legs) for case, policy in zip(cases, policies, strict=True)]
+    if world.meets:
+        _refuse_beyond(world, len(cases), settings)
+        return react_team(world, costs, [Sampled(world, case, team, settings) for case, team in zip(
+            cases, teams, strict=True)], settings, legs, executor, progress, drives.missions)
     plays = _plays(world, cases, teams, settings, legs)
     rows = _driven(plays, legs, Courses(world, costs, settings), executor, progress, drives)
     reacted = [each.reacted(mine) for each, mine in zip(plays, rows, strict=True)]
@@ -85,6 +91,9 @@ def react_again(
     """
     legs = KnownLegs(world, costs, settings)
     team = _team(world, costs, case, policy, legs)
+    if world.meets:
+        alone = replace(settings, first=trial, trials=1)
+        return react_team_again(world, costs, Sampled(world, case, team, alone), alone, legs, executor)
     play_again: Enumerated | Sampled
     if history is None:
         play_again = Sampled(world, case, team, replace(settings, first=trial, trials=1))
@@ -94,7 +103,7 @@ def react_again(
     drives = Drives()
     (rows,) = _driven([play_again], legs, Courses(world, costs, settings), executor, None, drives)
     row = replace(play_again.reacted(rows).row(0 if history is None else history[1]), trial=np.array([trial]))
-    (mission,) = _missions_of(row)
+    (mission,) = missions_of(row)
     (shown,) = trace_teams(world, costs, settings, [mission], executor, drives)
     return replace(row, legs=tuple(legs_used(row.robots, [mission], legs)), shown=shown)
 
@@ -121,7 +130,7 @@ def _recorded(
     executor: Executor | None, drives: Drives,
 ) -> list[Reacted]:
     """What came of cases, with the legs driven, and with a typical mission over time where one reacts."""
-    missions = [_missions_of(run) for run in reacted]
+    missions = [missions_of(run) for run in reacted]
     chosen = [typical(mine) for mine in missions]
     traced = iter(trace_teams(world, costs, settings, [one for one in chosen if one is not None], executor, drives))
     return [replace(run, legs=tuple(legs_used(run.robots, mine, legs)), shown=None if one is None else next(traced))
@@ -132,24 +141,12 @@ def _driven_whole(reacted: Sequence[Reacted], teams: Sequence[Team], drives: Who
     """Drive the most probable mission with changed orders under each policy and news whole, and compare."""
     chosen: dict[tuple[str, str], tuple[int, Played]] = {}
     for number, run in enumerate(reacted):
-        mission, pair = typical(_missions_of(run)), (run.case.policy, run.case.news)
+        mission, pair = typical(missions_of(run)), (run.case.policy, run.case.news)
         if mission is not None and (pair not in chosen or mission.weight > chosen[pair][1].weight):
             chosen[pair] = number, mission
     alike = {number: drives.ends_alike(teams[number], mission.outcome, mission.rollout)
              for number, mission in chosen.values()}
     return [replace(run, whole=alike.get(number)) for number, run in enumerate(reacted)]
-
-
-def _missions_of(run: Reacted) -> list[Played]:
-    """The missions of a case that reacts, each once, by its first trial and with the weight of all."""
-    first: dict[int, int] = {}
-    weights: dict[int, float] = {}
-    for row, (played, weight) in enumerate(zip(run.played, run.weight.tolist(), strict=True)):
-        first.setdefault(id(played), row)
-        weights[id(played)] = weights.get(id(played), 0.0) + weight
-    return [] if run.case.policy == "none" else [
-        Played(case=run.case, trial=int(run.trial[row]), rollout=int(run.rollout[row]), weight=weights[number],
-               outcome=run.played[row]) for number, row in first.items()]
 
 
 def modelled_values(
@@ -168,8 +165,7 @@ def _plays(
     enumerated = [Enumerated(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
     if all(each.begin(legs) for each in enumerated):
         return enumerated
-    if (most := _most_held(world, len(cases))) < settings.trials:
-        raise _beyond_memory(world, len(cases), settings.trials, most)
+    _refuse_beyond(world, len(cases), settings)
     sampled = [Sampled(world, case, team, settings) for case, team in zip(cases, teams, strict=True)]
     for each in sampled:
         each.begin(legs)
@@ -195,12 +191,13 @@ def refuse_beyond_memory(
     Raises:
         BadInput: If there are more.
     """
-    if (most := _most_held(world, runs)) >= settings.trials:
+    if _most_held(world, runs) >= settings.trials:
         return
     legs = KnownLegs(world, costs, settings)
     told = [replace(case, news=heard) for case in cases for heard in ("never", *news)]
-    if not all(Enumerated(world, case, _team(world, costs, case, none, legs), settings).begin(legs) for case in told):
-        raise _beyond_memory(world, runs, settings.trials, most)
+    if world.meets or not all(
+            Enumerated(world, case, _team(world, costs, case, none, legs), settings).begin(legs) for case in told):
+        _refuse_beyond(world, runs, settings)
 
 
 def _most_held(world: World, runs: int) -> int:
@@ -208,10 +205,15 @@ def _most_held(world: World, runs: int) -> int:
     return MOST_TRIALS_HELD // (len(world.robots) * runs)
 
 
-def _beyond_memory(world: World, runs: int, trials: int, most: int) -> BadInput:
-    return BadInput(f"{counted(trials, 'trial')} of {counted(runs, 'plan')} with and without reaction: the histories "
-                    f"of {world.name} are too many to go through all, and at most {counted(most, 'trial')} can be "
-                    "sampled (--trials), or more of fewer reactions (--policy, --news)")
+def _refuse_beyond(world: World, runs: int, settings: Settings) -> None:
+    """Refuse more sampled trials than fit in memory."""
+    trials, most = settings.trials, _most_held(world, runs)
+    if most < trials:
+        why = f"the histories of {world.name} are not gone through, for its robots meet" if world.meets else \
+            f"the histories of {world.name} are too many to go through all"
+        raise BadInput(f"{counted(trials, 'trial')} of {counted(runs, 'plan')} with and without reaction: {why}, and "
+                       f"at most {counted(most, 'trial')} can be sampled (--trials), or more of fewer reactions "
+                       "(--policy, --news)")
 
 
 def _team(world: World, costs: Mapping[str, FuelCosts], case: Case, policy: Policy, legs: KnownLegs) -> Team:

@@ -12,7 +12,7 @@ from sva_bench.execution.case import Case
 from sva_bench.execution.executed import LegTime
 from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.team_outcome import TeamOutcome
-from sva_bench.execution.team_trace import TeamTrace
+from sva_bench.execution.team_trace import Played, TeamTrace
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,3 +91,15 @@ class Reacted:
         case, kind = self.case, "histories, all of them" if self.enumerated else "trials"
         return f"<{case.scenario.name}, {case.planner}, {case.policy} on {case.news} news: {len(self.trial)} {kind}, " \
                f"mean value {float(self.weight @ self.value.sum(axis=1)):.1f}>"
+
+
+def missions_of(run: Reacted) -> list[Played]:
+    """The missions of a case that reacts, each once, by its first trial and with the weight of all."""
+    first: dict[int, int] = {}
+    weights: dict[int, float] = {}
+    for row, (played, weight) in enumerate(zip(run.played, run.weight.tolist(), strict=True)):
+        first.setdefault(id(played), row)
+        weights[id(played)] = weights.get(id(played), 0.0) + weight
+    return [] if run.case.policy == "none" else [
+        Played(case=run.case, trial=int(run.trial[row]), rollout=int(run.rollout[row]), weight=weights[number],
+               outcome=run.played[row]) for number, row in first.items()]

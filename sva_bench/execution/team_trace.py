@@ -116,13 +116,17 @@ def _trace_team(world: World, costs: Mapping[str, FuelCosts], mission: Played, d
             path_of(costs[world.kind_of(robot)], orders.route),
             start_s=_departure_s(outcome),
             waves=draw_noise(world.noise, seed, mission.rollout, number).disturbance.waves))
-    news = tuple(_heard(world, costs, reaction) for reaction in mission.outcome.reactions)
-    return TeamTrace(trial=mission.trial, traces=tuple(traces), news=news)
+    return TeamTrace(trial=mission.trial, traces=tuple(traces), news=news_of(world, costs, mission.outcome))
 
 
 def _departure_s(outcome: Outcome) -> float:
     """When a robot leaves the base: one that was to stay may be sent out later."""
     return next((event.time_s for event in outcome.events if event.kind == "departed"), 0.0)
+
+
+def news_of(world: World, costs: Mapping[str, FuelCosts], mission: TeamOutcome) -> tuple[NewsHeard, ...]:
+    """What was heard in a mission, with the paths that orders change."""
+    return tuple(_heard(world, costs, reaction) for reaction in mission.reactions)
 
 
 def _heard(world: World, costs: Mapping[str, FuelCosts], reaction: Reaction) -> NewsHeard:

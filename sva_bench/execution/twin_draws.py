@@ -15,7 +15,7 @@ from sva_bench.execution.judging import judge_route
 from sva_bench.execution.margins import margins_of
 from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.outcome import Assignment
-from sva_bench.execution.shared.execute import ground_of, play_all
+from sva_bench.execution.shared.execute import Wanted, ground_of, play_all
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.unfailed import BAD, leavers, margins_of_missions, unfailed_keys
 from sva_bench.mission.failures import PlanningTerms, process_of
@@ -103,7 +103,7 @@ class TwinDraws:
         """Missions, played now or before."""
         known: dict[MissionKey, TeamDriven] = {}
         play_all(self._world, ground_of(self._world, self._costs), self._settings,
-                 [(orders, key, False) for key in keys if key not in self._drives.missions], self._executor, None,
+                 [Wanted(orders, key) for key in keys if key not in self._drives.missions], self._executor, None,
                  known)
         # What they looked like is of no use here, and takes much room.
         self._drives.missions.update({key: replace(mission, trails=(), cuts=()) for key, mission in known.items()})

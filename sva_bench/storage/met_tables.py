@@ -12,6 +12,7 @@ from sva_bench.errors import BadFile
 from sva_bench.execution.case import Case
 from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.reacted import Reacted
+from sva_bench.execution.shared.players import BRAKING
 from sva_bench.execution.waits import PEOPLE
 from sva_bench.storage.run_folder import Legs
 from sva_bench.storage.tables import CONTACTS, LEGS, MOST_ROWS, WAITS, pieces_of, write_table
@@ -85,8 +86,9 @@ def read_met(folder: Path, world: World, legs: Legs, words: Mapping[str, frozens
               *(f"cylinder {k + 1}" for k in range(len(world.obstacles.cylinders)))]
     sites = frozenset(site.name for site in world.sites)
     others = [robot.name for robot in world.robots] if world.meets else []
+    causes = [PEOPLE, *(passage.name for passage in world.passages), *others, *([BRAKING] if world.meets else [])]
     known = {**words, "origin": sites, "destination": sites, "solid": frozenset((*solids, *others)),
-             "cause": frozenset((PEOPLE, *(passage.name for passage in world.passages), *others))}
+             "cause": frozenset(causes)}
     contacts, waits = (_read(folder / f"{name}.parquet", schema, legs, known) for name, schema in FILES.items())
     return contacts, waits
 

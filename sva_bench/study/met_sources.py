@@ -20,7 +20,7 @@ from sva_bench.execution.execute import NOTHING
 from sva_bench.execution.orders import orders_of, planned_legs
 from sva_bench.execution.outcome import Assignment, Driven, RobotFate
 from sva_bench.execution.rules import settle
-from sva_bench.execution.shared.execute import Ground, Team, execute_team, ground_of, play_all, ways_of
+from sva_bench.execution.shared.execute import CaseTrials, Ground, Wanted, execute_team, ground_of, play_all, ways_of
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.unfailed import as_ordered_until, leavers, unfailed_keys
 from sva_bench.execution.sources import OF_PHYSICS, sources_on, without
@@ -123,8 +123,8 @@ class _Told:
         """Mean value if each robot were alone, and if it were but drove the ways that it was led round others."""
         name = _name(case)
         orders = self._orders[name]
-        team = Team(self._world, ways_of(self._ground), case, orders, self._settings)
-        by_draw = {key[2]: alone[key].driven for key in self._keys[name]}
+        team = CaseTrials(self._world, ways_of(self._ground), case, orders, self._settings)
+        by_draw = {key.rollout: alone[key].driven for key in self._keys[name]}
         settled: dict[tuple[int, int, RobotFate], float] = {}
         values = np.zeros((2, self._settings.trials, len(orders)))
         for row in range(self._settings.trials):
@@ -151,10 +151,10 @@ class _Told:
 
     def _whole(self, world: World | None = None, *, known: Missions, alone: bool = False) -> Missions:
         """The missions in which nobody fails, driven to their ends though a tank be empty."""
-        wanted = [([replace(own, fuel_capacity_s=math.inf, mission_limit_s=math.inf) for own in self._orders[name]],
-                   key, False) for name, keys in self._keys.items() for key in keys]
-        found = {key: known[key] for _, key, _ in wanted if key in known and not any(
-            outcome.end == "out_of_fuel" for outcome in known[key].robots)}
+        wanted = [Wanted([replace(own, fuel_capacity_s=math.inf, mission_limit_s=math.inf)
+                          for own in self._orders[name]], key) for name, keys in self._keys.items() for key in keys]
+        found = {one.key: known[one.key] for one in wanted if one.key in known and not any(
+            outcome.end == "out_of_fuel" for outcome in known[one.key].robots)}
         play_all(world or self._world, self._ground, self._settings, wanted, self._grounds.executor, None, found,
                  alone=alone)
         return found

@@ -12,7 +12,7 @@ from sva_bench.execution.drives import Drives, drive_all
 from sva_bench.execution.execute import drives_ahead
 from sva_bench.execution.margins import Margins, margins_of_team
 from sva_bench.execution.orders import orders_of, planned_legs
-from sva_bench.execution.shared.execute import ground_of, play_all
+from sva_bench.execution.shared.execute import Wanted, ground_of, play_all
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.unfailed import margins_of_missions, unfailed_keys
 from sva_bench.mission.plan import Plan, unless_interrupted
@@ -90,7 +90,7 @@ def _of_missions(world: World, costs: Mapping[str, FuelCosts], cases: Sequence[C
     orders = orders_of(world, cases[0], planned_legs(world, costs, cases))
     keys = unfailed_keys(world, cases, orders, settings.rollouts)
     played: dict[MissionKey, TeamDriven] = {}
-    play_all(world, ground_of(world, costs), settings, [(orders, key, False) for key in keys], None, progress, played)
+    play_all(world, ground_of(world, costs), settings, [Wanted(orders, key) for key in keys], None, progress, played)
     return margins_of_missions(orders, played.items())
 
 

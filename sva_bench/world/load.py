@@ -42,8 +42,8 @@ from sva_bench.world.schema import (
 )
 from sva_bench.world.within import refuse_outside
 
-AMBIGUOUS = ("robots that meet wait for each other by name, and this one is that of a passage or of people in the way; "
-             "rename the robot")
+AMBIGUOUS = ("robots that meet wait for each other by name, and this one is that of a passage, of people in the way, "
+             "or of a team that plans anew (replanning); rename the robot")
 _Entry = tuple[SiteKind, str, SiteEntry, tuple[str, ...]]  # a site, and its location in the file
 
 

@@ -217,7 +217,7 @@ class World:
     @property
     def ambiguous_robot(self) -> str | None:
         """A robot that goes by the name of something else that robots wait for; ``None`` where they tell them apart."""
-        others = {"people", *(passage.name for passage in self.passages)} if self.meets else set()
+        others = {"people", "replanning", *(passage.name for passage in self.passages)} if self.meets else set()
         return next((robot.name for robot in self.robots if robot.name in others), None)
 
     def scenario(self, name: str) -> Scenario:

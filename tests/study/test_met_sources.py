@@ -18,7 +18,7 @@ from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.execution.orders import orders_of, planned_legs
-from sva_bench.execution.shared.execute import ground_of, play_all
+from sva_bench.execution.shared.execute import Wanted, ground_of, play_all
 from sva_bench.execution.shared.players import TeamDriven
 from sva_bench.execution.shared.unfailed import unfailed_keys
 from sva_bench.execution.sources import sources_on
@@ -174,7 +174,7 @@ def played(seed: int) -> tuple[Mapping[SourceName, SourceEffect], list[TeamDrive
     found = []
     for alone in (False, True):
         missions: dict[object, TeamDriven] = {}
-        play_all(world, ground_of(world, ready.costs), settings, [(orders, key, False) for key in keys], None, None,
+        play_all(world, ground_of(world, ready.costs), settings, [Wanted(orders, key) for key in keys], None, None,
                  missions, alone=alone)  # type: ignore[arg-type]
         found.append([missions[key] for key in keys])
     return effects, *found  # type: ignore[return-value]

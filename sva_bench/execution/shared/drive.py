@@ -10,6 +10,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import Fidelity
 from sva_bench.execution.corridor import solids_near, strayed
+from sva_bench.execution.known_team import Team
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import Assignment, RobotFate
 from sva_bench.execution.screening import checked, wants_physics
@@ -18,6 +19,7 @@ from sva_bench.execution.shared.lanes import Order
 from sva_bench.execution.shared.mission import SharedMission
 from sva_bench.execution.shared.own_ways import Ways
 from sva_bench.execution.shared.players import TeamDriven
+from sva_bench.execution.shared.reacting import ReactingMission
 from sva_bench.execution.shared.team_bullet import TeamBullet
 from sva_bench.execution.shared.team_twin import TeamTwin
 from sva_bench.world.model import World
@@ -39,6 +41,7 @@ class TeamRun:
         noise_index: Seed and number of the noise draw, for what robots meet on their ways.
         alone: Whether robots neither heed nor touch each other.
         switches: Whether robots may be let go before others that are late.
+        team: What the team does about news; ``None`` if it keeps its orders.
     """
 
     world: World
@@ -50,6 +53,7 @@ class TeamRun:
     noise_index: tuple[int, int]
     alone: bool = False
     switches: bool = True
+    team: Team | None = None
 
 
 def drive_team(run: TeamRun, fidelity: Fidelity, *, traced: bool) -> TeamDriven:
@@ -81,8 +85,13 @@ def _pose(pose: FloatArray) -> tuple[float, float, float]:
 
 def _played(run: TeamRun, driver: TeamDriver, *, traced: bool) -> TeamDriven:
     with driver:
-        return replace(SharedMission(run.world, run.ways, run.orders, run.fates, run.drawn, run.order, driver,
-                                     run.noise_index, alone=run.alone, switches=run.switches).play(), traced=traced)
+        if run.team is None:
+            mission = SharedMission(run.world, run.ways, run.orders, run.fates, run.drawn, run.order, driver,
+                                    run.noise_index, alone=run.alone, switches=run.switches)
+        else:
+            mission = ReactingMission(run.world, run.ways, run.team, run.fates, run.drawn, run.order, driver,
+                                      run.noise_index)
+        return replace(mission.play(), traced=traced)
 
 
 def _in_physics(run: TeamRun, members: Sequence[Member], twin: TeamDriven, *, traced: bool) -> TeamDriven:

@@ -103,11 +103,11 @@ class Happening:
 
     Attributes:
         kind: ``arrived``: a robot ended its leg; ``ended``: its driving time or its fuel is used up; ``stuck``;
-            ``touch``: two robots touch; ``waits``: a robot asks to go first;
-            ``rest``: all stand that were to brake; ``idle``: nobody has a leg to drive;
-            ``deadlock``: robots wait for each other for good, which is a fault of the order.
+            ``touch``: two robots touch; ``waits``: a robot asks to go first; ``rest``: all stand that were to brake;
+            ``time``: it is as late as was asked for; ``idle``: nobody has a leg to drive; ``deadlock``: robots wait for
+            each other for good, which is a fault of the order.
         clock_s: When [s].
-        robot: Its number; of ``rest``, ``idle`` and ``deadlock`` -1.
+        robot: Its number; of ``rest``, ``time``, ``idle`` and ``deadlock`` -1.
         other: The other robot of a touch.
     """
 
@@ -170,8 +170,8 @@ class TeamDriver(Protocol):
         """Let all robots brake, or let them go on."""
         ...
 
-    def run(self) -> Happening:
-        """Drive until something happens."""
+    def run(self, until_s: float = ...) -> Happening:
+        """Drive until something happens, or until the first control step at or after ``until_s``."""
         ...
 
     def leg(self, robot: int) -> LegSoFar:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from sva_bench.choices import Fidelity
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.fate import draw_fate
+from sva_bench.execution.known_team import Team
 from sva_bench.execution.margins import Margins
 from sva_bench.execution.meetings import Meetings
 from sva_bench.execution.noise import draw_noise
@@ -27,8 +29,7 @@ from sva_bench.execution.shared.trace import leg_times, traces_of
 from sva_bench.execution.shared.truncation import cut_off
 from sva_bench.execution.shared.unfailed import margins_of_missions
 from sva_bench.files.digest import digest
-from sva_bench.mission.failures import NEVER, process_of
-from sva_bench.mission.plan import Route
+from sva_bench.mission.failures import process_of
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
@@ -58,6 +59,7 @@ def ground_of(world: World, costs: Mapping[str, FuelCosts]) -> Ground:
 
 @lru_cache(maxsize=2)  # a worker plays missions of one world after the other, plan by plan
 def ways_of(ground: Ground) -> Ways:
+    """The ways of a world's robots, kept from one plan to the next."""
     return Ways(ground.world, ground.costs)
 
 
@@ -69,6 +71,7 @@ class TeamTask:
         world: The world.
         ground: What the ways of its robots depend on.
         orders: The robots' orders.
+        team: What the team does about news; ``None`` if it keeps its orders.
         keys: The missions.
         traced: Whether poses are kept, by mission.
         seed, fidelity: As of the settings.
@@ -83,20 +86,30 @@ class TeamTask:
     seed: int
     fidelity: Fidelity
     alone: bool = False
+    team: Team | None = None
+
+
+class Wanted(NamedTuple):
+    """A mission that is to be played, and whether poses are kept; ``team``: as of ``TeamTask``."""
+
+    orders: Sequence[Assignment]
+    key: MissionKey
+    traced: bool = False
+    team: Team | None = None
 
 
 def play_missions(task: TeamTask) -> tuple[TeamDriven, ...]:
     """Play the missions of a task."""
     world, ways = task.world, ways_of(task.ground)
-    _, fates, _ = task.keys[0]
-    leaves = tuple(fate.before_poi > 0 and bool(own.route) for fate, own in zip(fates, task.orders, strict=True))
+    leaves = tuple(fate.before_poi > 0 and bool(own.route)
+                   for fate, own in zip(task.keys[0].fates, task.orders, strict=True))
     order = first_order(ways, task.orders, leaves) if world.interaction == "shared" and not task.alone else None
     played = []
-    for (_, own, rollout), traced in zip(task.keys, task.traced, strict=True):
-        drawn = [draw_noise(world.noise, task.seed, rollout, number) for number in range(len(world.robots))]
+    for key, traced in zip(task.keys, task.traced, strict=True):
+        drawn = [draw_noise(world.noise, task.seed, key.rollout, number) for number in range(len(world.robots))]
         played.append(drive_team(TeamRun(
-            world=world, ways=ways, orders=task.orders, fates=own, drawn=drawn, order=order,
-            noise_index=(task.seed, rollout), alone=task.alone), task.fidelity, traced=traced))
+            world=world, ways=ways, orders=task.orders, fates=key.fates, drawn=drawn, order=order, alone=task.alone,
+            noise_index=(task.seed, key.rollout), team=task.team), task.fidelity, traced=traced))
     return tuple(played)
 
 
@@ -117,17 +130,16 @@ def execute_team(
     """
     planned, ground = planned_legs(world, costs, cases), ground or ground_of(world, costs)
     ways = ways_of(ground)
-    teams = [Team(world, ways, case, orders_of(world, case, planned), settings) for case in cases]
-    play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
-                                      for key, traced in team.unfailed().items()], executor, progress, known)
-    play_all(world, ground, settings, [(team.orders, key, traced) for team in teams
-                                      for key, traced in team.failed(known).items()], executor, progress, known)
+    teams = [CaseTrials(world, ways, case, orders_of(world, case, planned), settings) for case in cases]
+    play_all(world, ground, settings, [Wanted(team.orders, key, traced) for team in teams
+                                       for key, traced in team.unfailed().items()], executor, progress, known)
+    play_all(world, ground, settings, [Wanted(team.orders, key, traced) for team in teams
+                                       for key, traced in team.failed(known).items()], executor, progress, known)
     return [team.executed(costs, known) for team in teams]
 
 
 def play_all(
-    world: World, ground: Ground, settings: Settings,
-    wanted: Sequence[tuple[Sequence[Assignment], MissionKey, bool]], executor: Executor | None,
+    world: World, ground: Ground, settings: Settings, wanted: Sequence[Wanted], executor: Executor | None,
     progress: Callable[[int, int], None] | None, known: dict[MissionKey, TeamDriven], *, alone: bool = False,
 ) -> None:
     """Play missions that are not known yet.
@@ -136,28 +148,27 @@ def play_all(
         world: The world that robots meet.
         ground: What their ways depend on.
         settings: Seed and fidelity.
-        wanted: Orders of the robots, the mission, and whether its poses are kept.
+        wanted: The missions.
         executor: Where missions are played; ``None`` = here.
         progress: Called with the number of missions played and of all.
         known: Missions played already; what is played now is added.
         alone: Whether robots neither heed nor touch each other.
     """
-    groups: dict[tuple[tuple[Route, ...], tuple[bool, ...]], dict[MissionKey, bool]] = {}
-    orders_of_routes: dict[tuple[Route, ...], Sequence[Assignment]] = {}
-    for orders, key, traced in wanted:
-        if key not in known or (traced and not known[key].traced):
-            routes, fates, _ = key
-            orders_of_routes[routes] = orders
-            group = groups.setdefault((routes, tuple(fate.before_poi == 0 for fate in fates)), {})
-            group[key] = group.get(key, False) or traced
+    groups: dict[MissionKey, dict[MissionKey, Wanted]] = {}  # by the mission in which the same robots leave
+    for one in wanted:
+        if one.key not in known or (one.traced and not known[one.key].traced):
+            group = groups.setdefault(one.key.unfailed._replace(rollout=0), {})
+            if one.key not in group or one.traced:
+                group[one.key] = one
     tasks = []
-    for (routes, _), group in groups.items():
-        keys = list(group)
-        for first in range(0, len(keys), _CHUNK):
-            mine = tuple(keys[first:first + _CHUNK])
-            tasks.append(TeamTask(world=world, ground=ground, orders=tuple(orders_of_routes[routes]), keys=mine,
-                                  traced=tuple(group[key] for key in mine), seed=settings.seed,
-                                  fidelity=settings.fidelity, alone=alone))
+    for group in groups.values():
+        members = list(group.values())
+        for first in range(0, len(members), _CHUNK):
+            mine = members[first:first + _CHUNK]
+            tasks.append(TeamTask(
+                world=world, ground=ground, orders=tuple(mine[0].orders), keys=tuple(one.key for one in mine),
+                traced=tuple(one.traced for one in mine), seed=settings.seed, fidelity=settings.fidelity,
+                team=mine[0].team, alone=alone))
     count, of = 0, sum(len(task.keys) for task in tasks)
     for task, played in _played(tasks, executor):
         known.update(zip(task.keys, played, strict=True))
@@ -182,7 +193,7 @@ def _played(tasks: Sequence[TeamTask], executor: Executor | None
             future.cancel()
 
 
-class Team:
+class CaseTrials:
     """The trials of one case."""
 
     def __init__(self, world: World, ways: Ways, case: Case, orders: Sequence[Assignment], settings: Settings) -> None:
@@ -212,12 +223,11 @@ class Team:
         return self._settings.recorded and row == 0
 
     def _key(self, row: int) -> MissionKey:
-        return self._routes, self._fates[row], int(self._fate.rollout[row])
+        return MissionKey(self._routes, self._fates[row], int(self._fate.rollout[row]))
 
     def _unfailed(self, row: int) -> MissionKey:
         """The mission of a trial if no robot fails on its way."""
-        return self._routes, tuple(RobotFate(0 if fate.before_poi == 0 else NEVER) for fate in self._fates[row]), \
-            int(self._fate.rollout[row])
+        return self._key(row).unfailed
 
     def _cut_off(self, row: int, known: Mapping[MissionKey, TeamDriven]) -> TeamDriven | None:
         """The mission without failures, cut off by those of a trial; ``None`` if they touch another robot."""
@@ -267,7 +277,7 @@ class Team:
             incentive=figures["incentive"], value=figures["value"], end_time_s=figures["end_time_s"],
             fuel_used_s=figures["fuel_used_s"], waited_s=figures["waited_s"],
             **{name: figures[name].astype(np.int64) for name in ("pois_reached", "stops_reached", "end", "contacts")},
-            legs=self._legs(costs, found), traces=self._traces(found), meetings=_meetings(distinct).rows(kind))
+            legs=self._legs(costs, found), traces=self._traces(found), meetings=meetings_of(distinct).rows(kind))
 
     def _margins(self, known: Mapping[MissionKey, TeamDriven]) -> tuple[Margins, ...]:
         """What each route left of fuel and time where nobody fails on the way, under each noise draw."""
@@ -280,7 +290,7 @@ class Team:
         robots = self._world.robots
         first = self._settings.first
         return tuple(leg_times([costs[self._world.kind_of(robot)] for robot in robots], [r.name for r in robots], {
-            first + row: (key[2], mission) for key, (row, mission) in found.items()}))
+            first + row: (key.rollout, mission) for key, (row, mission) in found.items()}))
 
     def _traces(self, found: Mapping[MissionKey, tuple[int, TeamDriven]]) -> tuple[Trace, ...]:
         if not self._settings.recorded:
@@ -291,7 +301,7 @@ class Team:
         return traces_of(self._ways, self.orders, mission, [mine.disturbance.waves for mine in drawn])
 
 
-def _meetings(missions: Sequence[TeamDriven]) -> Meetings:
+def meetings_of(missions: Sequence[TeamDriven]) -> Meetings:
     """What robots did to each other in some missions, each of which was played or is provably one that was."""
     return Meetings(
         contacts=np.array([mission.contacts for mission in missions], dtype=np.int64),

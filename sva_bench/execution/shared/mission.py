@@ -12,11 +12,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain, pairwise, repeat
 
+from sva_bench.arrays import IntArray
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import HELD_S, Assignment, RobotFate, Wait
 from sva_bench.execution.rules import LegDriven, RobotMission
 from sva_bench.execution.shared.driver import Happening, Hold, LegWait, TeamDriver
-from sva_bench.execution.shared.lanes import Order
+from sva_bench.execution.shared.lanes import Lane, Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
 from sva_bench.execution.shared.players import BRAKING, Player, TeamDriven, driven_by
@@ -67,13 +68,9 @@ class SharedMission:
             if not player.active:
                 driver.assign(number, None, None)
             elif order is None:
-                player.cuts = [ways.shortest(number, a, b) for a, b in pairwise(route)]
-                driver.assign(number, uncoordinated(player.cuts), None)
+                self._assign(player, uncoordinated([ways.shortest(number, a, b) for a, b in pairwise(route)]), None)
             else:
-                player.cuts = list(order.lanes[number].cuts)
-                player.around = [way is not ways.shortest(number, a, b)
-                                 for way, (a, b) in zip(player.cuts, pairwise(route), strict=True)]
-                driver.assign(number, order.lanes[number], order.needs[number])
+                self._follow(player, order, route)
         self._planned = tuple(tuple(player.cuts) for player in self._players)
         self._starts = tuple(driver.pose(player.number) for player in self._players)
         for player in self._players:
@@ -83,7 +80,7 @@ class SharedMission:
 
     def play(self) -> TeamDriven:
         """Play it to its end."""
-        while (happening := self._driver.run()).kind != "idle":
+        while (happening := self._driver.run(self._until_s)).kind != "idle":
             self._take(happening)
         return TeamDriven(
             names=tuple(self._names), contacts=self._contacts,
@@ -94,6 +91,11 @@ class SharedMission:
             replanned=self._replanned or any(player.down for player in self._players),
             trails=tuple(tuple(player.trail) for player in self._players), asked_s=self._asked_s,
             switched=self._switched)
+
+    @property
+    def _until_s(self) -> float:
+        """When to look at the mission next, whatever happens [s]."""
+        return math.inf
 
     def _take(self, happening: Happening) -> None:
         """React to what happened."""
@@ -138,7 +140,7 @@ class SharedMission:
         driven_s, waited_s = player.so_far_s
         driving_s = 0.0 if mission.fails_on_leaving else mission.fate.lifetime_s - mission.driven_s - driven_s
         self._driver.start_leg(
-            player.number, ready_s, driving_s, self._holds(player), idle_share=share,
+            player.number, ready_s, driving_s, () if player.anew else self._holds(player), idle_share=share,
             fuel_s=max(mission.tank_s * capacity - driven_s - share * waited_s, 0.0))
 
     def _holds(self, player: Player) -> list[Hold]:
@@ -183,7 +185,7 @@ class SharedMission:
             player.at = self._ways.site_at(player.number, player.stops[-1], player.cuts[0])
             player.cuts, player.around = player.cuts[1:], player.around[1:]
             self._depart(player)
-        elif player.mission.end in ("home", "late") or player.mission.kept_off:
+        elif player.mission.end in ("home", "late", "stuck"):  # stuck at home: kept off a stop
             player.cuts = []
         else:  # it ran dry while it stood at its stop
             self._stands(player)
@@ -242,8 +244,12 @@ class SharedMission:
         player.down, player.cuts = True, []
         self._driver.drop(player.number)
         if self._coordinated and not self._braking and self._in_the_way(player):
-            self._braking = self._replanned = True
-            self._driver.brake(True)
+            self._brake()
+
+    def _brake(self) -> None:
+        """Let all come to rest, to plan the rest anew."""
+        self._braking = self._replanned = True
+        self._driver.brake(True)
 
     def _in_the_way(self, down: Player) -> bool:
         """Whether a robot stands where another still has to pass."""
@@ -267,7 +273,11 @@ class SharedMission:
             self._take_up(player, then)
         for player, _ in moving:
             if player.active:
-                self._set_off(player, self._driver.clock_s if player.parts else player.mission.clock_s)
+                self._set_off(player, self._ready_s(player))
+
+    def _ready_s(self, player: Player) -> float:
+        """When a robot at rest can go on [s]."""
+        return self._driver.clock_s if player.parts else player.mission.clock_s
 
     def _present(self, player: Player) -> Present:
         mission, number = player.mission, player.number
@@ -277,8 +287,8 @@ class SharedMission:
         return Present(
             number=number, orders=mission.orders, pose=self._driver.pose(number), down=player.down,
             site=player.at if at_stop else None, ahead=mission.ahead if player.active else (),
-            ready_s=mission.clock_s, burnt_s=mission.burnt_s + driven_s, cuts=tuple(player.cuts),
-            around=tuple(player.around),
+            ready_s=mission.clock_s, burnt_s=mission.burnt_s + driven_s,
+            cuts=() if player.anew else tuple(player.cuts), around=tuple(player.around),
             arc_m=None if at_stop else arc_m, name=self._names[number])
 
     def _take_up(self, player: Player, then: Onward) -> None:
@@ -291,6 +301,19 @@ class SharedMission:
         mission.kept_off = mission.kept_off or then.kept_off
         mission.give(then.ahead)
         player.stops[-1] = then.ahead[0]
-        player.cuts, player.around = list(then.lane.cuts), list(then.around)
         player.on_its_way, player.begun_m = then.on_its_way, then.begun_m
-        self._driver.assign(player.number, then.lane, then.needs)
+        self._assign(player, then.lane, then.needs, then.around)
+
+    def _follow(self, player: Player, order: Order, route: Sequence[str]) -> None:
+        """Give a robot at its berth its way by a plan in space and time."""
+        lane = order.lanes[player.number]
+        self._assign(player, lane, order.needs[player.number], [
+            way is not self._ways.shortest(player.number, a, b)
+            for way, (a, b) in zip(lane.cuts, pairwise(route), strict=True)])
+
+    def _assign(self, player: Player, lane: Lane, needs: Sequence[IntArray] | None, around: Sequence[bool] = ()
+                ) -> None:
+        """Give a robot at rest its way from here on; ``around``: as of ``Player``, none by default."""
+        player.cuts, player.anew = list(lane.cuts), False
+        player.around = list(around) or [False] * len(player.cuts)
+        self._driver.assign(player.number, lane, needs)

@@ -16,6 +16,7 @@ from sva_bench.execution.shared.driver import Happening, Hold, LegSoFar, LegWait
 from sva_bench.execution.shared.lanes import Lane
 from sva_bench.execution.shared.state import (
     BRAKED,
+    NO_END,
     READY,
     STANDS,
     longer,
@@ -33,6 +34,7 @@ from sva_bench.execution.shared.ticks import (
     IS_STUCK,
     NOBODY,
     REST,
+    TIME,
     begin_leg,
     stop_robot,
 )
@@ -45,7 +47,8 @@ _BRAKING = 0.7  # share of its acceleration that a robot is sure to brake with: 
 _SPARE_M = 0.1  # beyond its braking distance: slip
 _OF_A_ROBOT: Mapping[int, HappeningKind] = {HAS_ARRIVED: "arrived", HAS_ENDED: "ended", IS_STUCK: "stuck",
                                               ASKS: "waits"}
-_OF_ALL: Mapping[int, HappeningKind] = {REST: "rest", NOBODY: "idle", DEADLOCK: "deadlock"}
+_OF_ALL: Mapping[int, HappeningKind] = {REST: "rest", TIME: "time", NOBODY: "idle", DEADLOCK: "deadlock"}
+_SAME = 1e-6  # of a control step: rounding of clocks
 
 
 class TeamMotion:
@@ -125,8 +128,9 @@ class TeamMotion:
         """Let all robots brake, or let them go on."""
         self._teams["braking"] = on
 
-    def run(self) -> Happening:
-        """Drive until something happens."""
+    def run(self, until_s: float = math.inf) -> Happening:
+        """Drive until something happens, or until the first control step at or after ``until_s``."""
+        self._teams["until"] = NO_END if math.isinf(until_s) else math.ceil(until_s * CONTROL_HZ - _SAME)
         while (happened := self._told()) is None:
             code = self._until_something(self._placed[0])
             if code == FULL:

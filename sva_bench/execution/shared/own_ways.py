@@ -69,6 +69,7 @@ class Ways:
         self._sites = [{site.name: site for site in own.sites} for own in self._own]
         self.orders: dict[tuple[Route, ...], Order | None] = {}
         self._shortest: dict[tuple[int, str, str], Cut] = {}
+        self._candidates: dict[tuple[int, str, str], tuple[Cut, ...]] = {}
         self._lines: dict[int, Lines] = {}
         located = world.noise.localisation
         self._off_m = 0.0 if located is None else _SDS * located.sd_m
@@ -93,6 +94,12 @@ class Ways:
 
     def candidates(self, robot: int, origin: str, destination: str) -> tuple[Cut, ...]:
         """The ways of a leg, the shortest first; nobody is led another one unless others are in the way."""
+        key = robot, origin, destination
+        if key not in self._candidates:
+            self._candidates[key] = self._find_candidates(robot, origin, destination)
+        return self._candidates[key]
+
+    def _find_candidates(self, robot: int, origin: str, destination: str) -> tuple[Cut, ...]:
         shortest, hops = self.shortest(robot, origin, destination), self.hops(robot, origin, destination)
         if len(hops) > 1:  # a robot stops at the sites between
             return (shortest,)

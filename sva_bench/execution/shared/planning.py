@@ -83,7 +83,7 @@ class Present:
         ahead: Stops that are left, the base last; none of a robot whose mission is over.
         ready_s: When it can go on [s].
         burnt_s: Fuel burnt since it was filled [s].
-        cuts: The ways of its legs as planned, the one that it is on first.
+        cuts: The ways of its legs as planned, the one that it is on first; none of legs that are new.
         around: Of each of these, whether it leads another way than the shortest.
         arc_m: How far along its leg it stands [m]; ``None`` at a stop.
         down: Whether it stands for good.
@@ -215,8 +215,12 @@ def _way_out(ways: Ways, robot: Present, discs: Sequence[Disc], *, aside: bool) 
             candidates: tuple[Cut, ...] = (ways.rest(number, robot.cuts[0].leg, robot.arc_m, robot.pose[2]),)
         elif at is None:
             candidates = ()
+        elif at == site:  # stops between are left out
+            continue
         elif at == sites[k] and k < len(robot.cuts):
             candidates, led_round = (robot.cuts[k],), robot.around[k]
+        elif k >= len(robot.cuts):  # its orders are new from here on
+            candidates = ways.candidates(number, at, site)
         else:
             candidates = (ways.shortest(number, at, site),)
         free = tuple(way for way in candidates if ways.blocked(number, way, discs) is None)

@@ -4,20 +4,41 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from sva_bench.choices import Fault
+from sva_bench.choices import Fault, News, PolicyName
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import Driven, Outcome, RobotFate
 from sva_bench.execution.rules import LegDriven, RobotMission
 from sva_bench.execution.shared.driver import Hold, LegSoFar
 from sva_bench.execution.shared.lanes import Cut
+from sva_bench.execution.team_outcome import TeamOutcome
+from sva_bench.mission.failures import NEVER
 from sva_bench.mission.plan import Route
 
-MissionKey = tuple[tuple[Route, ...], tuple[RobotFate, ...], int]
-"""Routes and fates of all robots, and the noise draw: what a mission depends on in a world."""
+
+class MissionKey(NamedTuple):
+    """What a mission depends on in a world.
+
+    Attributes:
+        routes, fates: Those of all robots.
+        rollout: The noise draw.
+        reaction: Scenario, policy and news of a team that reacts; ``None`` = it keeps its orders.
+    """
+
+    routes: tuple[Route, ...]
+    fates: tuple[RobotFate, ...]
+    rollout: int
+    reaction: tuple[str, PolicyName, News] | None = None
+
+    @property
+    def unfailed(self) -> MissionKey:
+        """The same if no robot fails on its way."""
+        return self._replace(fates=tuple(RobotFate(0 if fate.before_poi == 0 else NEVER) for fate in self.fates))
+
 
 BRAKING = "replanning"
 """The cause of waits while a team brakes and plans anew."""
@@ -46,6 +67,7 @@ class TeamDriven:
         traced: Whether poses were kept.
         asked_s: When a robot last asked to go first [s].
         switched: How many times one was let go first.
+        told: The same as of a team that reacts; ``None`` if it doesn't.
     """
 
     names: tuple[str, ...]
@@ -63,6 +85,7 @@ class TeamDriven:
     traced: bool = False
     asked_s: float = -math.inf
     switched: int = 0
+    told: TeamOutcome | None = None
 
     @property
     def detours(self) -> int:
@@ -96,6 +119,7 @@ class Player:
         trail: What it drove of each of them.
         down: Whether it stands for good away from its berth.
         fault: Why it got stuck where nothing held it.
+        anew: Whether it stands at a stop from which its way is to be found anew: its cuts are none that it drives.
     """
 
     number: int
@@ -114,6 +138,7 @@ class Player:
     trail: list[tuple[LegSoFar, ...]] = field(default_factory=list)
     down: bool = False
     fault: Fault | None = None
+    anew: bool = False
 
     @property
     def active(self) -> bool:

@@ -22,6 +22,9 @@ MOST_DELAY = 30
 """Commands that may be under way: half a second's."""
 _WAITS, _POSES, _HOLDS = 32, 512, 4  # room to begin with
 
+NO_END = 1 << 60
+"""A control step that never comes."""
+
 Records = NDArray[Any]
 """An array of records."""
 
@@ -124,6 +127,7 @@ class Team(Protocol):
         traced: Whether poses are kept.
         checked: Whether stuck robots are looked for.
         asks: Control steps of waiting for other robots after which one asks to go first; 0 = none does.
+        until: The control step before which it comes back at the latest.
     """
 
     now: int
@@ -131,6 +135,7 @@ class Team(Protocol):
     traced: bool
     checked: bool
     asks: int
+    until: int
 
 
 _SHAPES = {"limits": (4,), "waves": (8, FEATURES), "pose": (3,), "follow": (5,), "queue": (MOST_DELAY, 2)}
@@ -187,7 +192,7 @@ def robots_at_rest(members: Sequence[Member]) -> Records:
 
 def team_of(*, traced: bool, checked: bool) -> Records:
     """The record of a team at the start of a mission, shape (1,)."""
-    return np.array([(0, False, traced, checked, 0)], dtype=TEAM)
+    return np.array([(0, False, traced, checked, 0, NO_END)], dtype=TEAM)
 
 
 def nothing_noted(robots: int, *, traced: bool) -> Notes:

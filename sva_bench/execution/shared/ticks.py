@@ -18,6 +18,7 @@ from sva_bench.execution.shared.state import (
     CAUSE,
     DRAINS,
     DRIVES,
+    NO_END,
     READY,
     STANDS,
     Notes,
@@ -30,9 +31,9 @@ from sva_bench.robot.disturbance import error_at
 from sva_bench.robot.follower import ARRIVED, CONTROL_HZ, DRIVE, NO_LINE, braked, control, wrap
 from sva_bench.robot.twin import advance, delayed
 
-GO, EVENT, TOUCH, REST, NOBODY, DEADLOCK, FULL = 0, 1, 2, 3, 4, 5, 6
+GO, EVENT, TOUCH, REST, NOBODY, DEADLOCK, FULL, TIME = 0, 1, 2, 3, 4, 5, 6, 7
 """Why compiled code comes back: not at all; something happened to a robot, to a pair; all rest that brake; nobody has
-anything to do; robots wait for each other; waits or poses need more room."""
+anything to do; robots wait for each other; waits or poses need more room; it is as late as was asked for."""
 HAS_ARRIVED, HAS_ENDED, IS_STUCK, ASKS = 1, 2, 3, 4
 """What happens to a robot."""
 FREE_M = 0.01
@@ -67,6 +68,8 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
     for i in range(len(robots)):
         stale = stale or robots[i].commanded
     while True:
+        if team.now >= team.until:
+            return TIME
         happened, busy, still, full = False, False, True, False
         for i in range(len(robots)):
             robot = robots[i]
@@ -117,11 +120,14 @@ def drive_on(robots: Records, teams: Records, ways: Ways, notes: Notes, parts: F
         if happened:
             return EVENT
         if not busy:
-            return NOBODY
+            if team.until == NO_END:
+                return NOBODY
+            team.now = team.until
+            return TIME
         if still:
             steps = 1 if team.braking or stale else _steps_to_wait(robots, team, waits)
             stale = False
-            _pass_over(robots, team, waits, abs(steps))
+            _pass_over(robots, team, waits, min(abs(steps), team.until - team.now))
             if team.braking:
                 return REST
             if steps < 0:

@@ -33,13 +33,13 @@ def unfailed_keys(world: World, cases: Sequence[Case], orders: Sequence[Assignme
     fates = tuple(RobotFate(NEVER if any(process.can_leave(case.scenario.reliability(robot)) for case in cases) else 0)
                   for robot in world.robots)
     routes = tuple(own.route for own in orders)
-    return [(routes, fates, draw) for draw in range(draws)] if any(
+    return [MissionKey(routes, fates, draw) for draw in range(draws)] if any(
         own.route and fate.before_poi for own, fate in zip(orders, fates, strict=True)) else []
 
 
 def leavers(key: MissionKey) -> list[int]:
     """The robots that leave their berths in a mission, if nobody fails on its way; else none."""
-    routes, fates, _ = key
+    routes, fates = key.routes, key.fates
     sent = [number for number, route in enumerate(routes) if route]
     if any(fates[number].before_poi not in (0, NEVER) or np.isfinite(fates[number].lifetime_s) for number in sent):
         return []
@@ -61,7 +61,7 @@ def margins_of_missions(orders: Sequence[Assignment], missions: Iterable[tuple[M
     for key, mission in missions:
         mine = leavers(key)
         for number in mine:
-            at = number, key[2]
+            at = number, key.rollout
             if at not in most or most[at][0] < len(mine):
                 most[at] = len(mine), mission
     return tuple(margins_of(number, own, [

@@ -15,7 +15,7 @@ from sva_bench.execution.outcome import RobotFate
 from sva_bench.execution.shared.execute import TeamTask, ground_of, play_missions
 from sva_bench.execution.shared.mission import DEADLOCK
 from sva_bench.execution.shared.own_ways import Ways
-from sva_bench.execution.shared.players import TeamDriven
+from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.robot.follower import CONTROL_HZ
 from tests.execution.shared.random_missions import Ready
 
@@ -37,7 +37,7 @@ def played(ready: Ready, seed: int, fates: Sequence[RobotFate], rollout: int, *,
     """One mission played with its poses."""
     task = TeamTask(
         world=ready.world, ground=ground_of(ready.world, ready.costs), orders=ready.orders, seed=seed, traced=(True,),
-        keys=((tuple(own.route for own in ready.orders), tuple(fates), rollout),),
+        keys=(MissionKey(tuple(own.route for own in ready.orders), tuple(fates), rollout),),
         fidelity="physics" if physics else "kinematic")
     (mission,) = play_missions(task)
     return mission

@@ -101,6 +101,19 @@ def test_a_team_in_physics_repeats_to_the_bit() -> None:
     assert seen[0] == seen[1]
 
 
+def test_coming_back_at_some_time_changes_nothing_in_physics() -> None:
+    order, seen = planned(CROSSING, 1.0), []
+    for stops in ((), (0.0, 1.003, 4.5, 4.51)):
+        with TeamBullet(ROOM, members_of(CROSSING, [NOISY] * 2)) as driver:
+            mission = Mission(driver, order.lanes, stop_s=1.0)
+            mission.begin(order)
+            for until_s in stops:
+                assert driver.run(until_s).kind == "time"
+            mission.go_on()
+            seen.append((mission.happened, [driver.pose(robot) for robot in range(2)]))
+    assert seen[0] == seen[1]
+
+
 def test_robots_that_meet_without_gates_touch_and_both_know_whom() -> None:
     with TeamBullet(ROOM, members_of(CROSSING)) as driver:
         mission = Mission(driver, planned(CROSSING, 1.0).lanes)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sva_bench.execution.shared.driver import Hold, Member
+from sva_bench.execution.shared.driver import Happening, Hold, Member
 from sva_bench.execution.shared.lanes import Cut, Itinerary, cut
 from sva_bench.execution.shared.space_time import plan_order
 from sva_bench.execution.shared.team_twin import TeamTwin
@@ -401,6 +401,46 @@ def test_whoever_waits_for_a_dropped_robot_goes_on_at_once_whatever_their_number
         for wait in mission.legs[robot][0].waits:
             if wait.robot == first:
                 assert wait.since_s + wait.lasts_s <= happening.clock_s + 2 * TICK_S
+
+
+class InSlices(TeamTwin):
+    """Comes back at many times, and is told to go on each time."""
+
+    def run(self, until_s: float = math.inf) -> Happening:
+        while (happening := super().run(min(until_s, self.clock_s + 0.37))).kind == "time" and self.clock_s < until_s:
+            if not self._robots["doing"].any():
+                return super().run()
+        return happening
+
+
+@pytest.mark.parametrize("name", TOURS)
+def test_coming_back_at_some_time_changes_nothing(name: str) -> None:
+    # Holds and stops too, in which time is passed over.
+    tours, order, seen = TOURS[name], ORDERS[name], []
+    for driver in (TeamTwin(members_of(tours, [NOISY] * len(tours)), traced=True),
+                   InSlices(members_of(tours, [NOISY] * len(tours)), traced=True)):
+        mission = Mission(driver, order.lanes, stop_s=1.1)
+        mission.begin(order, {0: [Hold(along_m=1.0, lasts_s=5.0, cause="door")]})
+        assert mission.go_on().kind == "idle"
+        seen.append([(leg.driving_s, leg.clock_s, leg.waits, leg.since_s.tolist(), leg.pose.tolist())
+                     for legs in mission.legs.values() for leg in legs])
+        assert len(mission.happened) == sum(len(lane.cuts) for lane in order.lanes) + 1
+    assert seen[0] == seen[1]
+
+
+@pytest.mark.parametrize("until_s", [0.0, 1.0, 1.001, 100.0])
+def test_it_comes_back_at_the_first_control_step_from_a_time_on(until_s: float) -> None:
+    driver = TeamTwin(members_of([AHEAD]))
+    driver.assign(0, lane_of(cuts_of(AHEAD)), None)
+    driver.start_leg(0, 0.5, math.inf, ())
+    happening = driver.run(until_s)
+    if until_s == 100.0:  # beyond its arrival; nobody has anything to do after that, and time goes on
+        assert happening.kind == "arrived"
+        happening = driver.run(until_s)
+    assert happening.kind == "time"
+    assert until_s <= driver.clock_s < until_s + TICK_S
+    assert driver.run(until_s).kind == "time"  # it is late enough
+    assert driver.run().kind == ("idle" if until_s == 100.0 else "arrived")
 
 
 def test_time_in_which_all_stand_is_passed_over() -> None:
