@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sva_bench.choices import Fidelity
+from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.executed import Executed, LegTime
 from sva_bench.execution.fate import draw_fate
@@ -99,11 +100,20 @@ class Wanted(NamedTuple):
 
 
 def play_missions(task: TeamTask) -> tuple[TeamDriven, ...]:
-    """Play the missions of a task."""
+    """Play the missions of a task.
+
+    Raises:
+        BadInput: If no order of its robots is found: never, as long as berths leave all ways open.
+    """
     world, ways = task.world, ways_of(task.ground)
     leaves = tuple(fate.before_poi > 0 and bool(own.route)
                    for fate, own in zip(task.keys[0].fates, task.orders, strict=True))
-    order = first_order(ways, task.orders, leaves) if world.interaction == "shared" and not task.alone else None
+    order = None
+    if world.interaction == "shared" and not task.alone:
+        order = first_order(ways, task.orders, leaves)
+        if order is None:
+            raise BadInput(f"{world.name}: there is no order in which its robots get by each other, not even one after "
+                           "the other; move the base to a more open place, or widen the passages about it")
     played = []
     for key, traced in zip(task.keys, task.traced, strict=True):
         drawn = [draw_noise(world.noise, task.seed, key.rollout, number) for number in range(len(world.robots))]
