@@ -22,7 +22,8 @@ from sva_bench.analysis.statistics import controlled, estimate
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import ENDS, End, FailureProcess
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.drives import RouteKey, drive_tasks
+from sva_bench.execution.drives import RouteKey
+from sva_bench.execution.driving import drive_tasks
 from sva_bench.execution.execute import drives_ahead, settle_trials
 from sva_bench.execution.orders import PlannedLegs, planned_legs
 from sva_bench.execution.outcome import Assignment, Driven, RobotFate

@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 from sva_bench.arrays import FloatArray
-from sva_bench.execution.drives import DriveTask, drive_route
+from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.geometry.buckets import longest_view_heading
 from sva_bench.geometry.cells import Cells, bounds_of, boxes_of, connected_region, distance_field
 from sva_bench.geometry.obstacles import Obstacles

@@ -16,7 +16,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import Fidelity
-from sva_bench.execution.drives import DriveTask, drive_route
+from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.execution.noise import draw_noise
 from sva_bench.execution.outcome import Driven
 from sva_bench.geometry.obstacles import Obstacles

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.execution.drives import drive_route
+from sva_bench.execution.driving import drive_route
 from sva_bench.robot.model import BUILT_IN
 from tests.execution.test_simulator import random_tour
 from tests.worlds_for_tests import SMALL

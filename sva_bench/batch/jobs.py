@@ -14,7 +14,8 @@ from sva_bench.batch.physics import refuse_failed_physics
 from sva_bench.batch.shards import Reactions, Shard, shard_of
 from sva_bench.choices import PathPlanner
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.drives import Drives, DriveTask, RouteKey, drive_tasks
+from sva_bench.execution.drives import Drives, RouteKey
+from sva_bench.execution.driving import DriveTask, drive_tasks
 from sva_bench.execution.execute import execute, settle_trials
 from sva_bench.execution.orders import PlannedLegs
 from sva_bench.execution.outcome import Driven

@@ -36,15 +36,15 @@ SABOTAGE = """
 import sys
 if "sva_bench.workers.far_end" in sys.orig_argv:
     import ctypes, time
-    from sva_bench.execution import drives
-    near = drives.solids_near
+    from sva_bench.execution import driving
+    near = driving.solids_near
     def sabotaged(obstacles, *others):
         if len(obstacles.cylinders) == 2:
             ctypes.string_at(0)
         if len(obstacles.cylinders) == 3:
             time.sleep(600)
         return near(obstacles, *others)
-    drives.solids_near = sabotaged
+    driving.solids_near = sabotaged
 """
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadFile
-from sva_bench.execution.drives import DriveTask, drive_route
+from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.files.documents import parse_yaml
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.follower import CONTROL_HZ, stretches

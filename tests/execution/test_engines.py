@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sva_bench.choices import EngineName, Fidelity
-from sva_bench.execution import drives
+from sva_bench.execution import driving
 from sva_bench.execution.corridor import solids_near, strayed
-from sva_bench.execution.drives import DriveTask, drive_route, drive_tasks
+from sva_bench.execution.driving import DriveTask, drive_route, drive_tasks
 from sva_bench.execution.engines import bullet
 from sva_bench.execution.engines.engine import ENGINE_OF, ENGINES, Engine, Pose
 from sva_bench.execution.following import follow, is_stuck
@@ -210,9 +210,9 @@ def test_a_robot_that_strays_is_driven_again_among_all_obstacles(monkeypatch: py
                      traced=True)
     stopped = drive_route(task)
     assert stopped.stuck
-    monkeypatch.setattr(drives, "solids_near", lambda *_: ROOM)
+    monkeypatch.setattr(driving, "solids_near", lambda *_: ROOM)
     assert not drive_route(task).stuck
-    monkeypatch.setattr(drives, "strayed", lambda *_: True)
+    monkeypatch.setattr(driving, "strayed", lambda *_: True)
     assert np.array_equal(drive_route(task).pose, stopped.pose)
 
 

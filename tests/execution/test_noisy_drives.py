@@ -15,7 +15,7 @@ from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import Fault, Fidelity, NoiseName
-from sva_bench.execution.drives import DriveTask, drive_route
+from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.execution.engines import bullet
 from sva_bench.execution.engines.engine import ENGINES, Pose
 from sva_bench.execution.following import follow

@@ -10,7 +10,7 @@ import pytest
 
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadFile
-from sva_bench.execution.drives import DriveTask, drive_route
+from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.execution.engines.bodies import well_conditioned
 from sva_bench.execution.engines.bullet import Bullet
 from sva_bench.geometry.obstacles import Obstacles

@@ -13,7 +13,7 @@ from numpy.testing import assert_array_equal
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import Fidelity
-from sva_bench.execution.drives import DriveTask, drive_route
+from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.execution.following import downsampled
 from sva_bench.execution.legs import Leg
 from sva_bench.execution.outcome import Driven

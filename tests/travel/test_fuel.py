@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.execution.drives import DriveTask, drive_route
+from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.travel.fuel import fuel_costs, repair_metric
 from sva_bench.travel.roadmap import plan_paths
