@@ -305,3 +305,15 @@ def test_what_does_not_fit_has_an_error_of_its_own_in_python(
             function(world)
         with pytest.raises(BadFile, match=r"world\.yaml:[0-9]+: sites\..*no room for"):
             function(tmp_path / "world.yaml")
+
+
+def test_a_run_in_which_robots_touched_is_read_back_with_whom_they_touched(tmp_path: Path) -> None:
+    # In four-rooms both robots touch soon after they left, if nobody coordinates them; physics drives such missions.
+    world = Path(__file__).parents[2] / "worlds" / "four-rooms.yaml"
+    assert run_command_line(["run", str(world), "--scenario", "S1", "--interaction", "uncoordinated", "--trials", "4",
+                             "--rollouts", "2", "--out", str(tmp_path)]) == 0
+    (folder,) = tmp_path.iterdir()
+    met = pq.read_table(folder / "contacts.parquet").to_pylist()
+    assert {(row["robot"], row["solid"]) for row in met} == {("uv1", "uv2"), ("uv2", "uv1")}
+    assert run_command_line(["report", str(folder)]) == 0
+    assert run_command_line(["replay", str(folder), "--trial", "1", "--planner", "stochastic"]) == 0

@@ -22,6 +22,7 @@ from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.planning import Onward, Present, plan_onward, uncoordinated
 from sva_bench.execution.shared.players import BRAKING, Player, TeamDriven, driven_by
 from sva_bench.execution.shared.switching import ASK_S, Switching
+from sva_bench.execution.touch import Touch
 from sva_bench.execution.waits import waits_on
 from sva_bench.world.model import World
 
@@ -197,7 +198,8 @@ class SharedMission:
         waits, touches, driving_s = [], [], 0.0
         for part in parts:
             waits += [self._wait(wait, number, driving_s) for wait in part.waits]
-            touches += [replace(touch, leg=number, since_s=touch.since_s + driving_s) for touch in part.touches]
+            touches += [replace(touch, leg=number, since_s=touch.since_s + driving_s, solid=self._met(touch))
+                        for touch in part.touches]
             driving_s += part.driving_s
         leg = LegDriven(driving_s, stuck, len(touches), sum(wait.lasts_s for wait in waits), player.drawn.capacity,
                         tuple(touches), tuple(waits), held_by)
@@ -225,9 +227,11 @@ class SharedMission:
         """What a stuck robot touches, or touched until shortly before."""
         leg = self._driver.leg(number)
         held = [touch for touch in leg.touches if touch.since_s + touch.lasted_s >= leg.driving_s - HELD_S]
-        if not held:
-            return ""
-        return held[-1].solid if held[-1].robot is None else self._names[held[-1].robot]
+        return self._met(held[-1]) if held else ""
+
+    def _met(self, touch: Touch) -> str:
+        """What a hull touched, a robot by its name."""
+        return touch.solid if touch.robot is None else self._names[touch.robot]
 
     def _touch(self, one: Player, other: Player) -> None:
         """Two hulls touched: of robots that nobody coordinates, that is the end of both."""

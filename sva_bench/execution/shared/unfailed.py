@@ -78,7 +78,7 @@ def _as_ordered(orders: Assignment, mission: TeamDriven, number: int) -> Driven:
     """What a robot drove of its route.
 
     From a stop on that it left out, since somebody stood there, it drove nothing of it. A leg that it ran dry on takes
-    what it was planned to take.
+    what it was planned to take, and so do those after it.
     """
     driven, stops, outcome = mission.driven[number], mission.stops[number], mission.robots[number]
     leg_s, kept = driven.leg_s.tolist(), as_ordered_until(orders, stops)
@@ -87,5 +87,6 @@ def _as_ordered(orders: Assignment, mission: TeamDriven, number: int) -> Driven:
     if outcome.end == "out_of_fuel" and len(leg_s) > outcome.stops_reached:
         leg = len(leg_s) - 1
         planned_s = orders.planned_s[leg] if orders.planned_s else 0.0
-        return replace(driven, leg_s=np.array([*leg_s[:leg], max(leg_s[leg] + _LEAST_SHORT_S, planned_s)]))
+        rest = orders.planned_s[leg + 1:]  # as where robots do not meet: their routes are driven to the end
+        return replace(driven, leg_s=np.array([*leg_s[:leg], max(leg_s[leg] + _LEAST_SHORT_S, planned_s), *rest]))
     return driven
