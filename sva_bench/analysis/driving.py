@@ -39,7 +39,7 @@ class DrivesMade(Record):
 def driving_told(made: DrivesMade) -> str:
     """The same in a sentence."""
     said = f"{made.in_physics_pct:.3g} % of the driving time of {made.count} {made.unit} in physics"
-    if made.checked:
+    if made.checked and made.worst_check_pct is not None:
         said += (f"; {made.checked} of them checked the twin, which was off by {made.worst_check_pct:.2g} % of a "
                  "drive's time at most")
     if made.tipped_over:

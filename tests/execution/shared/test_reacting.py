@@ -246,7 +246,7 @@ def settings_of(seed: int) -> Settings:
 
 
 @pytest.mark.parametrize("interaction", ["shared", "uncoordinated"])
-@pytest.mark.parametrize("seed", [1, 2, 4])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_team_that_keeps_its_orders_fares_as_one_that_does_not_react(seed: int, interaction: str) -> None:
     ready = random(seed, interaction)
     (alone,) = execute_team(ready.world, ready.costs, [ready.case], settings_of(seed), None, None, {})
@@ -272,7 +272,7 @@ def resolved(ready: Ready, news: News, settings: Settings) -> Reacted:
 
 
 @pytest.mark.parametrize("news", ["instant", "report"])
-@pytest.mark.parametrize("seed", [1, 2, 7])
+@pytest.mark.parametrize("seed", [1, 7])
 def test_whatever_happens_nobody_touches_and_nobody_waits_for_ever(seed: int, news: News) -> None:
     run = resolved(random(seed), news, settings_of(seed))
     assert run.meetings is not None
