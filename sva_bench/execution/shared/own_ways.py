@@ -16,7 +16,6 @@ from sva_bench.arrays import FloatArray
 from sva_bench.execution.engines.engine import Pose
 from sva_bench.execution.legs import Leg
 from sva_bench.execution.shared.lanes import CELL_M, Cut, Order, cut
-from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.mission.plan import Route
 from sva_bench.robot.follower import CONTROL_HZ, Stretch, arc_lengths, stretches
 from sva_bench.robot.model import RobotModel
@@ -27,7 +26,7 @@ from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
 _STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goes by
-_ROUNDING_M = 0.01
+_ROUNDING_M = 0.01  # by which ways round somebody keep farther off than ways are asked to when they are looked at again
 _STEP_S = 1.0 / CONTROL_HZ
 _SDS = 3.0  # of a localisation error that both robots may have
 _BESIDE = tuple((ring, k) for ring in (0.52, 0.62) for k in range(8))  # places beside a site that is taken
@@ -234,10 +233,6 @@ class Ways:
         """Whether somebody stands too near to a place."""
         return any(math.dist(place, (disc.x_m, disc.y_m)) < self._passes_at(robot, disc) + _ROUNDING_M
                    for disc in discs)
-
-    def obstacles(self, robot: int) -> Obstacles:
-        """What a robot's paths keep clear of, other berths among them."""
-        return self._own[robot].obstacles
 
     def _passes_at(self, robot: int, disc: Disc) -> float:
         """How near a robot's middle may come to that of one that stands [m]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
@@ -11,8 +11,10 @@ from sva_bench.execution.outcome import Assignment, Outcome, RobotFate
 from sva_bench.execution.rules import settle
 from sva_bench.execution.shared.own_ways import Disc, Ways
 from sva_bench.execution.shared.players import TeamDriven
+from sva_bench.robot.follower import CONTROL_HZ
 
 _T = TypeVar("_T")
+_STEP_S = 1.0 / CONTROL_HZ  # clocks of drivers go by it
 _SETTLES_M = 0.01  # by which physics may move a robot that stands at a stop
 
 
@@ -40,7 +42,7 @@ def cut_off(ways: Ways, orders: Sequence[Assignment], whole: TeamDriven, fates: 
     for number, (own, outcome, fate) in enumerate(zip(orders, outcomes, fates, strict=True)):
         if outcome.end != "failed" or fate.before_poi == 0:
             continue
-        if outcome.driven_s >= fate.lifetime_s or whole.asked_s >= outcome.end_time_s - 1.0 / 60.0:
+        if outcome.driven_s >= fate.lifetime_s or whole.asked_s >= outcome.end_time_s - _STEP_S:
             return None  # without it another answer might have been given
         trail = whole.trails[number][:outcome.stops_reached]
         x, y, _ = trail[-1][-1].at if trail else whole.starts[number]
@@ -79,6 +81,6 @@ def _touched(ways: Ways, robot: int, whole: TeamDriven, since_s: float, disc: Di
 
 def _legs_done(outcome: Outcome, by_s: float) -> int:
     """Legs that were over by then."""
-    if outcome.end_time_s <= by_s - 1.0 / 60.0 and outcome.end != "failed":
-        return math.floor(1e9)
-    return sum(event.kind == "arrived" and event.time_s < by_s - 1.0 / 60.0 for event in outcome.events)
+    if outcome.end_time_s <= by_s - _STEP_S and outcome.end != "failed":
+        return sys.maxsize  # it drives no more
+    return sum(event.kind == "arrived" and event.time_s < by_s - _STEP_S for event in outcome.events)
