@@ -11,6 +11,11 @@ from sva_bench.mission.instance import Instance
 
 TOLERANCE = 1e-6
 NOWHERE = -math.inf
+MOST_STATES = 1_000_000  # 400 MB
+
+
+class TooMany(Exception):
+    """There are more states than enumeration goes through."""
 
 
 class Here(NamedTuple):
@@ -115,6 +120,8 @@ class Ground:
                 tried = self._over(key, there)
                 if tried.value > found.value + 1e-9:
                     found = tried
+            if len(self._known) >= MOST_STATES:
+                raise TooMany
             self._known[key] = found
         return self._known[key]
 

@@ -12,7 +12,7 @@ from sva_bench.choices import FailureProcess
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.rest import Afield, Rest
 from sva_bench.solver.rest import plan_rest
-from tests.oracles.rest import Ground, Here
+from tests.oracles.rest import Ground, Here, TooMany
 from tests.oracles.teams import random_team
 from tests.solver.oracle import random_instance
 
@@ -93,7 +93,10 @@ def test_the_rest_is_planned_as_well_as_enumeration_does(seed: int, process: Fai
 @over_solved
 @pytest.mark.parametrize("seed", range(1000, 4000))
 def test_the_rest_is_planned_as_well_as_enumeration_does_on_many_teams(seed: int, process: FailureProcess) -> None:
-    check(random_rest(seed, process))
+    try:
+        check(random_rest(seed, process))
+    except TooMany:  # two seeds in three thousand
+        pytest.skip("more states than enumeration goes through")
 
 
 def test_random_rests_have_what_makes_them_hard() -> None:

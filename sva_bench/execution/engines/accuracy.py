@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sva_bench.execution.engines.bodies import lightness
 from sva_bench.robot.follower import CONTROL_HZ
 from sva_bench.robot.model import RobotModel
 
@@ -11,6 +12,7 @@ PHYSICS_HZ, _FINE_HZ = 60.0, 120.0  # 960 Hz and a residual of 1e-7 give leg tim
 _ITERATIONS, _FINE_ITERATIONS = 50, 200  # at most: at the usual residual, and at a finer one
 _RESIDUAL = 1e-4  # ends the iterations early
 _OWN_RESIDUAL = 1e-5  # of bodies that were not made for the solver, as round ones are
+_MOST_ITERATIONS = 3200  # however light the wheels are
 _WHEEL_RAD_S, _WHEEL_RAD_S2 = 5.0, 7.0  # slower or more slowly accelerated wheels don't bear that residual [rad2/s2]
 _FAST_RAD_S = 30.0  # wheels that turn faster don't bear 60 Hz: up to 1.5 % of a leg's time
 _MOTOR_G = 3.0  # motor torque, in multiples of what accelerates the robot as its limits allow
@@ -36,10 +38,11 @@ def accuracy(model: RobotModel) -> dict[str, float]:
     acceleration = min(model.acceleration_m_s2, model.turn_acceleration_rad_s2 * turning) / model.wheel_radius_m
     slowness = min(speed / _WHEEL_RAD_S, acceleration / _WHEEL_RAD_S2, 1.0)
     own = model.body is not None
+    iterations = _ITERATIONS if slowness == 1 and not own else _FINE_ITERATIONS
     fast = own or fastest_wheel_rad_s(model) > _FAST_RAD_S
     return {"fixedTimeStep": 1.0 / CONTROL_HZ,
             "numSubSteps": round((_FINE_HZ if fast or slowness < 1 else PHYSICS_HZ) / CONTROL_HZ),
-            "numSolverIterations": _ITERATIONS if slowness == 1 and not own else _FINE_ITERATIONS,
+            "numSolverIterations": min(round(iterations * lightness(model)), _MOST_ITERATIONS),
             "solverResidualThreshold": (_OWN_RESIDUAL if own else _RESIDUAL) * slowness**2, "enableConeFriction": 0,
             "deterministicOverlappingPairs": 1}
 

@@ -84,6 +84,18 @@ def well_conditioned(body: OwnBody, model: RobotModel) -> OwnBody:
     return body
 
 
+def lightness(model: RobotModel) -> float:
+    """By how much the driven wheels are lighter than the solver bears: at least 1, which is that of round robots.
+
+    A hull with little inertia can't give its wheels the mass that they want (``well_conditioned``), and the solver's
+    iterations converge the more slowly: with a quarter of that mass robots drive 4 % too fast.
+    """
+    if model.body is None:
+        return 1.0
+    used = well_conditioned(model.body, model)
+    return max(_WHEEL_SHARE * used.mass_kg / min(used.wheel_kg), 1.0)
+
+
 def _of_point(mass_kg: float, at_m: FloatArray) -> FloatArray:
     """Inertia of a point mass about the origin, shape (3, 3) [kg m2]."""
     return mass_kg * (float(at_m @ at_m) * np.eye(3) - np.outer(at_m, at_m))
