@@ -12,7 +12,8 @@ from sva_bench.arrays import FloatArray
 from sva_bench.errors import BadFile
 from sva_bench.execution.driving import DriveTask, drive_route
 from sva_bench.execution.engines.bodies import well_conditioned
-from sva_bench.execution.engines.bullet import Bullet
+from sva_bench.execution.engines.bullet import Bullet, BulletTeam
+from sva_bench.execution.touch import Touch
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.body import OwnBody
 from sva_bench.robot.disturbance import UNDISTURBED
@@ -68,6 +69,13 @@ def drive_ahead(model: RobotModel, obstacles: Obstacles, to_m: float = 3.4) -> F
     return driven.pose
 
 
+def touched(model: RobotModel, obstacles: Obstacles) -> tuple[Touch, ...]:
+    """What is touched on a drive along y = 1."""
+    hop = stretches(np.array([[0.6, 1.0], [3.4, 1.0]]), 0.0)
+    return drive_route(DriveTask(obstacles=obstacles, model=model, start=(0.6, 1.0, 0.0), legs=((hop,),),
+                                 fidelity="physics", traced=False)).touches
+
+
 def test_an_own_body_drives_the_same_bit_for_bit() -> None:
     first = drive_ahead(OWN, OPEN)
     drive_ahead(BUILT_IN["turtlebot2"], OPEN)  # a client that had another robot in it leaves nothing behind
@@ -93,6 +101,30 @@ def test_it_touches_a_wall_with_its_own_hull_and_not_with_a_circle() -> None:
                      cylinders=np.empty((0, 3)))
     assert OWN.radius_m > 0.28
     assert drive_ahead(OWN, wall)[-1, 0] == pytest.approx(1.95 - 0.25, abs=0.01)
+
+
+@pytest.mark.parametrize(("gap_m", "touches"), [(0.185, False), (0.165, True)])
+def test_its_wheels_touch_a_wall_as_cylinders_and_not_as_the_spheres_they_roll_on(gap_m: float, touches: bool) -> None:
+    # Cylinders reach 0.16 + 0.012 m to the side, spheres 0.16 + 0.06 m.
+    wall = Obstacles(bounds_m=np.array([0.0, 0, 6, 4]), boxes=np.array([[2.0, 1 + gap_m + 0.1, 1.5, 0.1, 0]]),
+                     cylinders=np.empty((0, 3)))
+    assert bool(touched(OWN, wall)) == touches
+
+
+def test_a_round_robot_touches_a_wall_with_its_hull_though_its_wheels_stick_out() -> None:
+    # As spheres they reach 0.08 + 0.033 m to the side.
+    wall = Obstacles(bounds_m=np.array([0.0, 0, 6, 4]), boxes=np.array([[2.0, 1.11 + 0.1, 1.5, 0.1, 0]]),
+                     cylinders=np.empty((0, 3)))
+    assert BUILT_IN["turtlebot3_burger"].radius_m < 0.11
+    assert not touched(BUILT_IN["turtlebot3_burger"], wall)
+
+
+def test_wheels_of_two_robots_touch_as_cylinders_too() -> None:
+    # Side by side, 0.352 m apart: cylinders reach 0.172 m, spheres 0.22 m, where the other's box begins at 0.212 m.
+    with BulletTeam(OPEN, [(OWN, (0.0, 0.0, 0.0), UNDISTURBED), (OWN, (0.0, 0.352, 0.0), UNDISTURBED)]) as team:
+        for _ in range(60):
+            team.step([(0.2, 0.2), (0.2, 0.2)], np.empty((2, 3)))
+        assert not [*team.touches(0), *team.touches(1)]
 
 
 def test_it_touches_with_what_is_higher_than_obstacles_usually_are() -> None:

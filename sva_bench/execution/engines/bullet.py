@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import itertools
 import math
 import os
 import sys
@@ -63,7 +64,7 @@ _UPRIGHT = 0.7  # cosine of the tilt at which a robot has tipped over
 _CASTER_FRICTION = 0.01  # of the hull in PyBullet, with the casters, which slide; obstacles make up for it
 _WHEEL_FRICTION = 1.0  # rubber on a hard floor
 _USUAL_RAD_S = 100.0  # to which PyBullet holds joints, unless told otherwise: small wheels of a fast robot turn faster
-_ROBOT, _STATIC, _FLOOR = 1, 2, 64  # groups of bodies: Bullet's own for moving and fixed ones, and one of ours
+_HULL, _WHEELS = -1, (0, 1)  # links of a robot
 _NEAR_M = 0.05  # gap between hulls, by their radii, from which on contact is looked for
 _Pose = tuple[float, float, float]  # x, y [m], yaw [rad]
 _free: list[int] = []  # clients of this process that no engine uses
@@ -207,11 +208,12 @@ class _Robot:
         if rough:
             pybullet.changeDynamics(self._solids, -1, physicsClientId=client,
                                     lateralFriction=self._disturbance.hull_friction / _CASTER_FRICTION)
-        for link in (0, 1):
+        for link in _WHEELS:
             pybullet.changeDynamics(body, link, lateralFriction=_WHEEL_FRICTION, jointDamping=0.0, **smooth)
             fastest = fastest_wheel_rad_s(model)
             if 2 * fastest > _USUAL_RAD_S:
                 pybullet.changeDynamics(body, link, maxJointVelocity=2 * fastest, physicsClientId=client)
+        _part_wheels(body, self._solids, (_HULL,), client)
         return body
 
 
@@ -265,6 +267,8 @@ class BulletTeam:
         self._stood = [False] * len(robots)
         radii = [model.radius_m for model, _, _ in robots]
         self._pairs = [(i, j, radii[i] + radii[j] + _NEAR_M) for j in range(len(robots)) for i in range(j)]
+        for one, other in itertools.permutations(self._robots, 2):
+            _part_wheels(one.body, other.body, (_HULL, *_WHEELS), self._client.number)
 
     def __enter__(self) -> Self:
         return self
@@ -319,7 +323,6 @@ def _build_world(obstacles: Obstacles, height_m: float, client: int) -> int:
     floor = pybullet.createMultiBody(
         0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client), physicsClientId=client)
     # Casters that hover over the floor are no contacts to solve for: they'd take a sixth of the time.
-    pybullet.setCollisionFilterGroupMask(floor, -1, _STATIC | _FLOOR, -1, physicsClientId=client)
     pybullet.changeDynamics(floor, -1, lateralFriction=1.0, contactProcessingThreshold=CASTER_GAP_M / 2,
                             physicsClientId=client)
     # One compound body for all obstacles: its own tree finds the few that are near. Only a URDF may hold more
@@ -337,12 +340,9 @@ def _load(urdf: str, **options: Any) -> int:
 
 def _load_own(urdf: str, model: RobotModel, pose: _Pose, client: int) -> int:
     with _quiet():
-        body = _load(urdf, basePosition=[pose[0], pose[1], model.wheel_radius_m],
+        return _load(urdf, basePosition=[pose[0], pose[1], model.wheel_radius_m],
                      baseOrientation=_upright(pose[2]), physicsClientId=client,
                      flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER)
-    for link in (0, 1):  # they roll on the floor as spheres; what they touch obstacles with is among the hull's solids
-        pybullet.setCollisionFilterGroupMask(body, link, _ROBOT, _FLOOR, physicsClientId=client)
-    return body
 
 
 def _create_round(parts: RoundBody, pose: _Pose, client: int) -> int:
@@ -368,6 +368,13 @@ def _axle_in_base(body: int, client: int) -> tuple[Any, Any]:
     place, turned = pybullet.getDynamicsInfo(body, -1, physicsClientId=client)[3:5]
     axle: tuple[Any, Any] = pybullet.invertTransform(place, turned)
     return axle
+
+
+def _part_wheels(body: int, other: int, links: Sequence[int], client: int) -> None:
+    """Let a robot's wheels not touch a body: as spheres they stick out farther than the hull, of which wheels of a body
+    of its own are a part as the cylinders that they are."""
+    for wheel, link in itertools.product(_WHEELS, links):
+        pybullet.setCollisionFilterPair(body, other, wheel, link, 0, physicsClientId=client)
 
 
 def _upright(yaw: float) -> tuple[float, float, float, float]:
