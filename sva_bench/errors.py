@@ -16,6 +16,7 @@ class ExitCode(IntEnum):
     BAD_INPUT = 2
     INFEASIBLE_PLAN = 3
     UNFINISHED_TRIALS = 4
+    EXPECTATION_NOT_MET = 5
     INTERRUPTED = 130
 
 

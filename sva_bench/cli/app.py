@@ -8,12 +8,14 @@ import typer
 
 from sva_bench import __version__
 from sva_bench.cli.batch import batch_app
+from sva_bench.cli.expect import expect
 from sva_bench.cli.inputs import instance_app, world_app
 from sva_bench.cli.paper import paper_app
 from sva_bench.cli.plans import certify, plan, times
 from sva_bench.cli.replay import replay
 from sva_bench.cli.run import execute, run
 from sva_bench.cli.usage import OneAtATime, PlainCommand
+from sva_bench.cli.verify import verify
 from sva_bench.cli.view import report, view
 
 app = typer.Typer(
@@ -24,11 +26,12 @@ app = typer.Typer(
            "usage, 3 an infeasible plan, 4 some trials could not be finished, 5 an expectation not met, 130 "
            "interrupted (143 by SIGTERM, 129 by SIGHUP); what is done is kept.")
 
-for command in (run, times, plan, certify, execute):
+for command in (run, times, plan, certify, execute, expect):
     app.command(cls=PlainCommand)(command)
 app.command(cls=OneAtATime)(view)
 app.command(cls=OneAtATime)(report)
 app.command(cls=OneAtATime)(replay)
+app.command(cls=OneAtATime)(verify)
 for name, group in (("batch", batch_app), ("world", world_app), ("instance", instance_app), ("reproduce", paper_app)):
     app.add_typer(group, name=name)
 

@@ -67,6 +67,7 @@ def replay(
             for line in one.told():
                 results().print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
     for one in found:
+        assert one.recording is not None
         messages.print(f"recorded in [bold]{escape(str(one.recording))}[/bold]", highlight=False, soft_wrap=True)
         if view:
             open_viewer(one.recording, web=False, screenshot=None, at_s=None)

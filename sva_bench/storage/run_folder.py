@@ -109,8 +109,8 @@ def write_map(folder: Path, files: Iterable[MapFile]) -> None:
         path.write_bytes(file.content)
 
 
-def write_travel_times(path: Path, costs: Mapping[str, FuelCosts]) -> None:
-    """Write ``travel_times.parquet``: a row per directed pair and robot model, or robot where robots meet."""
+def travel_table(costs: Mapping[str, FuelCosts]) -> pa.Table:
+    """Travel times and their repair: a row per directed pair and robot model, or robot where robots meet."""
     rows: dict[str, list[Any]] = {key: [] for key in ("origin", "destination", "model", "raw_s", "repaired_s", "via")}
     for kind, cost in costs.items():
         sites = cost.times.sites
@@ -124,7 +124,12 @@ def write_travel_times(path: Path, costs: Mapping[str, FuelCosts]) -> None:
                 rows["raw_s"].append(int(cost.times.time_ms[i, j]) / 1000)
                 rows["repaired_s"].append(int(cost.repaired_ms[i, j]) / 1000)
                 rows["via"].append(sites[int(cost.via[i, j])])
-    write_table(path, TRAVEL_TIMES, [pa.table(rows, schema=TRAVEL_TIMES)])
+    return pa.table(rows, schema=TRAVEL_TIMES)
+
+
+def write_travel_times(path: Path, costs: Mapping[str, FuelCosts]) -> None:
+    """Write ``travel_times.parquet``."""
+    write_table(path, TRAVEL_TIMES, [travel_table(costs)])
 
 
 MAP = "map"

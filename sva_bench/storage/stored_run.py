@@ -16,6 +16,7 @@ import pyarrow.compute as pc
 from sva_bench.analysis.calibration_table import CALIBRATION_COLUMNS, calibration_rows
 from sva_bench.analysis.catalogue import csv_cells, csv_columns
 from sva_bench.analysis.meetings import INTERACTION_COLUMNS, interaction_rows
+from sva_bench.analysis.over_maps import BATCH, BatchSummary
 from sva_bench.analysis.reaction_table import reaction_columns, reaction_rows
 from sva_bench.analysis.results import SUMMARY, SUMMARY_OF_REACTIONS
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -178,6 +179,25 @@ def _summary_in(folder: Path) -> tuple[Document, AnySummary]:
     return document, validate(document, summary_form(document.data), SUMMARY_OF_REACTIONS if grown else SUMMARY)
 
 
+def read_any_summary(folder: Path) -> dict[str, Any]:
+    """The content of ``summary.json`` of a run or a batch, checked.
+
+    Raises:
+        BadFile: If it is missing, invalid, or of a batch that isn't done.
+        BadInput: If this is no such folder.
+    """
+    if folder.is_dir() and is_batch(folder):
+        path = folder / "summary.json"
+        if not path.exists():
+            raise BadFile(folder, None, "", "the batch is not done, it has no summary yet; go on with it with --resume")
+        document: Document = read_ours(path, BatchSummary, BATCH)[0]
+    else:
+        with _complete(folder):
+            document, _ = _summary_in(run_folder_at(folder))
+    content: dict[str, Any] = document.data
+    return content
+
+
 def read_content(folder: Path) -> Content:
     """The content of the report of a run folder.
 
@@ -257,6 +277,16 @@ def find_row(path: Path, key: Key, trial: int) -> tuple[int, int] | None:
         if found.num_rows:
             return int(found.column("rollout")[0].as_py()), int(found.column("history")[0].as_py())
     return None
+
+
+def rows_of_trial(path: Path, key: Key, trial: int) -> list[dict[str, Any]]:
+    """The rows of one trial of outcomes, robot by robot.
+
+    Raises:
+        BadFile: If they can't be read.
+    """
+    return [row for piece in _rows_of(path, key)
+            for row in piece.filter(pc.equal(piece.column("trial"), trial)).cast(OUTCOMES).to_pylist()]
 
 
 def last_trial(path: Path, key: Key) -> int:

@@ -57,13 +57,13 @@ class Replayed:
     Attributes:
         case: Plan, scenario, policy and news.
         rows: Its rows as in ``outcomes.parquet``.
-        recording: Where it was recorded.
+        recording: Where it was recorded; ``None``: nowhere.
         reactions: News that was heard, in order, and how orders changed.
     """
 
     case: Case
     rows: Sequence[Mapping[str, Any]]
-    recording: Path
+    recording: Path | None
     reactions: Sequence[Reaction] = ()
 
     def reactions_as_dicts(self) -> list[dict[str, Any]]:
@@ -117,22 +117,31 @@ def replay(folder: Path, wanted: Wanted, executor: Executor | None, progress: On
         BadFile: If a file of the folder is damaged.
     """
     content = read_content(run_folder_at(folder))
-    cases = _cases(folder, content, wanted)
+    cases = cases_of(folder, content, wanted)
     costs = plan_costs(content.world, content.manifest.options["planner"], progress)
     foreign = isinstance(content.summary, ComparisonSummary)
     found = []
     for case, history in cases:
         path = folder / "recordings" / f"{recording_stem(case.key, wanted.trial, foreign=foreign)}.rrd"
         path.parent.mkdir(exist_ok=True)
-        found.append(_again(content, costs, case, wanted.trial, history, path, executor))
+        found.append(play_again(content, costs, case, wanted.trial, history, path, executor))
     return found
 
 
-def _again(
+def play_again(
     content: Content, costs: Mapping[str, FuelCosts], case: Case, trial: int, history: tuple[int, int] | None,
-    path: Path, executor: Executor | None,
+    path: Path | None, executor: Executor | None,
 ) -> Replayed:
-    """Play one case again."""
+    """Play one trial of one case again.
+
+    Args:
+        content, costs: The run, and the fuel costs of its world.
+        case: Plan, scenario, policy and news.
+        trial: Number of the trial, or of the history.
+        history: Noise draw and history, where these are enumerated.
+        path: Where it is recorded; ``None``: nowhere.
+        executor: Processes that drive.
+    """
     world, summary = content.world, content.summary
     settings = Settings(seed=summary.seed, trials=summary.trials, rollouts=summary.rollouts, fidelity=summary.fidelity)
     run: Executed | Reacted
@@ -140,19 +149,21 @@ def _again(
     if case.policy == "none":
         settings = replace(settings, first=trial, trials=1)
         (run,) = execute(world, costs, [case], settings, executor)
-        record(path, world, run.traces, title=f"{world.name}, {case.title}, trial {trial}")
+        if path is not None:
+            record(path, world, run.traces, title=f"{world.name}, {case.title}, trial {trial}")
     else:
         instance = replace(instance_of(world, costs, case.scenario), failure=world.execute_failure)
         policy = POLICIES[case.policy](Means(instance=instance, plans_rest=plan_rest))
         run = react_again(world, costs, case, policy, settings, trial, history, executor)
         assert run.shown is not None, "a mission that is played again is shown"
-        record_team(path, world, case, run.shown)
+        if path is not None:
+            record_team(path, world, case, run.shown)
         reactions = run.played[0].reactions
     table = outcome_table(run, [robot.name for robot in world.robots], settings)
     return Replayed(case=case, rows=table.to_pylist(), recording=path, reactions=reactions)
 
 
-def _cases(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case, tuple[int, int] | None]]:
+def cases_of(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case, tuple[int, int] | None]]:
     """The plans that are to be played again, with noise draw and history where these are enumerated.
 
     Raises:

@@ -221,6 +221,7 @@ def test_every_trial_and_history_replayed_gives_its_rows_to_the_bit(folder: Path
             (found,) = replay(folder, Wanted(scenario=scenario, trial=trial, planner=planner, policy=policy,
                                              news=None if policy == "none" else news), None, lambda *_: None)
             assert list(found.rows) == [row for row in mine if (row["planner"], row["trial"]) == (planner, trial)]
+            assert found.recording
             assert found.recording.is_file()
     assert read_content(folder).lacking == ()  # recordings beside those of the run are no harm
 
@@ -330,5 +331,6 @@ def test_a_robot_that_is_sent_out_from_the_base_and_fails_at_once_is_recorded(tm
     for row in sent:
         wanted = Wanted(scenario=None, trial=row["trial"], planner=row["planner"], policy="resolve")
         (found,) = replay(finished.folder, wanted, None, lambda *_: None)
+        assert found.recording
         assert found.recording.is_file()
     assert read_content(finished.folder).lacking == ()

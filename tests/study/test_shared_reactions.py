@@ -110,6 +110,7 @@ def test_every_trial_replayed_gives_its_rows_to_the_bit(ours: sb.Result[Summary]
                 assert list(found.rows) == [row for row in rows if (
                     row["planner"], row["policy"], row["news"], row["trial"]) == (
                         found.case.planner, "resolve", news, trial)]
+                assert found.recording
                 assert found.recording.is_file()
                 assert found.told()
 
