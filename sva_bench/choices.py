@@ -51,6 +51,15 @@ Cuts = Literal["single", "multi", "pareto"]
 Status = Literal["optimal", "feasible", "time_limit", "interrupted"]
 """Of a plan, best first."""
 
+# Exports
+ExportFormat = Literal["nav2", "geojson", "csv"]
+EXPORT_FORMATS: Mapping[ExportFormat, str] = {
+    "nav2": "waypoints (YAML) as RViz's Nav2 panel loads them",
+    "geojson": "sites and planned paths, in metres in the map's frame",
+    "csv": "columns robot, stop, site",
+}
+"""What plans are written as for other programs, in a few words each."""
+
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]
 EngineName = Literal["ideal", "bullet"]

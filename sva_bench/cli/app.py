@@ -9,6 +9,7 @@ import typer
 from sva_bench import __version__
 from sva_bench.cli.batch import batch_app
 from sva_bench.cli.expect import expect
+from sva_bench.cli.export import export
 from sva_bench.cli.inputs import instance_app, world_app
 from sva_bench.cli.paper import paper_app
 from sva_bench.cli.plans import certify, plan, times
@@ -26,7 +27,7 @@ app = typer.Typer(
            "usage, 3 an infeasible plan, 4 some trials could not be finished, 5 an expectation not met, 130 "
            "interrupted (143 by SIGTERM, 129 by SIGHUP); what is done is kept.")
 
-for command in (run, times, plan, certify, execute, expect):
+for command in (run, times, plan, certify, execute, expect, export):
     app.command(cls=PlainCommand)(command)
 app.command(cls=OneAtATime)(view)
 app.command(cls=OneAtATime)(report)

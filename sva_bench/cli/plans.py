@@ -67,8 +67,8 @@ def times(
 def plan(
     source: Annotated[Path, typer.Argument(metavar="WORLD-or-INSTANCE", help="World (YAML) or instance (JSON).",
                                            show_default=False)],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Plan file to write; default: standard output.",
-                                                show_default=False)] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Plan file to write, JSON or CSV; default: "
+                                                "standard output.", show_default=False)] = None,
     objective: Annotated[Objective, typer.Option(help="Plan for failures, or take every robot as "
                                                             "available.")] = "stochastic",
     method: Annotated[Method, typer.Option(help="Solution method. " + "; ".join(
@@ -93,9 +93,8 @@ def plan(
     """Make one plan, proved optimal unless a limit stops it."""
     with loading():
         from sva_bench.files.documents import YAML_SUFFIXES
-        from sva_bench.files.pretty import pretty_json
         from sva_bench.mission.instance_file import read_instance
-        from sva_bench.mission.plan_file import plan_as_dict
+        from sva_bench.mission.plan_file import plan_text
 
     set_up_logging(verbose)
     check_output(output, source)
@@ -117,7 +116,7 @@ def plan(
         progress("solving", 0, 1)
         with deferring_ctrl_c():  # the solver hears it; from there on the plan is written
             made = make_plan(instance, request, SolveLimits(time_limit_s=time_limit, gap=gap))
-            write_result(output, pretty_json(plan_as_dict(made)))
+            write_result(output, plan_text(made, output))
         progress("solving", 1, 1)
     assert made.value is not None
     assert made.bound is not None
@@ -133,7 +132,7 @@ def plan(
 
 def certify(
     instance: Annotated[Path, typer.Argument(metavar="INSTANCE", help="Instance file (JSON).", show_default=False)],
-    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="Plan file (JSON).", show_default=False)],
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="Plan file (JSON or CSV).", show_default=False)],
     as_json: AsJson = False,
 ) -> None:
     """Check a plan independently: is it feasible, and what is it worth?

@@ -121,8 +121,8 @@ def run(
 
 def execute(
     world: WorldArgument,
-    plans: Annotated[list[Path], typer.Argument(metavar="PLAN...", help="Plan files (JSON), by hand or from anywhere.",
-                                                show_default=False)],
+    plans: Annotated[list[Path], typer.Argument(metavar="PLAN...", help="Plan files (JSON or CSV), by hand or from "
+                                                "anywhere.", show_default=False)],
     allow_infeasible: Annotated[bool, typer.Option("--allow-infeasible", help="Drive plans that break fuel capacity "
                                                    "or mission limit too: seeing them fail is the point. What no robot "
                                                    "could drive is refused all the same: unknown sites, legs without a "

@@ -1,4 +1,4 @@
-"""Plans as JSON files, from this solver or any other."""
+"""Plans as JSON or CSV files, from this solver or any other."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from sva_bench.files.printable import all_text
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.instance_file import MOST_VEHICLES
 from sva_bench.mission.plan import Plan, Route
+from sva_bench.mission.plan_csv import CSV_SUFFIX, read_rows, routes_as_csv
 
 KIND = "sva-bench/plan@1"
 MOST_BYTES = 20_000_000
@@ -41,7 +42,7 @@ class _PlanFile(Section):
 
 
 def read_plan(path: Path, instance: Instance) -> Plan:
-    """Read a plan file for an instance.
+    """Read a plan file for an instance: JSON, or CSV where its name ends in ``.csv``.
 
     Raises:
         BadFile: If it is no valid plan, or names a vehicle or site that the instance doesn't have.
@@ -68,6 +69,8 @@ def read_routes(path: Path, robots: Sequence[str], sites: Sequence[str]) -> dict
 
 def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFile:
     """A plan file, with names and size checked."""
+    if path.suffix.lower() == CSV_SUFFIX:
+        return _read_csv(path, vehicles, sites)
     document = read_json(path, MOST_BYTES)
     routes = document.data.get("routes") if isinstance(document.data, dict) else None
     if isinstance(routes, dict) and len(routes) > MOST_VEHICLES:
@@ -89,6 +92,24 @@ def _read(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFil
     return file
 
 
+def _read_csv(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _PlanFile:
+    """A table of routes, with names and size checked."""
+    known, robots = set(sites), set(vehicles)
+    rows = read_rows(path, MOST_BYTES)
+    for robot, stops in rows.items():
+        if robot not in robots:
+            raise BadFile(path, stops[0].line, "robot", f"there is no vehicle {robot[:64]!r}; "
+                          f"{nearest(robot, list(vehicles))}")
+        if len(stops) > MOST_STOPS:
+            raise BadFile(path, stops[0].line, "robot", f"{robot} has {len(stops)} stops; at most {MOST_STOPS} are "
+                          "driven")
+        for row in stops:
+            if row.site not in known:
+                raise BadFile(path, row.line, "site", f"there is no site {row.site[:64]!r}; "
+                              f"{nearest(row.site, list(sites))}")
+    return _PlanFile(format=KIND, routes={robot: [row.site for row in stops] for robot, stops in rows.items()})
+
+
 def plan_as_dict(plan: Plan) -> dict[str, Any]:
     """The plan as the content of its file, without what is ``None``."""
     data: dict[str, Any] = {"format": KIND}
@@ -105,6 +126,13 @@ def plan_as_dict(plan: Plan) -> dict[str, Any]:
         data["seed"] = plan.seed
     data["details"] = dict(plan.details)
     return data
+
+
+def plan_text(plan: Plan, path: Path | None) -> str:
+    """The plan as the content of its file: routes alone where its name ends in ``.csv``, else all of it as JSON."""
+    if path is not None and path.suffix.lower() == CSV_SUFFIX:
+        return routes_as_csv(plan.routes)
+    return pretty_json(plan_as_dict(plan))
 
 
 def write_plan(path: Path, plan: Plan) -> None:
