@@ -8,6 +8,7 @@ import typer
 
 from sva_bench import __version__
 from sva_bench.cli.batch import batch_app
+from sva_bench.cli.doctor import doctor
 from sva_bench.cli.expect import expect
 from sva_bench.cli.export import export
 from sva_bench.cli.inputs import instance_app, world_app
@@ -33,6 +34,7 @@ app.command(cls=OneAtATime)(view)
 app.command(cls=OneAtATime)(report)
 app.command(cls=OneAtATime)(replay)
 app.command(cls=OneAtATime)(verify)
+app.command(cls=PlainCommand)(doctor)
 for name, group in (("batch", batch_app), ("world", world_app), ("instance", instance_app), ("reproduce", paper_app)):
     app.add_typer(group, name=name)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sva_bench.errors import BadFile
 from sva_bench.files.atomic import reason_of
+from sva_bench.files.printable import counted
 
 COLUMNS = ("robot", "stop", "site")
 CSV_SUFFIX = ".csv"
@@ -41,7 +42,7 @@ def read_rows(path: Path, most_bytes: int) -> dict[str, list[Row]]:
         if not cells:
             continue
         if len(cells) != len(COLUMNS):
-            raise BadFile(path, line, "", f"expected {len(COLUMNS)} columns, found {len(cells)}")
+            raise BadFile(path, line, "", f"expected robot, stop and site, found {counted(len(cells), 'column')}")
         cell = dict(zip(header, (text.strip() for text in cells), strict=True))
         number = cell["stop"]
         if not (number.isascii() and number.isdecimal() and len(number) < 10):
@@ -62,7 +63,7 @@ def _rows(path: Path, most_bytes: int) -> Iterator[tuple[int, list[str]]]:
     except OSError as error:
         raise BadFile(path, None, "", f"cannot be read ({reason_of(error)})") from None
     if len(data) > most_bytes:
-        raise BadFile(path, None, "", f"larger than {most_bytes} bytes; no plan is")
+        raise BadFile(path, None, "", f"larger than {counted(most_bytes, 'byte')}; no plan is")
     try:
         text = data.decode("utf-8-sig")  # spreadsheets write a mark in front
     except UnicodeDecodeError:

@@ -14,7 +14,7 @@ from sva_bench.files.complaints import dotted
 from sva_bench.files.documents import read_json, validate
 from sva_bench.files.fields import Name, NonNegativeInt, Number, Section
 from sva_bench.files.pretty import pretty_json
-from sva_bench.files.printable import all_text
+from sva_bench.files.printable import all_text, counted
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.instance_file import MOST_VEHICLES
 from sva_bench.mission.plan import Plan, Route
@@ -101,8 +101,8 @@ def _read_csv(path: Path, vehicles: Sequence[str], sites: Sequence[str]) -> _Pla
             raise BadFile(path, stops[0].line, "robot", f"there is no vehicle {robot[:64]!r}; "
                           f"{nearest(robot, list(vehicles))}")
         if len(stops) > MOST_STOPS:
-            raise BadFile(path, stops[0].line, "robot", f"{robot} has {len(stops)} stops; at most {MOST_STOPS} are "
-                          "driven")
+            raise BadFile(path, stops[0].line, "robot", f"{robot} has {counted(len(stops), 'stop')}; at most "
+                          f"{MOST_STOPS} are driven")
         for row in stops:
             if row.site not in known:
                 raise BadFile(path, row.line, "site", f"there is no site {row.site[:64]!r}; "

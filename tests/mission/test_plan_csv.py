@@ -53,7 +53,7 @@ def test_a_robot_with_the_base_alone_stays_home(tmp_path: Path, tiny: Instance) 
     ("", "1: expected the columns robot, stop, site, found nothing"),
     ("robot,site\n", "1: expected the columns robot, stop, site, found robot, site"),
     ('{"format": "sva-bench/plan@1"}', "expected the columns"),
-    ("robot,stop,site\nuv1,0,base\nuv1,1\n", "3: expected 3 columns, found 2"),
+    ("robot,stop,site\nuv1,0,base\nuv1,1\n", "3: expected robot, stop and site, found 2 columns"),
     ("robot,stop,site\nuv1,first,base\n", "2: stop: expected the number of a stop, such as 0, found 'first'"),
     ("robot,stop,site\nuv1,-1,base\n", "2: stop: expected the number of a stop"),
     ("robot,stop,site\nuv1,1,base\nuv1,1,p1\n", "3: stop: uv1 has stop 1 already, in line 2"),
