@@ -70,4 +70,4 @@ def replay(
         assert one.recording is not None
         messages.print(f"recorded in [bold]{escape(str(one.recording))}[/bold]", highlight=False, soft_wrap=True)
         if view:
-            open_viewer(one.recording, web=False, screenshot=None, at_s=None)
+            open_viewer((one.recording,), web=False, screenshot=None, at_s=None)

@@ -11,6 +11,7 @@ from rich.markup import escape
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import AsCsv, Verbose
 from sva_bench.cli.terminal import messages, set_up_logging
+from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output
 
 
@@ -22,17 +23,29 @@ def view(
                                                     show_default=False)] = None,
     at: Annotated[float | None, typer.Option(metavar="S", min=0, help="Mission time of the picture.",
                                              show_default="the end")] = None,
+    scenario: Annotated[str | None, typer.Option(help="Of a run: only recordings of this scenario.",
+                                                 show_default="all")] = None,
+    planner: Annotated[str | None, typer.Option(help="Of a run: only recordings of this planner's plan.",
+                                                show_default="all")] = None,
 ) -> None:
     """Open recordings in the Rerun viewer."""
     with loading():
+        from sva_bench.recording.viewer import recordings_of
         from sva_bench.recording.viewer import view as open_viewer
+        from sva_bench.storage.recordings import recordings_for
         from sva_bench.storage.stored_run import missing, run_folder_at
 
     if recording.is_dir() and next((recording / "recordings").glob("*.rrd"), None) is None:
         raise missing(run_folder_at(recording), recording / "recordings" / "*.rrd")  # or what it is, if it is none
     if screenshot is not None:
         check_output(screenshot, way_out="choose another place with --screenshot")
-    open_viewer(recording, web=web, screenshot=screenshot, at_s=at)
+    if scenario is None and planner is None:
+        files = recordings_of(recording)
+    elif recording.is_file():
+        raise BadInput(f"{recording} is one recording: --scenario and --planner choose among those of a run folder")
+    else:
+        files = recordings_for(run_folder_at(recording), scenario, planner)
+    open_viewer(files, web=web, screenshot=screenshot, at_s=at)
 
 
 def report(

@@ -54,19 +54,19 @@ class ViewerFailed(SvaBenchError):
         return f"the Rerun viewer failed: {self.said}"
 
 
-def view(path: Path, *, web: bool, screenshot: Path | None, at_s: float | None) -> None:
-    """Show a recording, or all recordings of a run, until the viewer is closed or interrupted.
+def view(files: Sequence[Path], *, web: bool, screenshot: Path | None, at_s: float | None) -> None:
+    """Show recordings until the viewer is closed or interrupted.
 
     Nothing but this machine can reach the viewer, and it is gone when this returns.
 
     Args:
-        path: An ``.rrd`` file or a run folder.
+        files: ``.rrd`` files, as ``recordings_of`` gives them.
         web: In a browser rather than in a window.
-        screenshot: Draw a picture into this file instead; of a run, its first stochastic recording.
+        screenshot: Draw a picture of the first into this file instead.
         at_s: Moment of the picture [s]; ``None`` = the end of the mission.
 
     Raises:
-        BadInput: If ``path`` is neither, or the options contradict each other.
+        BadInput: If the options contradict each other.
         BadFile: If a recording is damaged.
         NoVulkanDriver: If a picture is wanted and there is nothing to draw it with.
         ViewerFailed: If the viewer ended by itself with an error.
@@ -75,7 +75,6 @@ def view(path: Path, *, web: bool, screenshot: Path | None, at_s: float | None) 
         raise BadInput("--web and --screenshot exclude each other: leave one out")
     if at_s is not None and screenshot is None:
         raise BadInput("a moment is for a picture: add --screenshot OUT.png, or leave it out")
-    files = recordings_of(path)
     if screenshot is not None:
         _picture(files[0], screenshot, at_s)
         return

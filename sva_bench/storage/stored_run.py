@@ -179,6 +179,17 @@ def _summary_in(folder: Path) -> tuple[Document, AnySummary]:
     return document, validate(document, summary_form(document.data), SUMMARY_OF_REACTIONS if grown else SUMMARY)
 
 
+def read_summary(folder: Path) -> AnySummary:
+    """The summary of a run.
+
+    Raises:
+        BadFile: If it is missing or invalid.
+        BadInput: If this is no run folder.
+    """
+    with _complete(folder):
+        return _summary_in(run_folder_at(folder))[1]
+
+
 def read_any_summary(folder: Path) -> dict[str, Any]:
     """The content of ``summary.json`` of a run or a batch, checked.
 

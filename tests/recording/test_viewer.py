@@ -40,27 +40,27 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
     for name, words in (("", "holds no"), ("gone.rrd", "there is no"), ("notes.txt", "is no recording")):
         with pytest.raises(BadInput, match=words):
-            view(tmp_path / name, web=False, screenshot=None, at_s=None)
+            view(recordings_of(tmp_path / name), web=False, screenshot=None, at_s=None)
 
 
 def test_contradicting_options_are_refused(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(BadInput, match="exclude each other"):
-        view(recording, web=True, screenshot=Path("x.png"), at_s=None)
+        view((recording,), web=True, screenshot=Path("x.png"), at_s=None)
     with pytest.raises(BadInput, match="is for a picture"):
-        view(recording, web=False, screenshot=None, at_s=3.0)
+        view((recording,), web=False, screenshot=None, at_s=3.0)
     with pytest.raises(BadInput, match=r"end in \.png"):
-        view(recording, web=False, screenshot=Path("x.jpg"), at_s=None)
+        view((recording,), web=False, screenshot=Path("x.jpg"), at_s=None)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(BadInput, match="no screen"):
-        view(recording, web=False, screenshot=None, at_s=None)
+        view((recording,), web=False, screenshot=None, at_s=None)
 
 
 def test_a_truncated_recording_is_named(recording: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.rrd"
     cut.write_bytes(recording.read_bytes()[:-2000])
     with pytest.raises(BadFile, match=r"cut\.rrd: the recording is cut off"):
-        view(cut, web=True, screenshot=None, at_s=None)
+        view((cut,), web=True, screenshot=None, at_s=None)
 
 
 def test_the_error_of_a_missing_driver_names_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,7 +114,7 @@ def test_a_picture_is_drawn_without_a_screen_and_no_viewer_is_left(
 ) -> None:
     monkeypatch.setattr(viewer, "_PICTURE_SIZE", "1200x701")
     picture = tmp_path / "picture.png"
-    view(recording, web=False, screenshot=picture, at_s=None)
+    view((recording,), web=False, screenshot=picture, at_s=None)
     content = picture.read_bytes()
     assert content[:8] == b"\x89PNG\r\n\x1a\n"
     assert struct.unpack(">II", content[16:24]) == (1200, 701)
@@ -128,7 +128,7 @@ def test_a_viewer_that_cannot_draw_is_a_missing_driver_and_leaves_no_picture(
     monkeypatch.setenv("VK_ICD_FILENAMES", str(tmp_path / "broken.json"))
     monkeypatch.setattr(viewer, "_PICTURE_SIZE", "1200x702")
     with pytest.raises(NoVulkanDriver):
-        view(recording, web=False, screenshot=tmp_path / "picture.png", at_s=None)
+        view((recording,), web=False, screenshot=tmp_path / "picture.png", at_s=None)
     assert not (tmp_path / "picture.png").exists()
     assert not processes("1200x702")
 
@@ -137,7 +137,7 @@ def test_a_viewer_that_cannot_draw_is_a_missing_driver_and_leaves_no_picture(
 def served(recording: Path) -> Iterator[subprocess.Popen[str]]:
     """A program that shows a recording in a browser, once it has said where."""
     program = ("import sys; from pathlib import Path; from sva_bench.recording.viewer import view;"
-               "view(Path(sys.argv[1]), web=True, screenshot=None, at_s=None)")
+               "view((Path(sys.argv[1]),), web=True, screenshot=None, at_s=None)")
     quiet = {**os.environ, "BROWSER": "true"}  # "opens" the page without a browser
     process = subprocess.Popen([sys.executable, "-c", program, str(recording)], env=quiet, stdout=subprocess.PIPE,
                                stderr=subprocess.STDOUT, text=True)

@@ -1,0 +1,66 @@
+"""Recordings of a run, by scenario and planner; names that could be taken for one another among them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sva_bench.errors import BadInput
+from sva_bench.storage.recordings import recordings_for
+from tests.worlds_for_tests import SMALL
+
+WORLD = SMALL.replace("half: {uv2: 0.5}", "S: {uv2: 0.5}").replace("safe: {uv2: 1.0}", "S-stochastic: {uv2: 1.0}")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "small.yaml").write_text(WORLD, encoding="utf-8")
+    done = subprocess.run([sys.executable, "-m", "sva_bench", "run", "small.yaml", "--trials", "10", "--rollouts", "1",
+                           "--fidelity", "kinematic", "--workers", "1"], cwd=folder, capture_output=True, text=True,
+                          check=False)
+    assert done.returncode == 0, done.stderr
+    (found,) = (folder / "runs").iterdir()
+    (found / "recordings" / "S-stochastic+trial7.rrd").write_bytes(b"")  # as replay names what it records
+    return found
+
+
+@pytest.mark.parametrize(("scenario", "planner", "stems"), [
+    ("S", None, {"S-stochastic", "S-deterministic", "S-stochastic+trial7"}),
+    ("S", "stochastic", {"S-stochastic", "S-stochastic+trial7"}),
+    ("S-stochastic", None, {"S-stochastic-stochastic", "S-stochastic-deterministic"}),
+    (None, "deterministic", {"S-deterministic", "S-stochastic-deterministic"}),
+])
+def test_recordings_are_found_by_scenario_and_planner(run: Path, scenario: str | None, planner: str | None,
+                                                      stems: set[str]) -> None:
+    assert {path.stem for path in recordings_for(run, scenario, planner)} == stems
+
+
+@pytest.mark.parametrize(("scenario", "planner", "said"), [
+    ("T", None, "--scenario 'T': the run has none of that name"),
+    (None, "stochastc", "did you mean 'stochastic'"),
+])
+def test_what_the_run_does_not_have_is_refused(run: Path, scenario: str | None, planner: str | None, said: str) -> None:
+    with pytest.raises(BadInput) as error:
+        recordings_for(run, scenario, planner)
+    assert said in str(error.value)
+
+
+def test_a_plan_without_a_recording_says_how_to_get_one(run: Path) -> None:
+    path = run / "recordings" / "S-deterministic.rrd"
+    path.rename(run / "moved")
+    try:
+        with pytest.raises(BadInput, match="replay"):
+            recordings_for(run, "S", "deterministic")
+    finally:
+        (run / "moved").rename(path)
+
+
+def test_one_recording_is_not_chosen_from(run: Path) -> None:
+    done = subprocess.run([sys.executable, "-m", "sva_bench", "view", str(run / "recordings" / "S-deterministic.rrd"),
+                           "--scenario", "S", "--web"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "is one recording" in done.stderr
