@@ -188,5 +188,5 @@ def legs_used(robots: Sequence[str], missions: Iterable[Played], legs: KnownLegs
                         trial=mission.trial, rollout=mission.rollout, robot=robots[robot], leg=leg, origin=origin,
                         destination=destination, planned_s=legs.planned(robot, stops[:leg + 2]).time_s,
                         driven_s=done.time_s, waited_s=done.waited_s, touches=done.touches, waits=done.waits,
-                        held_by=done.held_by))
+                        held_by=done.held_by, cut_short=done.stuck))
     return rows

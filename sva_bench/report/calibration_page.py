@@ -46,11 +46,12 @@ def _executed_otherwise(summary: Summary, scenario: ScenarioSummary, found: Cali
         return ""
     one, reasons = 1 / summary.rollouts, []
     if one > found.share:
-        reasons.append(f"one bad draw of {summary.rollouts} is {per_cent(100 * one)} already")
+        reasons.append(f"this run has {counted(summary.rollouts, 'noise draw')}, of which a single bad one is "
+                       f"{per_cent(100 * one)} of missions")
     if summary.fidelity != "kinematic":
-        reasons.append("physics does what the twin doesn't see")
+        reasons.append("physics may do what the twin doesn't see")
     return (f" Executed, {per_cent(100 * bad.share)} of missions go wrong, more than the {share_pct(found)} asked for: "
-            f"{' or '.join(reasons) or 'the draws of this run are others'}.")
+            f"{'; and '.join(reasons) or 'this run has other noise draws than those that prove the share'}.")
 
 
 def _told(found: Calibration) -> str:
