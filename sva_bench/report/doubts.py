@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.results import PlanResult
@@ -15,7 +15,7 @@ from sva_bench.report.wording import listed, per_cent, with_interval
 CONTRADICTED = "The execution contradicts the model."
 """What a contradiction is announced by."""
 _TOLERANCE = 1e-6  # relative: of sums in another order
-_MOST_NAMED = 6
+_MOST_NAMED, _MOST_PLANS = 6, 8
 
 
 def contradictions(summary: AnySummary) -> list[str]:
@@ -41,14 +41,17 @@ def _contradiction(scenario: ScenarioSummary) -> str | None:
         return None
     how = "and not" if excluded else "of the other sign than"
     return (f"{scenario.name}: executed, planning for failures is worth {with_interval(found)}, {how} the "
-            f"{vss.modelled:.1f} of the model: {_why(lost)}.")
+            f"{vss.modelled:.1f} of the model: {_why(lost, scenario.plans)}.")
 
 
-def _why(lost: dict[str, tuple[float, str]]) -> str:
+def _why(lost: Mapping[str, tuple[float, str]], plans: Mapping[str, PlanResult]) -> str:
     """What cost most, and where to look: by end. What each source of noise cost stands beside the ledger."""
     name, (amount, end) = max(lost.items(), key=lambda item: item[1][0])
-    return (f"what cost most is that robots of the {name} plan ended {end.replace('_', ' ')} ({amount:.1f}); see "
-            '"From promise to execution"')
+    met = plans[name].interaction
+    collided = end == "stuck" and met is not None and met.contacts > 0
+    return (f"what cost most is that robots of the {name} plan {'collided and ' if collided else ''}ended "
+            f"{end.replace('_', ' ')} ({amount:.1f}); see "
+            '"From promise to execution"' + (' and "Robots in one world"' if collided else ""))
 
 
 def _lost(plan: PlanResult) -> tuple[float, str]:
@@ -83,8 +86,8 @@ _DIGITS = 6  # of values that are summed in another order
 
 
 def _some(words: Sequence[str]) -> str:
-    left = len(words) - _MOST_NAMED
-    return listed(words if left <= 0 else [*words[:_MOST_NAMED], f"{left} more"])
+    left = len(words) - _MOST_PLANS
+    return listed(words if left <= 0 else [*words[:_MOST_PLANS], f"{left} more"])
 
 
 def upset_by_noise(summary: AnySummary) -> list[str]:
