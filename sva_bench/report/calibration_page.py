@@ -71,9 +71,9 @@ def _told(found: Calibration) -> str:
         promised = f"it promises {found.promised:.1f} in place of {found.nominal.promised:.1f}{share}"
     goal = "for the greatest executed value" if found.share is None else f"for at most {share_pct(found)}"
     if found.is_nominal:
-        return f"calibrated {goal}: the nominal plan is it already; {wrong}."
-    return (f"calibrated {goal}: made for {_costs(found)}, {promised}; {wrong}, of the nominal plan's "
-            f"{bad_pct(found.nominal.bad)}. By the twin it is worth {found.executed:.1f}, the nominal one "
+        return f"calibrated {goal}: that is the nominal plan; {wrong}."
+    return (f"calibrated {goal}: made for {_costs(found)}, {promised}; {wrong}; with the nominal "
+            f"plan {bad_pct(found.nominal.bad)} do. By the twin it is worth {found.executed:.1f}, the nominal one "
             f"{found.nominal.executed:.1f}.")
 
 
