@@ -15,7 +15,7 @@ MapMode = Literal["trinary", "scale", "raw"]
 Interaction = Literal["independent", "uncoordinated", "shared"]
 INTERACTIONS: Mapping[Interaction, str] = {
     "independent": "robots do not meet: each drives as if it were alone",
-    "uncoordinated": "they drive in one world, and nobody coordinates them",
+    "uncoordinated": "they drive in one world, nobody coordinates them, and a collision of two ends both",
     "shared": "they drive in one world, coordinated: they wait for each other and never touch",
 }
 """What robots are to each other, in a few words each."""
@@ -92,8 +92,8 @@ DriveUnit = Literal["hops", "routes", "missions"]
 """What is driven at a time: from site to site, from base to base, or all robots of a world together."""
 Fault = Literal["tipped over", "physics failed"]
 """Why a robot drives no more though nothing holds it: it lies on its side, or physics gives no finite pose of it."""
-MarkKind = Literal["contact", "wait"]
-"""What a picture marks of what robots met."""
+MarkKind = Literal["contact", "collision", "wait"]
+"""What a picture marks of what robots met: contacts with obstacles, collisions of two robots, and waits."""
 StandKind = Literal["berth", "slot"]
 """A place for one robot, at the base or at a station."""
 Judgement = Literal["safe", "close", "edge"]

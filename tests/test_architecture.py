@@ -30,7 +30,8 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet_utils": ("execution/engines/bullet.py",), "ompl": ("travel/roadmap.py",),
     "highspy": ("solver/highs.py",), "rerun": ("recording/rerun.py",), "networkx": ("solver/flow/cuts.py",),
     "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py",), "distributed": ("workers/dask.py",),
-    "matplotlib": ("report/drawing.py", "paper/gaps_picture.py"),  # pictures of runs, and the paper's own figure
+    # Charts, pictures of worlds and their legend, and the paper's own figure.
+    "matplotlib": ("report/canvas.py", "report/drawing.py", "report/legend.py", "paper/gaps_picture.py"),
 }
 MOST_LINES = 425
 

@@ -16,7 +16,7 @@ from sva_bench.generate import instances, terrain, worlds
 from sva_bench.generate.instances import random_instance
 from sva_bench.mission.failures import PROCESSES
 from sva_bench.recording.colors import SITE_COLORS
-from sva_bench.report import drawing
+from sva_bench.report import styles
 from sva_bench.solver.methods import METHODS
 from sva_bench.solver.two_stage import plan_stochastic
 from sva_bench.travel.roadmap import PAIR_PLANNERS
@@ -36,11 +36,11 @@ REGISTRIES: list[tuple[str, Iterable[Any]]] = [
     ("WorldFamily", worlds._FIRST_WORDS),
     ("InstanceFamily", instances.FUEL_MULTIPLE),
     ("SiteKind", SITE_COLORS),
-    ("SiteKind", drawing._KINDS),
-    ("SiteKind", drawing._MARKERS),
+    ("SiteKind", styles.SITE_KINDS),
+    ("SiteKind", styles.SITE_MARKERS),
     ("End", choices.ENDS),
     ("Interaction", choices.INTERACTIONS),
-    ("StandKind", drawing._STANDS),
+    ("StandKind", styles.STANDS),
     ("PolicyName", POLICIES),
     ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"], "anticipative"]),
 ]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.summaries import ComparisonSummary, Reach
 
-NOTHING = "no robot reaches any POI: give them more fuel or time"
+_NOTHING = "no robot reaches any POI: give them more fuel or time"
 _NAMED = 20  # POIs or maps that a sentence names
 
 
@@ -24,6 +24,11 @@ def reached(missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Se
         robots=tuple(robot for robot in robots if len(missed.get(robot, ())) == len(pois)),
         pois=tuple(poi for poi in pois if all(poi in missed.get(robot, ()) for robot in robots)),
         missed={robot: tuple(missed[robot]) for robot in robots if missed.get(robot)})
+
+
+def why_nothing(reach: Reach) -> str:
+    """Why no robot reaches any POI, where that is so, and what to change."""
+    return _NOTHING if reach.missed else "the world has no POIs: add some under sites.pois"
 
 
 def beyond_reach(reach: Reach) -> list[str]:
@@ -43,7 +48,7 @@ def maps_without_reach(labels: Sequence[str]) -> list[str]:
     names = list(dict.fromkeys(labels))
     if not names:
         return []
-    return [f"On {len(names)} map{'s' * (len(names) > 1)} ({_named(names)}) {NOTHING}, or leave "
+    return [f"On {len(names)} map{'s' * (len(names) > 1)} ({_named(names)}) {_NOTHING}, or leave "
             f"{'it' if len(names) == 1 else 'them'} out."]
 
 

@@ -25,6 +25,7 @@ from sva_bench.files.fields import Name, Number, Section, Seed
 from sva_bench.files.patterns import has_pattern, matching
 from sva_bench.seeds import MOST_SEED
 from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.study.inputs import asked_with
 from sva_bench.study.options import Options, reactions_of
 from sva_bench.study.reacting import misfit, news_of, policies_of
 from sva_bench.workers.progress import OnProgress
@@ -305,7 +306,7 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
     files: dict[str, Path] = {}
     from_file: dict[str, World] = {}
     for path in sweep.worlds:
-        document = read_yaml(path)
+        document = asked_with(read_yaml(path), sweep.interaction)
         for chosen in product(*vary.values()):
             values = dict(zip(vary, chosen, strict=True))
 

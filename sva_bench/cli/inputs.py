@@ -90,7 +90,7 @@ def check_world(
         _check_noise(loaded, world, planner, plan, output, draws or 200, seed or 0, as_json=as_json)
         return
     with loading():
-        from sva_bench.analysis.reach import NOTHING, beyond_reach
+        from sva_bench.analysis.reach import beyond_reach, why_nothing
         from sva_bench.report.stands import interaction_lines, stands_of
         from sva_bench.study.costs import plan_costs, reach_of
 
@@ -112,7 +112,7 @@ def check_world(
     reach = reach_of(loaded, costs)
     for said in beyond_reach(reach):
         console.print(said, highlight=False, markup=False)
-    verdict = f"can be read, but {NOTHING}" if reach.nothing else "is a good world"
+    verdict = f"can be read, but {why_nothing(reach)}" if reach.nothing else "is a good world"
     counts = {"station": len(loaded.stations), "POI": len(loaded.pois), "robot": len(loaded.robots),
               "scenario": len(loaded.scenarios)}
     console.print(f"{loaded.name} {verdict}: "
@@ -277,10 +277,12 @@ def draw(
     world: WorldArgument,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="PICTURE.png|svg", help="Picture to write.",
                                          show_default=False)],
-    roadmap: Annotated[bool, typer.Option("--roadmap", help="Show the roadmap that paths are planned on.")] = False,
-    paths: Annotated[bool, typer.Option("--paths", help="Show the paths between all sites.")] = False,
+    roadmap: Annotated[bool, typer.Option("--roadmap", help="Show the roadmap that paths are planned on, that of the "
+                                                 "widest robot.")] = False,
+    paths: Annotated[bool, typer.Option("--paths", help="Show the paths between all sites, of all robots.")] = False,
     plan: Annotated[Path | None, typer.Option(metavar="PLAN.json", help="Show the routes of a plan.",
                                               show_default="none")] = None,
+    interaction: InteractionOption = None,
     verbose: Verbose = False,
 ) -> None:
     """Draw a world to scale: map, sites, incentives; on request roadmap, paths and a plan's routes."""
@@ -290,7 +292,7 @@ def draw(
 
     set_up_logging(verbose)
     check_output(output, world)
-    loaded = load(world)
+    loaded = load(world, interaction=interaction)
     check_output(output, *(world.parent / file.name for file in loaded.files))  # a map may be a picture of that name
     with loading():
         from sva_bench.study.given_plans import read_plans

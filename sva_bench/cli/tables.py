@@ -18,9 +18,9 @@ from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_page import calibration_lines
-from sva_bench.report.doubts import CONTRADICTED, contradictions, failed_physics, upset_by_noise
+from sva_bench.report.doubts import CONTRADICTED, contradictions, costless_ends, failed_physics, upset_by_noise
 from sva_bench.report.interaction_section import INTERACTION_HEAD, interaction_table, interaction_told
-from sva_bench.report.source_table import SOURCES_HEAD, source_rows
+from sva_bench.report.source_table import SOURCES_HEAD, source_rows, source_title
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     answer,
@@ -39,7 +39,7 @@ _ALWAYS_SHOWN = 3
 
 
 def print_summary(summary: AnySummary, *, wide: bool = False, world: World | None = None) -> None:
-    """Print a summary as a table, and what it comes to; ``wide``: what each source of noise did, too."""
+    """Print a summary as a table, and what it comes to; ``wide``: what noise and robots did to each plan, too."""
     console, travel = results(), summary.travel
     robots = list(summary.scenarios[0].availability)
     shown = _robots_that_fit(summary, console, robots)
@@ -117,23 +117,27 @@ def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
 
 def _print_unhappy(summary: AnySummary, console: Console) -> None:
     """Say how many missions ended otherwise than home or by draw."""
-    missions, unhappy = 0, []
+    missions, unhappy = set[int](), []
     for name in summary.scenarios[0].plans:
         ends: Counter[str] = Counter()
         for scenario in summary.scenarios:
             ends.update(scenario.plans[name].ends)
-        missions += ends.total()
+        missions.add(ends.total())
         bad = [f"{ends[end]} {end.replace('_', ' ')}" for end in ("out_of_fuel", "late", "stuck") if ends[end]]
         if bad:
             unhappy.append(f"{shown_over(summary.scenarios, name)} {', '.join(bad)}")
     if unhappy:
-        console.print(f"Of {missions} robot missions ended otherwise than home or by draw: {'; '.join(unhappy)}.",
-                      highlight=False)
+        many = " or ".join(map(str, sorted(missions)))
+        of_each = " of each plan" if len(summary.scenarios[0].plans) > 1 else ""
+        console.print(f"Of {many} robot missions{of_each} ended otherwise than home or by draw: "
+                      f"{'; '.join(unhappy)}.", highlight=False)
+    for said in costless_ends(summary.scenarios):
+        console.print(said, highlight=False, markup=False)
 
 
 def _print_sources(summary: AnySummary, console: Console) -> None:
     if rows := source_rows(summary.scenarios):
-        table = Table(title="What each source of noise did", title_justify="left")
+        table = Table(title=source_title(rows), title_justify="left")
         for number, heading in enumerate(SOURCES_HEAD):
             table.add_column(heading, justify="left" if number < 3 else "right")
         for row in rows:

@@ -222,5 +222,5 @@ def _leg_times(world: World, costs: Mapping[str, FuelCosts], drives: Mapping[Rou
             rows.append(LegTime(
                 trial=trial, rollout=rollout, robot=robot, leg=leg, origin=origin, destination=destination,
                 planned_s=int(planned_ms) / 1000, driven_s=done.time_s, waited_s=done.waited_s, touches=done.touches,
-                waits=done.waits, held_by=done.held_by))
+                waits=done.waits, held_by=done.held_by, cut_short=done.stuck))
     return rows

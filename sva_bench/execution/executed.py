@@ -22,6 +22,7 @@ class LegTime:
         leg: Its place on the robot's route in that trial.
         touches, waits: What the robot touched on it, and where it waited.
         held_by: What it got stuck by on it, where that is known.
+        cut_short: Whether the robot never reached its end: the times are of what it drove.
     """
 
     trial: int
@@ -36,6 +37,7 @@ class LegTime:
     touches: tuple[Touch, ...] = ()
     waits: tuple[Wait, ...] = ()
     held_by: str = ""
+    cut_short: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -126,10 +126,16 @@ def _departure_s(outcome: Outcome) -> float:
 
 def news_of(world: World, costs: Mapping[str, FuelCosts], mission: TeamOutcome) -> tuple[NewsHeard, ...]:
     """What was heard in a mission, with the paths that orders change."""
-    return tuple(_heard(world, costs, reaction) for reaction in mission.reactions)
+    return tuple(_heard(world, costs, reaction, {
+        robot.name for robot, outcome in zip(world.robots, mission.robots, strict=True)
+        if outcome.end in _NO_MORE and outcome.end_time_s <= reaction.time_s}) for reaction in mission.reactions)
 
 
-def _heard(world: World, costs: Mapping[str, FuelCosts], reaction: Reaction) -> NewsHeard:
+_NO_MORE = frozenset({"failed", "out_of_fuel", "stuck"})
+
+
+def _heard(world: World, costs: Mapping[str, FuelCosts], reaction: Reaction, gone: Container[str]) -> NewsHeard:
+    """What was heard of some failures; those who are ``gone`` by then are told, as nobody knows, and learn nothing."""
     pois, kinds = {site.name for site in world.pois}, {robot.name: world.kind_of(robot) for robot in world.robots}
     rerouted = []
     for robot, new in reaction.after.items():
@@ -138,8 +144,8 @@ def _heard(world: World, costs: Mapping[str, FuelCosts], reaction: Reaction) -> 
             robot=robot, taken=tuple(site for site in new if site in pois and site not in old),
             dropped=tuple(site for site in old if site in pois and site not in new),
             old=path_of(fuel, (since, *old)), new=path_of(fuel, (since, *new))))
-    return NewsHeard(time_s=reaction.time_s, failed=reaction.failed, learned=reaction.learned,
-                     rerouted=tuple(rerouted))
+    return NewsHeard(time_s=reaction.time_s, failed=reaction.failed,
+                     learned=tuple(robot for robot in reaction.learned if robot not in gone), rerouted=tuple(rerouted))
 
 
 def path_of(costs: FuelCosts, stops: Sequence[str]) -> FloatArray:
@@ -188,5 +194,5 @@ def legs_used(robots: Sequence[str], missions: Iterable[Played], legs: KnownLegs
                         trial=mission.trial, rollout=mission.rollout, robot=robots[robot], leg=leg, origin=origin,
                         destination=destination, planned_s=legs.planned(robot, stops[:leg + 2]).time_s,
                         driven_s=done.time_s, waited_s=done.waited_s, touches=done.touches, waits=done.waits,
-                        held_by=done.held_by))
+                        held_by=done.held_by, cut_short=done.stuck))
     return rows

@@ -46,11 +46,12 @@ def _executed_otherwise(summary: Summary, scenario: ScenarioSummary, found: Cali
         return ""
     one, reasons = 1 / summary.rollouts, []
     if one > found.share:
-        reasons.append(f"one bad draw of {summary.rollouts} is {per_cent(100 * one)} already")
+        reasons.append(f"this run has {counted(summary.rollouts, 'noise draw')}, of which a single bad one is "
+                       f"{per_cent(100 * one)} of missions")
     if summary.fidelity != "kinematic":
-        reasons.append("physics does what the twin doesn't see")
+        reasons.append("physics may do what the twin doesn't see")
     return (f" Executed, {per_cent(100 * bad.share)} of missions go wrong, more than the {share_pct(found)} asked for: "
-            f"{' or '.join(reasons) or 'the draws of this run are others'}.")
+            f"{'; and '.join(reasons) or 'this run has other noise draws than those that prove the share'}.")
 
 
 def _told(found: Calibration) -> str:
@@ -70,9 +71,9 @@ def _told(found: Calibration) -> str:
         promised = f"it promises {found.promised:.1f} in place of {found.nominal.promised:.1f}{share}"
     goal = "for the greatest executed value" if found.share is None else f"for at most {share_pct(found)}"
     if found.is_nominal:
-        return f"calibrated {goal}: the nominal plan is it already; {wrong}."
-    return (f"calibrated {goal}: made for {_costs(found)}, {promised}; {wrong}, of the nominal plan's "
-            f"{bad_pct(found.nominal.bad)}. By the twin it is worth {found.executed:.1f}, the nominal one "
+        return f"calibrated {goal}: that is the nominal plan; {wrong}."
+    return (f"calibrated {goal}: made for {_costs(found)}, {promised}; {wrong}; with the nominal "
+            f"plan {bad_pct(found.nominal.bad)} do. By the twin it is worth {found.executed:.1f}, the nominal one "
             f"{found.nominal.executed:.1f}.")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,8 @@ from sva_bench.analysis.plan_names import shown_over
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
-from sva_bench.report.drawing import Axes, chart
+from sva_bench.report.canvas import Axes, chart
+from sva_bench.report.styles import robot_colour
 
 AnyScenario = ScenarioSummary | ComparedScenario
 
@@ -35,7 +36,7 @@ def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence
     least, most = min(0.0, *shown), max(0.0, *shown)  # below 0: a robot's loss cost more than it collected
 
     def draw(axes: Axes) -> None:
-        _bars(axes, [s.name for s in scenarios], heights, {})
+        _bars(axes, [s.name for s in scenarios], heights, {}, robot_colour)
         axes.set_ylabel("mean value [world file's units]")
         axes.set_title(f"Value by robot, {plan} plan")
         if most > least:
@@ -165,19 +166,26 @@ def boxes_of(groups: Mapping[str, Sequence[float]], title: str, unit: str) -> st
 _LABEL = 32  # letters of a label from which on it goes on in the next line
 
 
-def legs_driven(planned_s: FloatArray, driven_s: FloatArray, robots: Sequence[str]) -> str:
-    """Points: how far each leg's driven time is off the planned one."""
+def legs_driven(planned_s: FloatArray, driven_s: FloatArray, robots: Sequence[str], order: Sequence[str]) -> str:
+    """Points: how far each leg's driven time is off the planned one.
+
+    Args:
+        planned_s, driven_s: Of each leg [s].
+        robots: Whose it is.
+        order: The robots of the world.
+    """
     def draw(axes: Axes) -> None:
         names = np.asarray(robots)
-        kept = planned_s > 0
-        for number, robot in enumerate(dict.fromkeys(robots)):
-            mine = kept & (names == robot)
+        for number, robot in enumerate(order):
+            mine = names == robot
+            if not mine.any():
+                continue
             axes.plot(planned_s[mine], 100 * (driven_s[mine] / planned_s[mine] - 1), linestyle="none",
-                      marker=_MARKERS[number % len(_MARKERS)], color=_colour(number), markersize=4,
+                      marker=_MARKERS[number % len(_MARKERS)], color=robot_colour(number), markersize=4,
                       markeredgecolor="black", markeredgewidth=0.3, alpha=0.75, label=robot,
-                      rasterized=int(kept.sum()) > _MANY)
+                      rasterized=len(names) > _MANY)
         axes.axhline(0, color="#444", linewidth=1)
-        axes.set_xlabel("planned time of the leg = fuel [s]")
+        axes.set_xlabel("planned time of the leg [s]")
         axes.set_ylabel("driven against planned [%]")
         axes.set_title("Legs as driven")
         axes.grid(color="#ddd")
@@ -190,10 +198,10 @@ _MANY = 2000  # points from which on an SVG holds them as an image
 
 
 def _bars(axes: Axes, groups: Sequence[str], heights: Mapping[str, Sequence[float]],
-          ends: Mapping[str, Sequence[Sequence[float] | None]]) -> None:
+          ends: Mapping[str, Sequence[Sequence[float] | None]], colour: Callable[[int], str] | None = None) -> None:
     for number, (name, tall) in enumerate(heights.items()):
         at = [k + _offset(number, len(heights)) for k in range(len(groups))]
-        axes.bar(at, tall, width=0.8 / len(heights), facecolor=_colour(number), hatch=_hatch(number),
+        axes.bar(at, tall, width=0.8 / len(heights), facecolor=(colour or _colour)(number), hatch=_hatch(number),
                  edgecolor="black", linewidth=0.6, label=name)
         for x, interval in zip(at, ends.get(name, ()), strict=False):
             if interval is not None:

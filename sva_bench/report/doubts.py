@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.results import PlanResult
-from sva_bench.analysis.scenarios import ScenarioSummary
+from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, Summary
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import per_cent, with_interval
+from sva_bench.report.wording import listed, per_cent, with_interval
 
 CONTRADICTED = "The execution contradicts the model."
 """What a contradiction is announced by."""
 _TOLERANCE = 1e-6  # relative: of sums in another order
-_MOST_NAMED = 6
+_MOST_NAMED, _MOST_PLANS = 6, 8
 
 
 def contradictions(summary: AnySummary) -> list[str]:
@@ -39,14 +41,17 @@ def _contradiction(scenario: ScenarioSummary) -> str | None:
         return None
     how = "and not" if excluded else "of the other sign than"
     return (f"{scenario.name}: executed, planning for failures is worth {with_interval(found)}, {how} the "
-            f"{vss.modelled:.1f} of the model: {_why(lost)}.")
+            f"{vss.modelled:.1f} of the model: {_why(lost, scenario.plans)}.")
 
 
-def _why(lost: dict[str, tuple[float, str]]) -> str:
+def _why(lost: Mapping[str, tuple[float, str]], plans: Mapping[str, PlanResult]) -> str:
     """What cost most, and where to look: by end. What each source of noise cost stands beside the ledger."""
     name, (amount, end) = max(lost.items(), key=lambda item: item[1][0])
-    return (f"what cost most is that robots of the {name} plan ended {end.replace('_', ' ')} ({amount:.1f}); see "
-            '"From promise to execution"')
+    met = plans[name].interaction
+    collided = end == "stuck" and met is not None and met.contacts > 0
+    return (f"what cost most is that robots of the {name} plan {'collided and ' if collided else ''}ended "
+            f"{end.replace('_', ' ')} ({amount:.1f}); see "
+            '"From promise to execution"' + (' and "Robots in one world"' if collided else ""))
 
 
 def _lost(plan: PlanResult) -> tuple[float, str]:
@@ -62,6 +67,27 @@ def failed_physics(summary: AnySummary) -> list[str]:
     return [f"Physics failed in {made.physics_failed} of {counted(made.count, 'drive')}: it gave no finite pose of the "
             "robot. Missions with such a drive count as stuck there, which says nothing about their plan: look at the "
             "masses, sizes and loads of the robots."]
+
+
+def costless_ends(scenarios: Sequence[ScenarioSummary | ComparedScenario]) -> list[str]:
+    """A sentence about ends of robots that cost their plans nothing though nobody wants them; nothing without any."""
+    told: dict[str, list[str]] = {}
+    for scenario in scenarios:
+        for name, plan in scenario.plans.items():
+            for end in EXECUTION_LOSSES:
+                if plan.ends.get(end) and not round(getattr(plan.ledger, end), _DIGITS):
+                    told.setdefault(end.replace("_", " "), []).append(f"{scenario.name} {shown_name(scenario, name)}")
+    return [f"Robots that ended {end} cost these plans nothing: {_some(plans)}. All that they were to collect was "
+            f"collected before, as on the way home{'' if end == 'late' else _LOST}." for end, plans in told.items()]
+
+
+_LOST = ", and losing a robot itself costs nothing without a loss_cost"
+_DIGITS = 6  # of values that are summed in another order
+
+
+def _some(words: Sequence[str]) -> str:
+    left = len(words) - _MOST_PLANS
+    return listed(words if left <= 0 else [*words[:_MOST_PLANS], f"{left} more"])
 
 
 def upset_by_noise(summary: AnySummary) -> list[str]:

@@ -11,8 +11,8 @@ from sva_bench.choices import INTERACTIONS
 from sva_bench.report.page import heading, note, table
 from sva_bench.world.model import World
 
-INTERACTION_HEAD = ("scenario", "plan", "contacts", "waited [s]", "detours", "exact [%]")
-MEANT = ("Means over missions. Contacts: how many times two robots came to touch. Waited: how long robots waited for "
+INTERACTION_HEAD = ("scenario", "plan", "collisions", "waited [s]", "detours", "exact [%]")
+MEANT = ("Means over missions. Collisions: how many times two robots came to touch. Waited: how long robots waited for "
          "others, added up over the team. Detours: legs driven on another path than the shortest, because of other "
          "robots. Exact: share of missions that were played themselves, or provably end as one that was; the others "
          "have their ends from a mission alike.")
@@ -43,10 +43,10 @@ def interaction_told(scenarios: Scenarios) -> str:
     for name in scenarios[0].plans:
         found = [mine for scenario in scenarios if (mine := scenario.plans[name].interaction) is not None]
         if found:
-            waited_s, contacts, detours = (sum(values) / len(found) for values in zip(*(
+            waited_s, collisions, detours = (sum(values) / len(found) for values in zip(*(
                 (each.waited_s, each.contacts, each.detours) for each in found), strict=True))
             told.append(f"{shown_over(scenarios, name)} {waited_s:.1f} s of waiting for others, {detours:.1f} detours, "
-                        f"{contacts:.1f} contacts")
+                        f"{collisions:.1f} collisions")
     over = "a mission" if len(scenarios) == 1 else "a mission, mean over scenarios"
     return f"Robots meet, {over}: {'; '.join(told)}." if told else ""
 

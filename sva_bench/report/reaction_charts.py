@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from sva_bench.analysis.results import Estimate
 from sva_bench.choices import NEWS
+from sva_bench.report.canvas import Axes, chart
 from sva_bench.report.charts import columns_of, legend_of, mark
-from sva_bench.report.drawing import Axes, chart
 from sva_bench.report.reaction_shares import recourse_pct, tell, vss_pct, without_pct
 from sva_bench.report.reaction_wording import AnyReacting, Reacting
 

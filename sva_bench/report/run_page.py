@@ -7,8 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-import numpy as np
-
 from sva_bench.analysis.catalogue import Section, statistics
 from sva_bench.analysis.driving import driving_told
 from sva_bench.analysis.plan_names import ShownNames, shown_name
@@ -16,13 +14,15 @@ from sva_bench.analysis.reach import lost_robots
 from sva_bench.analysis.results import Estimate, Share
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
-from sva_bench.choices import ENDS
+from sva_bench.choices import ENDS, End
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.calibration_page import against_nominal, calibration_section
-from sva_bench.report.doubts import CONTRADICTED, contradictions, failed_physics, upset_by_noise
+from sva_bench.report.doubts import CONTRADICTED, contradictions, costless_ends, failed_physics, upset_by_noise
 from sva_bench.report.interaction_section import interaction_section
+from sva_bench.report.legs_section import legs_section
 from sva_bench.report.meetings_section import meetings_section
+from sva_bench.report.overlays import Overlays
 from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.source_table import source_section
@@ -44,11 +44,8 @@ from sva_bench.report.wording import (
     with_interval,
 )
 from sva_bench.storage.manifest import Manifest
-from sva_bench.storage.run_folder import Legs
 from sva_bench.storage.stored_run import Content
 from sva_bench.world.model import World
-
-_WORST_LEGS = 10
 
 Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
@@ -78,11 +75,11 @@ def write_report(path: Path, content: Content) -> None:
         *source_section(scenarios),
         *reaction_ledgers(summary),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
-        *_ends(scenarios),
+        *_ends(scenarios, content.routes),
         *_measured(scenarios),
         *interaction_section(scenarios, content.world),
         *meetings_section(content),
-        *_legs(content.legs.without_reaction(), names),
+        *legs_section(content, names),
         *_routes(content.routes, names),
         *_recordings(content, names),
         *_again(summary, content.manifest),
@@ -198,13 +195,25 @@ def _assumptions(summary: Summary) -> list[str]:
                  "in the same trials.")]
 
 
-def _ends(scenarios: Scenarios) -> list[str]:
-    rows = [[s.name, shown_name(s, name), robot, *(_in_per_cent(shares[end]) if end in shares else "" for end in ENDS)]
+def _ends(scenarios: Scenarios, routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> list[str]:
+    def ends(scenario: str, planner: str, robot: str, shares: Mapping[End, Share]) -> list[str]:
+        # The perfect-information plans have other routes in each outcome.
+        if planner != "informed" and stays_home(routes[scenario, planner].get(robot, ())):
+            return ["stays home", *[""] * (len(ENDS) - 1)]
+        return [_in_per_cent(shares[end]) if end in shares else "" for end in ENDS]
+
+    rows = [[s.name, shown_name(s, name), robot, *ends(s.name, name, robot, shares)]
             for s in scenarios for name, plan in s.plans.items() for robot, shares in plan.end_shares.items()]
     return [heading("How the robots ended"), table(
         ["scenario", "plan", "robot", *(f"{end.replace('_', ' ')} [%]" for end in ENDS)], rows, words=(0, 1, 2)),
         note("Failed: by draw. Out of fuel, late (home past its limit) and stuck: by what physics made of the plan. "
-             "Where all trials ended alike, the interval says how often another end could still come up.")]
+             "Where all trials ended alike, the interval says how often another end could still come up."),
+        *(note(said) for said in costless_ends(scenarios))]
+
+
+def stays_home(route: Sequence[str]) -> bool:
+    """Whether a robot of this route never leaves the base."""
+    return len(set(route)) <= 1
 
 
 def _in_per_cent(found: Share) -> str:
@@ -212,39 +221,10 @@ def _in_per_cent(found: Share) -> str:
         100 * found.ci95[0], 100 * found.ci95[1])))
 
 
-def _legs(legs: Legs, shown: ShownNames) -> list[str]:
-    with holding_back_ctrl_c():
-        from sva_bench.report import charts
-
-    planned, driven = legs.planned_s, legs.driven_s
-    parts = [heading("Time and fuel, planned against driven")]
-    if not (planned > 0).any():
-        return [*parts, note("No leg was driven.")]
-    names = list(legs.robot)
-    rows = []
-    for robot in dict.fromkeys(names):
-        mine = np.array([name == robot for name in names]) & (planned > 0)
-        if mine.any():
-            off = 100 * (driven[mine] / planned[mine] - 1)
-            rows.append([robot, str(int(mine.sum())), f"{planned[mine].sum():.1f}", f"{driven[mine].sum():.1f}",
-                         f"{100 * (driven[mine].sum() / planned[mine].sum() - 1):+.2f}", f"{off.min():+.2f}",
-                         f"{off.max():+.2f}"])
-    late = np.argsort(-(driven - planned), kind="stable")[:_WORST_LEGS]
-    worst = [[legs.scenario[k], shown.of(legs.scenario[k], legs.planner[k]), legs.robot[k], str(legs.rollout[k]),
-              legs.origin[k], legs.destination[k], f"{planned[k]:.2f}", f"{driven[k]:.2f}",
-              f"{driven[k] - planned[k]:+.2f}"]
-             for k in late.tolist()]
-    return [*parts,
-            figure(charts.legs_driven(planned, driven, names), "Each point is a leg under one noise draw. Fuel is "
-                   "measured in seconds of driving, so a leg's time is its fuel."),
-            table(["robot", "legs", "planned [s]", "driven [s]", "off [%]", "least [%]", "most [%]"], rows),
-            table(["scenario", "plan", "robot", "noise draw", "from", "to", "planned [s]", "driven [s]", "off [s]"],
-                  worst, words=(0, 1, 2, 4, 5), caption="The legs that took longest beyond their plan")]
-
-
 def _world(world: World) -> list[str]:
     with holding_back_ctrl_c():
-        from sva_bench.report.drawing import Overlays, draw_world, for_page
+        from sva_bench.report.canvas import for_page
+        from sva_bench.report.drawing import draw_world
 
     drawn = draw_world(world, "svg", Overlays(stands=stands_of(world))).decode()
     picture = for_page(drawn, "world", f"The world {world.name} from above")
@@ -254,7 +234,7 @@ def _world(world: World) -> list[str]:
 
 
 def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]], shown: ShownNames) -> list[str]:
-    rows = [[scenario, shown.of(scenario, planner), robot, " → ".join(route) or "stays home"]
+    rows = [[scenario, shown.of(scenario, planner), robot, "stays home" if stays_home(route) else " → ".join(route)]
             for (scenario, planner), robots in routes.items() for robot, route in robots.items()]
     return [heading("Routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
 

@@ -45,15 +45,22 @@ def _signed(figure: float) -> str:
     return f"{round(figure, 1) + 0.0:+.1f}"
 
 
+def source_title(rows: Sequence[Sequence[str]]) -> str:
+    """What the table of these rows is called."""
+    return "What noise and other robots did" if _met(rows) else "What each source of noise did"
+
+
+def _met(rows: Sequence[Sequence[str]]) -> bool:
+    return any(row[2] in MET_NAMES for row in rows)
+
+
 def source_section(scenarios: Scenarios) -> list[str]:
     """The section of the page."""
     rows = source_rows(scenarios)
     if not rows:
         return []
-    met = any(row[2] in MET_NAMES for row in rows)
-    return [heading("What noise and other robots did" if met else "What each source of noise did"),
-            note(costliest(scenarios)), table(SOURCES_HEAD, rows, words=(0, 1, 2)),
-            *([note(_OF_OTHERS)] if met else []),
+    return [heading(source_title(rows)), note(costliest(scenarios)), table(SOURCES_HEAD, rows, words=(0, 1, 2)),
+            *([note(_OF_OTHERS)] if _met(rows) else []),
             note("Value: with the source less without it, in the same trials and noise draws, by the noisy twin; of "
                  "contact, floors and payload, executed less by the twin. Interplay: what is due to no source by "
                  "itself. The values add up to executed less expected less draws. Route times: how much longer the "

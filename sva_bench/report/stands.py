@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import StandKind
 from sva_bench.travel.berths import own_world, place_berths
-from sva_bench.world.model import World
+from sva_bench.world.model import Site, World
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +59,16 @@ def stands_of(world: World) -> tuple[Stand, ...]:
                        for (name, x, y), radius in slots.items()))
 
 
+def _served(stations: Sequence[Site]) -> str:
+    """How many robots each station serves at a time."""
+    several = ", ".join(f"{site.name} {site.slots}" for site in stations if site.slots > 1)
+    alone = [site.name for site in stations if site.slots == 1]
+    if not several:
+        return "each station serves one robot at a time"
+    one = f"; {'the other serves' if len(alone) == 1 else 'the others serve'} one" if alone else ""
+    return f"robots that stations serve at a time, by their slots: {several}{one}"
+
+
 def interaction_lines(world: World, stands: tuple[Stand, ...]) -> list[str]:
     """What a check says of how robots meet; nothing where it is as usual."""
     several = [site for site in world.stations if site.slots > 1]
@@ -70,6 +81,5 @@ def interaction_lines(world: World, stands: tuple[Stand, ...]) -> list[str]:
     told = ", ".join(f"{stand.name} at ({stand.x_m:.2f}, {stand.y_m:.2f})" for stand in berths)
     lines = [f"interaction {world.interaction}: {len(berths)} berths at the base, {told}"]
     if world.stations and world.interaction == "shared":
-        served = ", ".join(f"{site.name} {site.slots}" for site in several)
-        lines.append(f"stations serve one robot at a time{f'; slots: {served}' if several else ''}")
+        lines.append(_served(world.stations))
     return lines

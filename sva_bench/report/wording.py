@@ -7,7 +7,7 @@ from typing import Protocol
 
 from sva_bench.analysis.catalogue import Statistic
 from sva_bench.analysis.over_maps import OverMaps, Percentage
-from sva_bench.analysis.reach import NOTHING, beyond_reach, infeasible_plans, warned
+from sva_bench.analysis.reach import beyond_reach, infeasible_plans, warned, why_nothing
 from sva_bench.analysis.results import Comparison, Estimate, PlanFigures, VssFigures
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
@@ -31,7 +31,7 @@ class WithInterval(Protocol):
 def answer(summary: AnySummary) -> str:
     """In one sentence: which plan is worth more, and by how much."""
     if summary.reach.nothing:
-        return f"There is nothing to compare, for {NOTHING}."
+        return f"There is nothing to compare, for {why_nothing(summary.reach)}."
     given = isinstance(summary, ComparisonSummary)
     said = _of_given_plans(summary) if isinstance(summary, ComparisonSummary) else _of_the_two_plans(summary)
     reacts = any(scenario.reactions for scenario in summary.scenarios) and not (
@@ -51,6 +51,9 @@ def _of_given_plans(summary: ComparisonSummary) -> str:
 
 
 def _of_the_two_plans(summary: Summary) -> str:
+    if all(plan.promised == 0 and plan.status == "optimal" for s in summary.scenarios for plan in (
+            s.stochastic, s.deterministic)):
+        return "There is nothing to compare, for no robot earns anything where it can go: give it incentives there."
     differing = [s for s in summary.scenarios if not s.vss.same_plan]
     alike = [s.name for s in summary.scenarios if s.vss.same_plan]
     unproved = not all(plan.status == "optimal" for s in summary.scenarios for plan in (s.stochastic, s.deterministic))
@@ -128,6 +131,8 @@ def finding(vss: VssFigures) -> str:
     better = "stochastic" if mean > 0 else "deterministic"
     if interval[0] == interval[1]:
         return f"the {better} plan is worth {abs(mean):.1f} more{share}, in every trial"
+    if f"{interval[0]:.1f}" == f"{interval[1]:.1f}":
+        return f"the {better} plan is worth {abs(mean):.1f} more{share}, 95 % sure of that figure"
     return f"the {better} plan is worth {abs(mean):.1f} more{share}, 95 % sure of " \
            f"{min(map(abs, interval)):.1f} to {max(map(abs, interval)):.1f}"
 

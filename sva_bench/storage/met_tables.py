@@ -22,7 +22,7 @@ FILES: Mapping[str, pa.Schema] = {"contacts": CONTACTS, "waits": WAITS}
 """Tables of a run folder that it may lack: older ones do, and those in which nothing was met."""
 MOST_MET = 5_000_000
 """Rows of either that are read, for they are held in memory."""
-_LEG = tuple(name for name in LEGS.names if not name.endswith("_s"))
+_LEG = tuple(name for name in LEGS.names if name in CONTACTS.names)
 _FARTHEST_M = 1e6
 _AGAIN = "run the command in manifest.json again"
 

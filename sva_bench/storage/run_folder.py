@@ -154,7 +154,7 @@ class Legs:
     planned_s: FloatArray
     driven_s: FloatArray
     waited_s: FloatArray
-
+    cut_short: Sequence[bool]
 
     def without_reaction(self) -> Legs:
         """Those of teams that keep their plans."""
@@ -176,7 +176,8 @@ def legs_of(executed: Sequence[Executed | Reacted]) -> Legs:
         destination=[leg.destination for _, leg in rows],
         planned_s=np.array([leg.planned_s for _, leg in rows], dtype=np.float64),
         driven_s=np.array([leg.driven_s for _, leg in rows], dtype=np.float64),
-        waited_s=np.array([leg.waited_s for _, leg in rows], dtype=np.float64))
+        waited_s=np.array([leg.waited_s for _, leg in rows], dtype=np.float64),
+        cut_short=[leg.cut_short for _, leg in rows])
 
 
 def write_legs(path: Path, legs: Legs) -> None:

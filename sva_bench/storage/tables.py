@@ -56,8 +56,8 @@ LEGS = _schema({
     "scenario": (_WORD, ""), "planner": (_WORD, ""), "policy": (_WORD, ""), "news": (_WORD, ""),
     "trial": (_COUNT, "1"), "rollout": (_COUNT, "1"), "robot": (_WORD, ""), "leg": (_COUNT, "1"),
     "origin": (_WORD, ""), "destination": (_WORD, ""), "planned_s": (_FIGURE, "s"), "driven_s": (_FIGURE, "s"),
-    "waited_s": (_FIGURE, "s")})
-"""A row per leg driven, with the first trial that it belongs to."""
+    "waited_s": (_FIGURE, "s"), "cut_short": (pa.bool_(), "")})
+"""A row per leg driven, with the first trial that it belongs to; of those cut short, what was driven of them."""
 
 _MET = {"scenario": (_WORD, ""), "planner": (_WORD, ""), "policy": (_WORD, ""), "news": (_WORD, ""),
         "trial": (_COUNT, "1"), "rollout": (_COUNT, "1"), "robot": (_WORD, ""), "leg": (_COUNT, "1"),

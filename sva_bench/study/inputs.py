@@ -10,12 +10,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from sva_bench.choices import FailureProcess, Interaction
+from sva_bench.choices import INTERACTIONS, FailureProcess, Interaction
 from sva_bench.errors import BadInput
-from sva_bench.files.documents import YAML_SUFFIXES, read_yaml
+from sva_bench.files.documents import YAML_SUFFIXES, Document, read_yaml
 from sva_bench.files.mistaken import what_it_is
 from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.world.load import load_world
+from sva_bench.world.load import load_world, world_of
 from sva_bench.world.model import World
 from sva_bench.world.variants import adapted
 
@@ -29,7 +29,18 @@ def load(
     interaction: Interaction | None = None,
 ) -> World:
     """The world, as the command line changes it."""
-    return adapted(load_world(path), scenarios, margin, plan_failure, execute_failure, interaction)
+    document = asked_with(read_yaml(path), interaction)
+    return adapted(world_of(document), scenarios, margin, plan_failure, execute_failure, interaction)
+
+
+def asked_with(document: Document, interaction: Interaction | None) -> Document:
+    """A world file with the interaction that is asked for in place of its own.
+
+    What is wrong only under the file's own isn't wrong where another is asked for. A file that says none, or one that
+    there isn't, is left as it is.
+    """
+    own = document.data.get("interaction") if isinstance(document.data, dict) else None
+    return document.changed("interaction", interaction) if interaction and own in list(INTERACTIONS) else document
 
 
 @contextmanager

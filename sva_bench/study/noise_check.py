@@ -16,7 +16,8 @@ from sva_bench.execution.shared.execute import Wanted, ground_of, play_all
 from sva_bench.execution.shared.players import MissionKey, TeamDriven
 from sva_bench.execution.shared.unfailed import margins_of_missions, unfailed_keys
 from sva_bench.mission.plan import Plan, unless_interrupted
-from sva_bench.report.drawing import JudgedLeg, Kind, Overlays, draw_world
+from sva_bench.report.drawing import draw_world
+from sva_bench.report.overlays import JudgedLeg, Kind, Overlays
 from sva_bench.solver.two_stage import Knowledge, knowledge_of, plan_stochastic
 from sva_bench.study.costs import instance_of
 from sva_bench.study.pictures import routes_of

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from sva_bench.mission.plan import Plan
-from sva_bench.report.drawing import Kind, Leg, Overlays, draw_world
+from sva_bench.report.drawing import draw_world
+from sva_bench.report.overlays import Kind, Leg, Overlays
 from sva_bench.report.stands import stands_of
+from sva_bench.report.wording import listed
 from sva_bench.study.costs import grounds_of, plan_costs
 from sva_bench.study.planning import check_plans
 from sva_bench.travel.fuel import FuelCosts
@@ -28,7 +30,8 @@ def picture_of(
     Args:
         world: The world.
         kind: ``png`` or ``svg``.
-        roadmap, paths: Whether to show them; those of the widest robot where there are several kinds.
+        roadmap: Whether to show it; that of the widest robot where not all have the same.
+        paths: Whether to show them; those of all robots.
         progress: Progress callback.
         plan, plan_file: A plan whose routes to show, and its file; one that breaks fuel or limit is shown too, with a
             warning.
@@ -49,12 +52,16 @@ def picture_of(
         ground = grounds_of(world)[kind_of_widest].world
         points = np.array([(site.x_m, site.y_m) for site in ground.sites])
         edges = roadmap_edges(ground.obstacles, points, widest.clearance_m)
-    drawn = [path for i, row in enumerate(widest.paths) for path in row[i + 1:] if path is not None] if paths else []
+    drawn = [path for cost in costs.values() for i, row in enumerate(cost.times.paths) for path in row[i + 1:]
+             if path is not None] if paths else []
+    several = len(costs) > 1
     routes: dict[str, list[Leg]] = {}
     if plan is not None and plan_file is not None:
         check_plans(world, costs, {"plan": plan}, {"plan": plan_file}, allow_infeasible=True)
         routes = routes_of(world, costs, plan)
-    return draw_world(world, kind, Overlays(roadmap=edges, paths=tuple(drawn), routes=routes, stands=stands))
+    return draw_world(world, kind, Overlays(
+        roadmap=edges, roadmap_of=kind_of_widest if several else "", paths=tuple(drawn),
+        paths_of=listed(list(costs)) if several else "", routes=routes, stands=stands))
 
 
 def routes_of(world: World, costs: Mapping[str, FuelCosts], plan: Plan) -> dict[str, list[Leg]]:

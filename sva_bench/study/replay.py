@@ -80,10 +80,12 @@ class Replayed:
         lines, known = [], set[str]()
         for heard in self.reactions:
             known |= set(heard.failed)
-            learned = ", ".join(self._as_it_is(robot, heard.time_s) for robot in heard.learned) or "nobody"
+            gone = [robot for robot in heard.learned if self._gone(robot, heard.time_s)]
+            learned = ", ".join(robot for robot in heard.learned if robot not in gone) or "nobody"
             changed = "" if heard.after else "; no orders changed" if heard.learned else \
                 self._beyond(known, heard.time_s)
             lines.append(f"at {heard.time_s:.1f} s {learned} learned that {', '.join(heard.failed)} failed{changed}")
+            lines += [f"  {self._as_it_is(robot, heard.time_s)} was told, and hears nothing" for robot in gone]
             lines += [f"  {self._as_it_is(robot, heard.time_s)}, from {heard.since[robot]}: "
                       f"{_stops(heard.before[robot])}; now {_stops(new)}" for robot, new in heard.after.items()]
         if self.case.policy != "none" and not lines:
@@ -92,10 +94,14 @@ class Replayed:
 
     def _as_it_is(self, robot: str, time_s: float) -> str:
         """A robot that is told something: whether it is lost by then, which the team doesn't know yet."""
+        end = self._gone(robot, time_s)
+        return f"{robot} ({end}, unknown to the team)" if end else robot
+
+    def _gone(self, robot: str, time_s: float) -> str:
+        """How a robot's mission had ended by then, if it was lost; else nothing."""
         row = next(row for row in self.rows if row["robot"] == robot)
         lost = row["lost"] or row["end"] in ("failed", "out_of_fuel", "stuck")
-        end = str(row["end"]).replace("_", " ")
-        return f"{robot} ({end}, unknown to the team)" if lost and row["end_time_s"] <= time_s else robot
+        return str(row["end"]).replace("_", " ") if lost and row["end_time_s"] <= time_s else ""
 
     def _beyond(self, known: Container[str], time_s: float) -> str:
         """Why nobody could be told: all robots but those known to be dead are home, or on their last leg there."""

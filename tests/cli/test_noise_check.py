@@ -10,7 +10,7 @@ import pytest
 from sva_bench.__main__ import run_command_line
 from sva_bench.analysis.tightness import MarginQuantiles
 from sva_bench.cli.noise_check import _JUDGED, _left
-from sva_bench.report.drawing import _JUDGED_TOLD
+from sva_bench.report.styles import JUDGED_TOLD
 from tests.worlds_for_tests import SMALL
 
 DOOR = Path(__file__).parents[2] / "examples" / "one-door.yaml"
@@ -95,7 +95,7 @@ def test_terminal_picture_and_pages_call_a_judgement_by_one_word() -> None:
     contact, formats = ((DOOR.parents[1] / "docs" / f"{page}.md").read_text(encoding="utf-8")
                         for page in ("contact", "formats"))
     for judged, word in _JUDGED.items():
-        assert judged == "safe" or (word and word in _JUDGED_TOLD[judged] and f"*{word}*" in contact)
+        assert judged == "safe" or (word and word in JUDGED_TOLD[judged] and f"*{word}*" in contact)
         assert word in formats.split("`judged` (")[1].split("; see")[0].split(f"`{judged}`")[1].split(";")[0]
     assert "*close*" not in contact
 

@@ -47,7 +47,8 @@ def test_how_missions_ended_is_said_plan_by_plan_without_brackets_in_brackets(
     print_summary(replace(found, scenarios=(replace(
         scenario, plans={**plans, "calibrated": plans["stochastic"]}, calibration=missed),)))
     said = " ".join(capsys.readouterr().out.split())
-    assert ("stochastic 7 out of fuel, 3 late; deterministic 7 out of fuel, 3 late; calibrated (share not reached) 7 "
+    assert ("Of 100 robot missions of each plan ended otherwise than home or by draw: "
+            "stochastic 7 out of fuel, 3 late; deterministic 7 out of fuel, 3 late; calibrated (share not reached) 7 "
             "out of fuel, 3 late.") in said
 
 

@@ -82,10 +82,13 @@ def test_each_share_is_said_to_be_the_twins_or_executed_and_why_they_differ() ->
     above = run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=1 / 32)
     (line,) = calibration_lines(above)
     assert "by the twin, under 1000 draws of its own, 0.0 % [0.0, 0.4] of missions go wrong" in line
-    assert "Executed, 3.1 % of missions go wrong, more than the 1 % asked for: one bad draw of 32 is 3.1 %" in line
+    assert "Executed, 3.1 % of missions go wrong, more than the 1 % asked for: this run has 32 noise draws, of which " \
+        "a single bad one is 3.1 % of missions." in line
     assert "physics" not in line  # which these missions have none of
     (line,) = calibration_lines(replace(above, fidelity="rollout", rollouts=1000))
-    assert "asked for: physics does what the twin doesn't see." in line
+    assert "asked for: physics may do what the twin doesn't see." in line
+    (line,) = calibration_lines(replace(above, fidelity="rollout"))
+    assert "is 3.1 % of missions; and physics may do" in line
     (line,) = calibration_lines(run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=0.01))
     assert "Executed" not in line
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from sva_bench.analysis.results import Ledger, Share
+from sva_bench.analysis.results import InteractionSummary, Ledger, Share
 from sva_bench.analysis.summaries import Summary
-from sva_bench.report.doubts import contradictions, upset_by_noise
+from sva_bench.report.doubts import contradictions, costless_ends, upset_by_noise
 from tests.results_for_tests import summary
 
 
@@ -51,3 +51,32 @@ def test_missions_that_noise_upsets_are_said_by_plan() -> None:
     assert upset_by_noise(run_of(10.0, (30.0, 50.0), bad=0.0)) == []
     (said,) = upset_by_noise(run_of(10.0, (30.0, 50.0), bad=0.31))
     assert "S: deterministic 31 %" in said
+
+
+def test_ends_that_nobody_wants_and_that_cost_nothing_are_explained() -> None:
+    found = run_of(10.0, (30.0, 50.0), lost=0.0)
+    (scenario,) = found.scenarios
+    assert costless_ends(found.scenarios) == []
+    dry = replace(scenario, plans={name: replace(plan, ends={"home": 3, "out_of_fuel": 1})
+                                   for name, plan in scenario.plans.items()})
+    (said,) = costless_ends([dry])
+    assert said.startswith("Robots that ended out of fuel cost these plans nothing: S stochastic and S deterministic. ")
+    assert "on the way home, and losing a robot itself costs nothing without a loss_cost." in said
+    (cost,) = run_of(10.0, (30.0, 50.0), lost=5.0).scenarios
+    (said,) = costless_ends([replace(cost, plans={name: replace(plan, ends={"out_of_fuel": 1})
+                                                  for name, plan in cost.plans.items()})])
+    assert "nothing: S stochastic. " in said
+
+
+@pytest.mark.parametrize(("contacts", "told"), [(0.5, True), (0.0, False), (None, False)])
+def test_what_cost_most_is_said_to_be_a_collision_where_it_was_one(contacts: float | None, told: bool) -> None:
+    found = run_of(10.0, (30.0, 50.0), lost=0.0)
+    (scenario,) = found.scenarios
+    plan = scenario.plans["deterministic"]
+    met = None if contacts is None else InteractionSummary(
+        contacts=contacts, waited_s=0.0, detours=0.0, exact_share=1.0)
+    stuck = replace(plan, ledger=replace(plan.ledger, stuck=-30.0), interaction=met)
+    (said,) = contradictions(replace(found, scenarios=(replace(
+        scenario, plans={**scenario.plans, "deterministic": stuck}),)))
+    assert f"robots of the deterministic plan {'collided and ' * told}ended stuck (30.0); see " in said
+    assert ('"Robots in one world"' in said) == told

@@ -19,16 +19,20 @@ from numpy.testing import assert_array_equal
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.arrays import FloatArray
-from sva_bench.choices import WorldFamily
+from sva_bench.choices import Interaction, WorldFamily
 from sva_bench.execution.engines.bodies import obstacles_urdf
 from sva_bench.generate.terrain import random_places, random_terrain
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.report import charts, drawing
-from sva_bench.report.drawing import _ROUTES, OBSTACLE_RGB, UNKNOWN_RGB, Kind, Leg, Overlays, draw_world
+from sva_bench.report.drawing import draw_world
 from sva_bench.report.ground import frame_of
 from sva_bench.report.labels import place_labels
+from sva_bench.report.overlays import Kind, Leg, Overlays
+from sva_bench.report.styles import OBSTACLE_RGB, ROBOTS, UNKNOWN_RGB
+from sva_bench.study import pictures
+from sva_bench.travel.berths import place_berths
 from sva_bench.travel.roadmap import roadmap_edges
 from sva_bench.world.maps.ros import read_ros_map
 from sva_bench.world.model import World
@@ -155,7 +159,7 @@ def test_the_map_is_seen_through_a_roadmap_of_many_edges(small: World) -> None:
 
 
 def test_robots_are_distinguishable_without_colour() -> None:
-    styles = [(str(style), width) for _, style, width in _ROUTES]
+    styles = [(str(style), width) for _, style, width in ROBOTS]
     assert len(set(styles)) == len(styles)
 
 
@@ -215,6 +219,26 @@ def test_the_command_draws_a_plan_and_leaves_nothing_half_written(
     assert run_command_line(["world", "draw", str(world), "-o", str(tmp_path / "w.jpg")]) == 2
     assert "let the name end in .png or .svg" in " ".join(capsys.readouterr().err.split())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.json", "w.yaml"]
+
+
+@pytest.mark.parametrize("interaction", ["independent", "shared"])
+def test_paths_are_drawn_of_all_robots_from_their_own_berths(
+        interaction: Interaction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "w.yaml").write_text(SMALL)
+    shown: list[Overlays] = []
+
+    def watched(world: World, kind: Kind, overlays: Overlays) -> bytes:
+        shown.append(overlays)
+        return draw_world(world, kind, overlays)
+
+    monkeypatch.setattr(pictures, "draw_world", watched)
+    assert run_command_line(["world", "draw", str(tmp_path / "w.yaml"), "--interaction", interaction, "--paths",
+                             "--roadmap", "-o", str(tmp_path / "w.svg")]) == 0
+    world = replace(world_of(tmp_path), interaction=interaction)
+    starts = place_berths(world) if world.meets else [(world.sites[0].x_m, world.sites[0].y_m)]
+    assert {tuple(np.round(path[0], 6)) for path in shown[0].paths} >= {tuple(np.round(start, 6)) for start in starts}
+    assert len(shown[0].paths) == len(starts) * len(list(combinations(world.sites, 2)))
+    assert (shown[0].paths_of, shown[0].roadmap_of) == (("uv1 and uv2", "uv1") if world.meets else ("", ""))
 
 
 @pytest.mark.parametrize("longest", [4, 30, 90])

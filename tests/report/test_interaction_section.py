@@ -37,14 +37,14 @@ def test_all_are_said_to_be_exact_only_if_they_are() -> None:
 
 
 def test_the_sentence_has_each_plan_over_all_scenarios() -> None:
-    # Waits (12.34 + 0) / 2 and detours (0.5 + 0) / 2 of the stochastic plan; contacts 2 and 0 of the other.
+    # Waits (12.34 + 0) / 2 and detours (0.5 + 0) / 2 of the stochastic plan; collisions 2 and 0 of the other.
     other = scenario_of({"stochastic": TOUCHED, "deterministic": WAITED}, "T")
     assert interaction_told([BOTH]) == (
-        "Robots meet, a mission: stochastic 12.3 s of waiting for others, 0.5 detours, 0.0 contacts; deterministic "
-        "0.0 s of waiting for others, 0.0 detours, 2.0 contacts.")
+        "Robots meet, a mission: stochastic 12.3 s of waiting for others, 0.5 detours, 0.0 collisions; "
+        "deterministic 0.0 s of waiting for others, 0.0 detours, 2.0 collisions.")
     said = interaction_told([BOTH, other])
     assert said.startswith("Robots meet, a mission, mean over scenarios: stochastic 6.2 s of waiting")
-    assert "1.0 contacts" in said
+    assert "1.0 collisions" in said
 
 
 @pytest.mark.parametrize("interaction", INTERACTIONS)

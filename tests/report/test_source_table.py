@@ -10,7 +10,8 @@ import pytest
 from sva_bench.analysis.results import SourceEffect
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.choices import SourceName
-from sva_bench.report.source_table import costliest, source_rows
+from sva_bench.cli.tables import print_summary
+from sva_bench.report.source_table import costliest, source_rows, source_section, source_title
 from tests.results_for_tests import summary
 
 Costs = Mapping[SourceName, float]
@@ -47,3 +48,16 @@ def test_sources_stand_in_one_order_under_all_plans_of_a_scenario() -> None:
     rows = source_rows([scenario_of({"interplay": -99.0, "capacity": -20.0, "people": 3.0, "delay": -1.0},
                                     {"capacity": -2.0, "people": -30.0, "delay": -1.0, "interplay": 0.0})])
     assert [row[2] for row in rows] == 2 * ["people", "capacity", "delay", "interplay"]
+
+
+@pytest.mark.parametrize(("source", "title"), [
+    ("wheels", "What each source of noise did"), ("waits", "What noise and other robots did"),
+    ("collisions", "What noise and other robots did")])
+def test_terminal_and_page_call_the_table_by_one_name(
+        source: SourceName, title: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found = summary((10.0, 20.0), 100.0)
+    scenarios = (scenario_of({source: -1.0}, {source: -1.0}),)
+    assert title == source_title(source_rows(scenarios))
+    assert f"<h2>{title}</h2>" in source_section(scenarios)
+    print_summary(replace(found, scenarios=scenarios), wide=True)
+    assert title in capsys.readouterr().out

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sva_bench.report.drawing import Overlays, draw_world
+from sva_bench.report.drawing import draw_world
+from sva_bench.report.overlays import Overlays
 from sva_bench.report.stands import Stand, interaction_lines, stands_of
 from sva_bench.travel.berths import place_berths
 from tests.worlds_for_tests import SMALL, world_of
@@ -36,6 +37,20 @@ def test_nobody_has_a_berth_where_nobody_meets(tmp_path: Path) -> None:
     assert stands_of(alone) == ()
     assert interaction_lines(alone, ())[0] == "interaction shared: there is one robot, which meets nobody"
     assert interaction_lines(world_of(tmp_path), ()) == []
+
+
+@pytest.mark.parametrize(("stations", "said"), [
+    ({}, "each station serves one robot at a time"),
+    ({"r1": 3}, "robots that stations serve at a time, by their slots: r1 3; the others serve one"),
+    ({"r1": 3, "r2": 2}, "robots that stations serve at a time, by their slots: r1 3, r2 2; the other serves one"),
+    ({"r1": 3, "r2": 2, "r3": 4}, "robots that stations serve at a time, by their slots: r1 3, r2 2, r3 4")])
+def test_a_check_says_how_many_robots_each_station_serves(
+        stations: dict[str, int], said: str, tmp_path: Path) -> None:
+    world = world_of(tmp_path, SHARED)
+    base, station, *pois = world.sites
+    world = replace(world, sites=(base, *(replace(station, name=name, slots=stations.get(name, 1))
+                                          for name in ("r1", "r2", "r3")), *pois))
+    assert interaction_lines(world, ())[-1] == said
 
 
 def test_without_coordination_no_station_is_said_to_queue(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,19 @@ def test_where_no_poi_is_reachable_table_page_summary_and_check_agree(
         assert "is best either way" not in text
     checked = sva_bench("world", "check", world_file(tmp_path, DRY), cwd=tmp_path)
     assert NOTHING in " ".join(checked.stdout.split())
+
+
+@pytest.mark.parametrize(("pois", "said"), [
+    (False, "the world has no POIs: add some under sites.pois"),
+    (True, "no robot earns anything where it can go: give it incentives there")])
+def test_where_there_is_nothing_to_earn_it_is_not_for_want_of_fuel(
+        pois: bool, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = re.sub(r"incentives: {.*}", "incentives: {}", SMALL)
+    if not pois:
+        text = re.sub(r"  pois:\n(    p.*\n)*", "  pois: {}\n", text)
+    for told_there in told(run_of(tmp_path, text), capsys):
+        assert f"There is nothing to compare, for {said}." in told_there
+        assert "fuel or time" not in told_there
 
 
 @pytest.mark.parametrize("limit", ["mission_limit_s: 120", "fuel_capacity_s: 60"])

@@ -264,7 +264,7 @@ def test_a_check_says_how_robots_meet_and_where_they_stand(tmp_path: Path, capsy
     (x, y), _ = place_berths(world)
     said = checked([path], capsys)
     assert f"interaction shared: 2 berths at the base, uv1 at ({x:.2f}, {y:.2f}), uv2 at" in said
-    assert "stations serve one robot at a time; slots: r1 2" in said
+    assert "robots that stations serve at a time, by their slots: r1 2" in said
     assert "uv1: 30 travel times" in said
     assert "uncoordinated: 2 berths" in checked([path, "--interaction", "uncoordinated"], capsys)
     alone = checked([path, "--interaction", "independent"], capsys)
@@ -317,3 +317,21 @@ def test_a_run_in_which_robots_touched_is_read_back_with_whom_they_touched(tmp_p
     assert {(row["robot"], row["solid"]) for row in met} == {("uv1", "uv2"), ("uv2", "uv1")}
     assert run_command_line(["report", str(folder)]) == 0
     assert run_command_line(["replay", str(folder), "--trial", "1", "--planner", "stochastic"]) == 0
+
+
+# Names that clash only where robots meet
+
+
+@pytest.mark.parametrize("own", ["shared", "uncoordinated", "independent"])
+def test_a_name_that_robots_would_wait_for_is_refused_only_where_they_meet(own: Interaction, tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text(SMALL.replace("uv2:", "people:") + f"interaction: {own}\n")
+    choices: tuple[Interaction, ...] = ("shared", "uncoordinated", "independent")
+    for asked in choices:
+        if asked == "independent":
+            assert sb.load_world(tmp_path / "world.yaml", interaction=asked).robots[1].name == "people"
+        else:
+            with pytest.raises((BadFile, BadInput), match="rename the robot"):
+                sb.load_world(tmp_path / "world.yaml", interaction=asked)
+    (tmp_path / "world.yaml").write_text(SMALL + "interaction: nobody\n")
+    with pytest.raises(BadFile, match="interaction"):
+        sb.load_world(tmp_path / "world.yaml", interaction="independent")

@@ -83,10 +83,12 @@ def leg_times(
         missions: Noise draw and mission by its first trial.
     """
     for trial, (rollout, mission) in missions.items():
-        for robot, fuel, stops, driven in zip(robots, costs, mission.stops, mission.driven, strict=True):
+        for robot, fuel, stops, driven, outcome in zip(
+                robots, costs, mission.stops, mission.driven, mission.robots, strict=True):
             sites = fuel.times.sites
             for leg, (done, (origin, destination)) in enumerate(zip(legs_of(driven), pairwise(stops), strict=False)):
                 planned_ms = fuel.repaired_ms[sites.index(origin), sites.index(destination)]
                 yield LegTime(trial=trial, rollout=rollout, robot=robot, leg=leg, origin=origin,
                               destination=destination, planned_s=int(planned_ms) / 1000, driven_s=done.time_s,
-                              waited_s=done.waited_s, touches=done.touches, waits=done.waits, held_by=done.held_by)
+                              waited_s=done.waited_s, touches=done.touches, waits=done.waits, held_by=done.held_by,
+                              cut_short=leg >= outcome.stops_reached)  # it failed, ran dry or got stuck on it
