@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import beta, norm
 from scipy.stats import t as student_t
 
 from sva_bench.analysis.moments import Bounds, Figure
@@ -14,6 +14,8 @@ from sva_bench.analysis.results import Distribution, Estimate
 from sva_bench.arrays import FloatArray
 
 CONFIDENCE = 0.95
+POWER = 0.8
+"""Probability to tell a difference from zero that counts as enough, by convention."""
 WORST = 0.1
 """Share of the trials whose mean is reported as the tail (CVaR)."""
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -42,6 +44,24 @@ def estimate(figure: Figure, *, comparisons: int = 1) -> Estimate:
     below = math.hypot(middle - drawn[0], max(taken[1] - lost, 0.0))
     above = math.hypot(drawn[1] - middle, max(lost - taken[0], 0.0))
     return _within_certain(figure, figure.mean, figure.mean - below, figure.mean + above)
+
+
+def detectable(estimate: Estimate) -> float | None:
+    """The smallest true difference that a run like this one would have told from zero with 80 % power.
+
+    Args:
+        estimate: The difference; its interval says how far such runs vary.
+
+    Returns:
+        That difference; ``None`` where there is no interval.
+
+    Source:
+        The usual formula of power, (z_0.975 + z_0.8) standard errors, with the interval's longer half as 1.96 of them.
+    """
+    if estimate.ci95 is None:
+        return None
+    half = max(estimate.mean - estimate.ci95[0], estimate.ci95[1] - estimate.mean)
+    return half * (1 + float(norm.ppf(POWER) / norm.ppf((1 + CONFIDENCE) / 2)))
 
 
 def controlled(figure: Figure, expected: float) -> Estimate:

@@ -10,6 +10,7 @@ from sva_bench.analysis.over_maps import OverMaps, Percentage
 from sva_bench.analysis.reach import beyond_reach, infeasible_plans, warned, why_nothing
 from sva_bench.analysis.results import Comparison, Estimate, PlanFigures, VssFigures
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
+from sva_bench.analysis.statistics import POWER, detectable
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.files.printable import counted
 from sva_bench.mission.failures import process_of
@@ -124,9 +125,10 @@ def finding(vss: VssFigures) -> str:
         return f"{mean:+.1f} by planning for failures; no interval: more trials or noise draws would tell " \
                "how sure that is"
     if not vss.distinguishable:
-        same = interval[0] == interval[1] == 0
-        return "no difference in any trial" if same else \
-            f"not distinguishable from zero: {mean:+.1f}, 95 % sure of {interval[0]:.1f} to {interval[1]:.1f}"
+        if interval[0] == interval[1] == 0:
+            return "no difference in any trial"
+        return f"not distinguishable from zero: {mean:+.1f}, 95 % sure of {interval[0]:.1f} to {interval[1]:.1f}; a " \
+               f"run like this tells a difference of {detectable(vss.executed):.1f} with {100 * POWER:.0f} % power"
     share = "" if vss.executed_pct is None else f" ({per_cent(vss.executed_pct)})"
     better = "stochastic" if mean > 0 else "deterministic"
     if interval[0] == interval[1]:

@@ -17,6 +17,7 @@ from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.statistics import (
     bounded_mean,
     controlled,
+    detectable,
     distribution,
     estimate,
     sample_mean,
@@ -251,3 +252,21 @@ def test_without_noise_the_control_is_the_plain_figure() -> None:
     # What a robot loses by the rules depends on the draw, and has no closed form here.
     figure = drawn_only(np.array([0.0, 60.0, 60.0, 60.0]), (0.0, 60.0))
     assert controlled(figure, 48.0) == estimate(figure)
+
+
+def test_a_difference_that_counts_as_detectable_is_told_from_zero_in_four_runs_of_five() -> None:
+    # Value of a POI worth 10 that is reached or not, less a constant, in 400 trials: +-10 and 0 as plans differ.
+    rng = np.random.default_rng(5)
+
+    def run(gain: float) -> Estimate:
+        values = rng.choice([10.0, 0.0, -10.0], 400, p=[0.2 + gain / 20, 0.6, 0.2 - gain / 20])
+        return estimate(drawn_only(values, (-10.0, 10.0)))
+
+    smallest = float(np.mean([detectable(run(0.0)) or 0.0 for _ in range(50)]))
+    told = sum(run(smallest).excludes_zero for _ in range(600)) / 600
+    assert 0.74 < told < 0.88  # 0.8, with three standard errors
+
+
+def test_without_an_interval_nothing_is_known_to_be_detectable() -> None:
+    assert detectable(Estimate(mean=1.0, ci95=None)) is None
+    assert detectable(Estimate(mean=1.0, ci95=(-1.0, 2.0))) == pytest.approx(2 * (1 + 0.8416 / 1.96), abs=1e-3)
