@@ -40,7 +40,8 @@ def proved_apart(obstacles: Obstacles, start: FloatArray, end: FloatArray, clear
     half = cell * math.sqrt(0.5)
     touched, sure = (keeps_clearance(obstacles, centres, clearance_m + more).reshape(tuple(counts))
                      for more in (-half - _ROUNDING_M, half))
-    kind = np.where(touched, np.where(binary_dilation(sure, np.ones((3, 3), dtype=np.bool_), iterations=_NEAR), _OPEN, _SPLIT), _SHUT)
+    wide = binary_dilation(sure, np.ones((3, 3), dtype=np.bool_), iterations=_NEAR)
+    kind = np.where(touched, np.where(wide, _OPEN, _SPLIT), _SHUT)
     fine = clearance_checker(obstacles, clearance_m - half / _FINER, _ROUNDING_M)
     return not _floods(kind.astype(np.uint8), fine, low, cell, start, end)
 
