@@ -40,6 +40,7 @@ REGISTRIES: list[tuple[str, Iterable[Any]]] = [
     ("SiteKind", drawing._MARKERS),
     ("End", choices.ENDS),
     ("Interaction", choices.INTERACTIONS),
+    ("Departures", choices.DEPARTURES),
     ("StandKind", drawing._STANDS),
     ("PolicyName", POLICIES),
     ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"], "anticipative"]),
