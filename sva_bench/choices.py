@@ -19,6 +19,12 @@ INTERACTIONS: Mapping[Interaction, str] = {
     "shared": "they drive in one world, coordinated: they wait for each other and never touch",
 }
 """What robots are to each other, in a few words each."""
+Departures = Literal["together", "staggered"]
+DEPARTURES: Mapping[Departures, str] = {
+    "together": "all robots leave their berths at once",
+    "staggered": "a robot leaves later by what it would wait for others on its first leg",
+}
+"""When robots that share a world leave, in a few words each."""
 Unknown = Literal["occupied", "free"]
 """What cells of a map count as that are neither occupied nor free."""
 SolidKind = Literal["box", "cylinder", "sphere"]

@@ -61,11 +61,17 @@ class BadFile(SvaBenchError):
         return f"{where}: {self.key}: {self.problem}" if self.key else f"{where}: {self.problem}"
 
 
+def closest(word: str, candidates: list[str]) -> str | None:
+    """The valid word closest to ``word``; ``None`` when none is close."""
+    close = get_close_matches(word[:200], candidates, n=1, cutoff=0.5)
+    return close[0] if close else None
+
+
 def nearest(word: str, candidates: list[str]) -> str:
     """A hint that names the valid word closest to ``word``, or all of them when none is close."""
-    close = get_close_matches(word[:200], candidates, n=1, cutoff=0.5)
-    if close:
-        return f"did you mean {close[0]!r}?"
+    close = closest(word, candidates)
+    if close is not None:
+        return f"did you mean {close!r}?"
     known = sorted(candidates)
     if len(known) > 12:
         return f"known: {', '.join(known[:10])} and {len(known) - 10} more"

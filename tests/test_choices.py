@@ -40,6 +40,7 @@ REGISTRIES: list[tuple[str, Iterable[Any]]] = [
     ("SiteKind", styles.SITE_MARKERS),
     ("End", choices.ENDS),
     ("Interaction", choices.INTERACTIONS),
+    ("Departures", choices.DEPARTURES),
     ("StandKind", styles.STANDS),
     ("PolicyName", POLICIES),
     ("PlanObjective", [*LITERALS["Objective"], *LITERALS["RiskKind"], "anticipative"]),

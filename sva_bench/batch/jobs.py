@@ -107,7 +107,8 @@ class PlansJob:
         if self.options.calibrate is not None:
             world = self.world
             calibrated = (self.options.calibrate, world.noise, world.passages, world.sites, world.interaction,
-                          self.costs, *((world.obstacles,) if world.meets else ()))  # ways round others
+                          world.departures, self.costs,
+                          *((world.obstacles,) if world.meets else ()))  # ways round others
         instances = [instance_of(self.world, self.costs, scenario) for scenario in self.world.scenarios]
         return digest(self.kind, [s.name for s in self.world.scenarios], instances, self.world.plan_failure,
                       self.world.execute_failure, self.options.limits, self.options.evpi, self.options.informed,

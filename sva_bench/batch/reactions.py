@@ -50,8 +50,9 @@ class ReactionsJob:
                   case.plan.status) for case in self.cases]
         robots = [replace(robot, urdf=None) for robot in world.robots]  # its model says all of a URDF
         return digest(self.kind, world.obstacles, world.sites, robots, world.scenarios, world.execute_failure,
-                      world.noise, world.passages, world.interaction, self.costs, self.instances, plans,
-                      settings_of(world, options), reactions_of(world, options), options.anticipate, options.limits)
+                      world.noise, world.passages, world.interaction, world.departures, self.costs, self.instances,
+                      plans, settings_of(world, options), reactions_of(world, options), options.anticipate,
+                      options.limits)
 
     @property
     def what(self) -> str:

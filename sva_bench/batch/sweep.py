@@ -16,7 +16,7 @@ from pydantic import Field
 
 from sva_bench.analysis.calibration import Target, target_of
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
-from sva_bench.choices import FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
+from sva_bench.choices import Departures, FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.complaints import shown
 from sva_bench.files.digest import digest
@@ -54,7 +54,7 @@ class Sweep:
         trials, rollouts, fidelity, unit_trials: As for ``Options`` and ``Grid``.
         planners: How paths are planned.
         scenarios: Names of the scenarios to execute.
-        margin, plan_failure, execute_failure, interaction: In place of the worlds' own.
+        margin, plan_failure, execute_failure, interaction, departures: In place of the worlds' own.
         policies, news, anticipate, calibrate, evpi: As for ``Options``.
         time_limit_s, gap: When a solve may stop.
         vary: Values by dotted key of a world file.
@@ -74,6 +74,7 @@ class Sweep:
     plan_failure: FailureProcess | None = None
     execute_failure: FailureProcess | None = None
     interaction: Interaction | None = None
+    departures: Departures | None = None
     policies: tuple[PolicyName, ...] | None = None
     news: tuple[News, ...] | None = None
     anticipate: bool | None = None
@@ -106,6 +107,7 @@ class _SweepFile(Section):
     plan_failure: FailureProcess | None = None
     execute_failure: FailureProcess | None = None
     interaction: Interaction | None = None
+    departures: Departures | None = None
     policy: Annotated[list[str], Field(min_length=1)] | str | None = None
     news: Annotated[list[str], Field(min_length=1)] | str | None = None
     anticipate: bool | None = None
@@ -151,7 +153,7 @@ def _from_file(document: Document) -> Sweep:
         unit_trials=file.unit_trials, planners=tuple(file.planners) if file.planners else None,
         scenarios=tuple(file.scenarios) if file.scenarios else None, margin=file.margin,
         plan_failure=file.plan_failure, execute_failure=file.execute_failure, interaction=file.interaction,
-        policies=policies, news=news, anticipate=file.anticipate, evpi=file.evpi,
+        departures=file.departures, policies=policies, news=news, anticipate=file.anticipate, evpi=file.evpi,
         calibrate=targets[0] if targets else None, time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set,
         file=document)
 
@@ -327,7 +329,7 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
                     raise sweep.wrong("scenarios", ("scenarios", number), f"--scenario {name}",
                                       "given twice; give it once")
             yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure,
-                                    sweep.interaction), from_file),
+                                    sweep.interaction, sweep.departures), from_file),
                    [f"{key}={json.dumps(value)}" for key, value in values.items()])
 
 
@@ -340,7 +342,8 @@ def _effective(world: World, options: Options) -> tuple[int, str]:
     sites = world.sites if world.meets else [replace(site, slots=1) for site in world.sites]
     return id(world.obstacles), digest(world.name, sites, robots, world.scenarios, world.plan_failure,
                                        world.execute_failure, world.margin, world.noise, world.passages,
-                                       world.interaction if world.meets else "", reactions_of(world, options))
+                                       (world.interaction, world.departures) if world.meets else "",
+                                       reactions_of(world, options))
 
 
 def _sharing(world: World, from_file: dict[str, World]) -> World:

@@ -16,6 +16,7 @@ from sva_bench.cli.options import (
     Anticipate,
     AsJson,
     Calibrate,
+    DeparturesOption,
     ExecuteFailure,
     InteractionOption,
     MarginOption,
@@ -92,6 +93,7 @@ def over(
     anticipate: Anticipate = False,
     calibrate: Calibrate = None,
     interaction: InteractionOption = None,
+    departures: DeparturesOption = None,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
                                                       "takes.")] = False,
     time_limit: TimeLimit = None,
@@ -134,6 +136,7 @@ def over(
         seeds=seeds_of(seed) if seed else None, trials=trials, rollouts=rollouts, fidelity=fidelity,
         planners=planners_of(planner) if planner else None, scenarios=tuple(scenario) if scenario else None,
         margin=margin, plan_failure=plan_failure, execute_failure=execute_failure, interaction=interaction,
+        departures=departures,
         policies=policies_of(policy) if policy else None, news=news_of(news) if news else None,
         anticipate=anticipate or None, calibrate=None if calibrate is None else target_of(calibrate),
         evpi=evpi or None,

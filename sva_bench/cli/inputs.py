@@ -134,9 +134,9 @@ def _kind_of(picture: Path) -> str:
 def _warn_of_doubtful(world: World, costs: Mapping[str, FuelCosts]) -> None:
     """Say what can't be what was meant."""
     with loading():
-        from sva_bench.study.doubtful import doubtful_loads, doubtful_passages
+        from sva_bench.study.doubtful import doubtful_berths, doubtful_loads, doubtful_passages
 
-    for said in (*doubtful_passages(world, costs), *doubtful_loads(world)):
+    for said in (*doubtful_passages(world, costs), *doubtful_berths(world), *doubtful_loads(world)):
         _log.warning("%s", said)
 
 

@@ -9,10 +9,12 @@ from typing import Annotated
 import typer
 
 from sva_bench.choices import (
+    DEPARTURES,
     INTERACTIONS,
     NEWS,
     POLICY_NAMES,
     USUAL_NEWS,
+    Departures,
     FailureProcess,
     Fidelity,
     Interaction,
@@ -80,6 +82,9 @@ Calibrate = Annotated[str | None, typer.Option(
 InteractionOption = Annotated[Interaction | None, typer.Option(
     "--interaction", help="What robots are to each other. " + "; ".join(
         f"{name}: {said}" for name, said in INTERACTIONS.items()) + ".", show_default="the world's")]
+DeparturesOption = Annotated[Departures | None, typer.Option(
+    "--departures", help="When robots leave that share a world. " + "; ".join(
+        f"{name}: {said}" for name, said in DEPARTURES.items()) + ".", show_default="the world's")]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder that receives the run folder.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Write the run's tables as CSV too, for spreadsheets.")]
 

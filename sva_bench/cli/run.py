@@ -14,6 +14,7 @@ from sva_bench.cli.options import (
     AsCsv,
     AsJson,
     Calibrate,
+    DeparturesOption,
     ExecuteFailure,
     FidelityOption,
     Gap,
@@ -64,6 +65,7 @@ def run(
     anticipate: Anticipate = False,
     calibrate: Calibrate = None,
     interaction: InteractionOption = None,
+    departures: DeparturesOption = None,
     time_limit: TimeLimit = None,
     gap: Gap = 1e-6,
     evpi: Annotated[bool, typer.Option("--evpi", help="Work out the value of perfect information however long it "
@@ -100,7 +102,7 @@ def run(
     target = None if calibrate is None else target_of(calibrate)
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
-    loaded = load(world, scenario, margin, plan_failure, execute_failure, interaction)
+    loaded = load(world, scenario, margin, plan_failure, execute_failure, interaction, departures)
     check_reactions(loaded, policies, heard, anticipate=anticipate)
     load_libraries()  # after the world is read: an error in the file is said at once
     with loading():
@@ -140,6 +142,7 @@ def execute(
     news: NewsNames = None,
     anticipate: Anticipate = False,
     interaction: InteractionOption = None,
+    departures: DeparturesOption = None,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -158,7 +161,8 @@ def execute(
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
     named = by_name(plans)
-    loaded = load(world, scenario, margin, execute_failure=execute_failure, interaction=interaction)
+    loaded = load(world, scenario, margin, execute_failure=execute_failure, interaction=interaction,
+                  departures=departures)
     check_reactions(loaded, policies, heard, anticipate=anticipate)
     refuse_the_name(named, anticipate=anticipate)
     read = read_plans(loaded, named)

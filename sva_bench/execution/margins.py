@@ -75,7 +75,7 @@ def margins_of(robot: int, orders: Assignment, drives: Sequence[Driven]) -> Marg
         done = len(driven.leg_s) - driven.stuck
         leg[row, :done], waited[row, :done] = driven.leg_s[:done], driven.waited_s[:done]
     fuel, time = np.empty_like(leg), np.empty_like(leg)
-    burnt, clock = np.zeros(len(drives)), np.zeros(len(drives))
+    burnt, clock = np.zeros(len(drives)), np.array([driven.start_s for driven in drives])
     for column, (_, site) in enumerate(pairwise(orders.route)):
         burnt = burnt + leg[:, column] + orders.idle_share * waited[:, column]
         clock = clock + leg[:, column] + waited[:, column] + orders.stop_s[site]

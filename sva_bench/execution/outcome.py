@@ -57,6 +57,7 @@ class Driven:
         in_physics: Share of its driving time that was driven in physics.
         twin_s: Driving time by the twin [s], where physics drove to check it; else ``None``.
         fault: Why it got stuck where nothing held it.
+        start_s: When it sets off [s on the mission clock].
     """
 
     leg_s: FloatArray
@@ -70,6 +71,7 @@ class Driven:
     in_physics: float = 0.0
     twin_s: float | None = None
     fault: Fault | None = None
+    start_s: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(self.clock_s)

@@ -49,6 +49,7 @@ class RobotMission:
     Attributes:
         orders: Its rules, and the route it began with.
         fate: When it fails.
+        start_s: When it sets off on the mission clock [s].
         ahead: Sites that it is to go to yet.
         site: Where it stands, or where it was going when it ended.
         clock_s: Mission clock [s]; at a stop, when the stop is over.
@@ -62,7 +63,7 @@ class RobotMission:
 
     def __init__(self, orders: Assignment, fate: RobotFate = _SURE, *, start_s: float = 0.0) -> None:
         self.orders, self.fate = orders, fate
-        self.clock_s = self.arrived_s = start_s
+        self.start_s = self.clock_s = self.arrived_s = start_s
         self.driven_s = self.fuel_s = self.waited_s = self.incentive = self._filled_at_s = 0.0
         self.tank_s = orders.fuel_capacity_s
         self.pois = self.stops = self.contacts = 0
@@ -78,6 +79,11 @@ class RobotMission:
             self._ends("failed", self.site)
         else:
             self._tell("departed", self.site)
+
+    def leave_at(self, start_s: float) -> None:
+        """Set off at another time; only before it has left its base."""
+        self.start_s = self.clock_s = self.arrived_s = start_s
+        self._events = [replace(event, time_s=start_s) for event in self._events]
 
     def give(self, stops: tuple[str, ...]) -> None:
         """Replace what is left of its orders; a robot whose mission is over takes none.
@@ -247,7 +253,7 @@ def settle(orders: Assignment, driven: Driven, fate: RobotFate = _SURE) -> Outco
         driven: Driving time of its legs, at least of those before a failure.
         fate: When it fails.
     """
-    mission = RobotMission(orders, fate)
+    mission = RobotMission(orders, fate, start_s=driven.start_s)
     legs = iter(legs_of(driven))
     while mission.depart() is not None:
         mission.drive(next(legs))

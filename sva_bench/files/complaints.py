@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from typing import Any, get_type_hints
 
 from pydantic import BaseModel, ValidationError
 
-from sva_bench.errors import nearest
+from sva_bench.errors import closest, nearest
 from sva_bench.files.printable import counted
 
 Loc = tuple[str | int, ...]
@@ -55,6 +56,9 @@ def first_complaint(
     also = f", found {shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
     if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
         also = f", found the text {shown(found)}" + (": take the quotes away" if _numeric(found) else _comma(found))
+    if detail["type"] == "literal_error" and isinstance(found, str):
+        close = closest(found.lower(), re.findall("'([^']*)'", detail["ctx"]["expected"]))
+        also += f"; did you mean {close!r}?" if close is not None else ""
     if detail["type"] == "too_long" and written and all(isinstance(item, int) for item in found):
         also = "; if commas among them are decimal ones, write decimal points"
     return loc, message[:1].lower() + message[1:] + also

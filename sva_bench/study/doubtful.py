@@ -10,7 +10,9 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.execution.waits import crossings_of
 from sva_bench.robot.model import MOTOR_RESERVE
+from sva_bench.travel.berths import place_berths
 from sva_bench.travel.fuel import FuelCosts
+from sva_bench.travel.narrowed import narrowed_by
 from sva_bench.world.model import World
 
 
@@ -39,6 +41,16 @@ def doubtful_passages(world: World, costs: Mapping[str, FuelCosts]) -> list[str]
             said.append(f"no planned path crosses passage {passage.name}, so no robot ever waits there: let its at_m "
                         "reach across a door that robots drive through, or remove it")
     return said
+
+
+def doubtful_berths(world: World) -> list[str]:
+    """A sentence about the way that robots in their berths narrow most, so that two don't pass each other."""
+    way = narrowed_by(world, place_berths(world)) if world.meets else None
+    return [] if way is None else [
+        f"robots in their berths narrow the way from {way.one} to {way.other}, from "
+        f"{'more than' if way.without_m > way.abreast_m - 0.1 else 'about'} {way.without_m:.2f} m to about "
+        f"{way.with_m:.2f} m, where two robots need {way.abreast_m:.2f} m to pass each other: move the base to a more "
+        "open place, or widen the passages about it"]
 
 
 def doubtful_loads(world: World) -> list[str]:

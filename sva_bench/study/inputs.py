@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from sva_bench.choices import INTERACTIONS, FailureProcess, Interaction
+from sva_bench.choices import INTERACTIONS, Departures, FailureProcess, Interaction
 from sva_bench.errors import BadInput
 from sva_bench.files.documents import YAML_SUFFIXES, Document, read_yaml
 from sva_bench.files.mistaken import what_it_is
@@ -26,11 +26,11 @@ _LONGEST_NAME = 120
 def load(
     path: Path, scenarios: Sequence[str] | None = None, margin: float | None = None,
     plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
-    interaction: Interaction | None = None,
+    interaction: Interaction | None = None, departures: Departures | None = None,
 ) -> World:
     """The world, as the command line changes it."""
     document = asked_with(read_yaml(path), interaction)
-    return adapted(world_of(document), scenarios, margin, plan_failure, execute_failure, interaction)
+    return adapted(world_of(document), scenarios, margin, plan_failure, execute_failure, interaction, departures)
 
 
 def asked_with(document: Document, interaction: Interaction | None) -> Document:

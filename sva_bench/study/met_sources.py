@@ -165,8 +165,8 @@ def _name(case: Case) -> CaseName:
 
 
 def _taken_s(mission: TeamDriven) -> float:
-    """Driving time and waits of all robots [s]; of one that got stuck, until then."""
-    return math.fsum(float(driven.leg_s.sum() + driven.waited_s.sum()) for driven in mission.driven)
+    """Driving time and waits of all robots, and by how much later they leave [s]; of one that got stuck, until then."""
+    return math.fsum(float(driven.leg_s.sum() + driven.waited_s.sum() + driven.start_s) for driven in mission.driven)
 
 
 def _mean(figures: Sequence[float]) -> float:

@@ -15,7 +15,8 @@ from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.geometry.buckets import clearance_checker, clearances, keeps_clear
 from sva_bench.geometry.distances import point_segment
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.travel.roadmap import plan_paths, surely_disconnected
+from sva_bench.travel.apart import proved_apart
+from sva_bench.travel.roadmap import plan_paths
 from sva_bench.travel.samples import arc_points, roadmap_samples
 from sva_bench.travel.tangents import tangents
 
@@ -154,7 +155,7 @@ def _joined(obstacles: Obstacles, checker: FloatArray, ends: FloatArray, clearan
     if path is not None:
         return path
     # The roadmap grows until it finds the narrowest passage.
-    if surely_disconnected(obstacles, ends, clearance_m)[0, 1]:
+    if proved_apart(obstacles, ends[0], ends[1], clearance_m):
         return None
     return plan_paths(obstacles, ends, clearance_m)[0][1]
 

@@ -42,8 +42,7 @@ from sva_bench.world.schema import (
 )
 from sva_bench.world.within import refuse_outside
 
-AMBIGUOUS = ("robots that meet wait for each other by name, and this one is that of a passage, of people in the way, "
-             "or of a team that plans anew (replanning); rename the robot")
+AMBIGUOUS = "robots that meet wait for each other by name, and this one is that of {}; rename the robot"
 _Entry = tuple[SiteKind, str, SiteEntry, tuple[str, ...]]  # a site, and its location in the file
 
 
@@ -91,9 +90,10 @@ def world_of(
         noise=file.noise.noise(), map_source=source,
         reaction=_reaction(document, file.reaction, stations=any(site.kind == "station" for site in sites)),
         passages=tuple(entry.passage(name) for name, entry in file.passages.items()), interaction=file.interaction,
+        departures=file.departures,
     )
-    if (name := world.ambiguous_robot) is not None:
-        raise document.error(("robots", name), AMBIGUOUS)
+    if (clash := world.ambiguous_robot) is not None:
+        raise document.error(("robots", clash[0]), AMBIGUOUS.format(clash[1]))
     return world
 
 
@@ -348,6 +348,7 @@ def world_as_dict(world: World) -> dict[str, Any]:
         # What is as usual is absent: names of runs depend on it.
         **({"reaction": asdict(world.reaction)} if reacts else {}),
         **({} if world.interaction == "independent" else {"interaction": world.interaction}),
+        **({} if world.departures == "together" else {"departures": world.departures}),
         "margin": world.margin, "noise": noise_as_dict(world.noise),
         **({"passages": {p.name: {"at_m": [list(p.ends_m[:2]), list(p.ends_m[2:])], "blocked": p.blocked,
                                   "wait_s": p.wait_s} for p in world.passages}} if world.passages else {}),

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sva_bench.choices import FailureProcess, Interaction, News, PolicyName, SiteKind
+from sva_bench.choices import Departures, FailureProcess, Interaction, News, PolicyName, SiteKind
 from sva_bench.errors import UnknownName, nearest
 from sva_bench.files.printable import counted
 from sva_bench.geometry.obstacles import Obstacles
@@ -159,6 +159,7 @@ class World:
         reaction: What the team does about failures, unless a run asks for something else.
         passages: Doors and gates that may be shut.
         interaction: What the robots are to each other.
+        departures: When robots that share it leave.
     """
 
     name: str
@@ -174,6 +175,7 @@ class World:
     reaction: WorldReaction = WorldReaction()
     passages: tuple[Passage, ...] = ()
     interaction: Interaction = "independent"
+    departures: Departures = "together"
 
     def __repr__(self) -> str:
         counts = ((self.robots, "robot"), (self.pois, "POI"), (self.stations, "station"), (self.scenarios, "scenario"))
@@ -215,10 +217,16 @@ class World:
         return tuple(site for site in self.sites if site.kind == "poi")
 
     @property
-    def ambiguous_robot(self) -> str | None:
-        """A robot that goes by the name of something else that robots wait for; ``None`` where they tell them apart."""
-        others = {"people", "replanning", *(passage.name for passage in self.passages)} if self.meets else set()
-        return next((robot.name for robot in self.robots if robot.name in others), None)
+    def unfit_departures(self) -> bool:
+        """Whether departures are to be staggered though nobody coordinates the robots."""
+        return self.departures == "staggered" and self.interaction != "shared"
+
+    @property
+    def ambiguous_robot(self) -> tuple[str, str] | None:
+        """A robot that goes by the name of something else that robots wait for, and what that is; ``None`` = none."""
+        others = {**{passage.name: "a passage" for passage in self.passages}, "people": "people in the way",
+                  "replanning": "a team that plans anew"} if self.meets else {}
+        return next(((robot.name, others[robot.name]) for robot in self.robots if robot.name in others), None)
 
     def scenario(self, name: str) -> Scenario:
         """The scenario of that name.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model, field_validator, model_validator
 
-from sva_bench.choices import FailureProcess, Interaction, News, PolicyName
+from sva_bench.choices import Departures, FailureProcess, Interaction, News, PolicyName
 from sva_bench.files.fields import (
     Bounded,
     MeanTime,
@@ -225,6 +225,7 @@ class WorldFile(Section):
     failure: FailureProcess | FailureEntry = "mission"
     reaction: Annotated[ReactionEntry, _EMPTY_IS_NONE] = Field(default_factory=ReactionEntry)
     interaction: Interaction = "independent"
+    departures: Departures = "together"
     margin: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] = 0.01
     noise: NoiseSection = Field(default_factory=NoiseEntry)
     passages: Annotated[dict[Name, PassageEntry], Field(max_length=1000), _EMPTY_IS_NONE] = Field(default_factory=dict)

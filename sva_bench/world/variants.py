@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from sva_bench.choices import FailureProcess, Interaction
+from sva_bench.choices import Departures, FailureProcess, Interaction
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.documents import Document, Loc
 from sva_bench.mission.failures import undefined_under, without_joint
@@ -85,17 +85,19 @@ def option_of(key: str, values: Mapping[str, Any]) -> str:
 def adapted(
     world: World, scenarios: Sequence[str] | None = None, margin: float | None = None,
     plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
-    interaction: Interaction | None = None,
+    interaction: Interaction | None = None, departures: Departures | None = None,
 ) -> World:
     """A world with some of its settings replaced.
 
     Args:
         world: The world.
         scenarios: Names of the scenarios to keep; ``None`` = all.
-        margin, plan_failure, execute_failure, interaction: In place of the world's own; ``None`` = unchanged.
+        margin, plan_failure, execute_failure, interaction, departures: In place of the world's own; ``None`` = the
+            same.
 
     Raises:
-        BadInput: If a scenario is unknown or listed twice, or a process doesn't support its joint distribution.
+        BadInput: If a scenario is unknown or listed twice, or a process doesn't support its joint distribution,
+            or departures are staggered of robots that nobody coordinates.
     """
     if scenarios:
         world = replace(world, scenarios=tuple(world.scenario(name) for name in _known_scenarios(
@@ -104,9 +106,13 @@ def adapted(
         world, margin=world.margin if margin is None else margin,
         plan_failure=world.plan_failure if plan_failure is None else plan_failure,
         execute_failure=world.execute_failure if execute_failure is None else execute_failure,
-        interaction=world.interaction if interaction is None else interaction)
-    if (called := world.ambiguous_robot) is not None:
-        raise BadInput(f"robots.{called}: {AMBIGUOUS}")
+        interaction=world.interaction if interaction is None else interaction,
+        departures=world.departures if departures is None else departures)
+    if world.unfit_departures:
+        raise BadInput(f"{world.name}: departures can't be staggered under interaction {world.interaction}, where no "
+                       "order says who waits for whom; take departures together, or interaction shared")
+    if (clash := world.ambiguous_robot) is not None:
+        raise BadInput(f"robots.{clash[0]}: {AMBIGUOUS.format(clash[1])}")
     correlated = [scenario.name for scenario in world.scenarios if scenario.joint is not None]
     if correlated and (other := without_joint([world.plan_failure, world.execute_failure])):
         raise BadInput(f"scenario {correlated[0]}: under {other} robots fail independently, and this scenario has a "

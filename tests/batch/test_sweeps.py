@@ -306,6 +306,18 @@ def test_what_robots_are_to_each_other_stands_in_a_sweep_file_and_is_overridden_
     assert {point.world.interaction for point in other.points} == {"shared"}
 
 
+def test_departures_stand_in_a_sweep_file_are_varied_and_are_told_apart(tmp_path: Path) -> None:
+    path = world(tmp_path)
+    grid = grid_of(Sweep(worlds=(path,), interaction="shared", vary={"departures": ["together", "staggered"]}))
+    assert [point.world.departures for point in grid.points] == ["together", "staggered"]
+    assert {point.world.interaction for point in grid.points} == {"shared"}
+    (tmp_path / "sweep.yaml").write_text(f"{SWEEP}interaction: shared\ndepartures: staggered\n", encoding="utf-8")
+    grid = grid_of(sweep_of([tmp_path / "sweep.yaml"], Sweep()))
+    assert {point.world.departures for point in grid.points} == {"staggered"}
+    with pytest.raises(BadInput, match="departures can't be staggered under interaction independent"):
+        grid_of(Sweep(worlds=(path,), departures="staggered"))
+
+
 def test_an_unknown_interaction_is_an_error_of_its_line_or_option(tmp_path: Path) -> None:
     path = world(tmp_path)
     sweep = tmp_path / "sweep.yaml"

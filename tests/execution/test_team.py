@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import get_args
 
@@ -16,15 +16,15 @@ from sva_bench.choices import NEWS, News, PolicyName
 from sva_bench.execution.chance import Drawn
 from sva_bench.execution.outcome import Assignment, Driven, RobotFate
 from sva_bench.execution.policies.none import none
-from sva_bench.execution.policies.policy import Orders, Policy, TeamState
+from sva_bench.execution.policies.policy import Policy
 from sva_bench.execution.policies.registry import POLICIES
 from sva_bench.execution.rules import LegDriven, settle
 from sva_bench.execution.team import Team, play
 from sva_bench.execution.team_outcome import TeamOutcome
+from tests.execution.shared.teams import ABSENT, SURE, Asked
 
 SITES = ("base", "r1", "p1", "p2", "p3", "p4")
 LEG_S = 10.0
-SURE, ABSENT = RobotFate(), RobotFate(before_poi=0)
 
 
 def orders(robot: str, *stops: str, fuel: float = 1000.0, limit: float = 1000.0) -> Assignment:
@@ -42,18 +42,6 @@ def legs(robot: int, stops: tuple[str, ...]) -> LegDriven:  # noqa: ARG001
 def team(own: Sequence[Assignment], news: News, policy: Policy = none) -> Team:
     return Team(orders=tuple(own), base="base", pois=frozenset({"p1", "p2", "p3", "p4"}), policy=policy, news=news,
                 scheduled_s=lambda robot, origin, destination: LEG_S)  # noqa: ARG005
-
-
-class Asked:
-    """A policy that gives the orders it is told to, and keeps what it was asked."""
-
-    def __init__(self, answer: Callable[[TeamState], Orders] = lambda state: {}) -> None:  # noqa: ARG005
-        self.states: list[TeamState] = []
-        self._answer = answer
-
-    def __call__(self, state: TeamState) -> Orders:
-        self.states.append(state)
-        return self._answer(state)
 
 
 def run(own: Sequence[Assignment], fates: Sequence[RobotFate], news: News, policy: Policy = none) -> TeamOutcome:

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sva_bench.arrays import FloatArray
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.travel.alternatives import alternatives, way_round, ways_among
+from sva_bench.travel.apart import proved_apart
 from sva_bench.travel.roadmap import plan_paths
 from tests.oracles.distances import path_clearance
 from tests.oracles.worlds import free_places, random_obstacles
@@ -153,3 +154,42 @@ def test_a_way_round_takes_a_tenth_of_a_second_at_most() -> None:
     begin = time.process_time()
     way_round(obstacles, points[0], points[1], CLEARANCE_M, discs)
     assert time.process_time() - begin < 0.1
+
+
+def beside_a_post(free_m: float) -> FloatArray:
+    """A robot that leaves a gap to the lower side of a door, wider by so much than a path needs."""
+    return np.array([[5.0, 2.0 + 2 * CLEARANCE_M + free_m + 0.177, 0.177]])
+
+
+DOOR = room((5.0, 4.7, 0.1, 1.3), (5.0, 1.0, 0.1, 1.0))  # of 1.4 m
+
+
+@pytest.mark.parametrize("free_m", [-0.05, -0.02, -0.005, -0.001])
+def test_that_a_robot_nearly_shuts_a_door_is_found_out_soon(free_m: float) -> None:
+    start, end = np.array([1.0, 3.0]), np.array([9.0, 3.0])
+    way_round(DOOR, start, end, CLEARANCE_M, beside_a_post(free_m))  # compiled
+    begin = time.process_time()
+    assert way_round(DOOR, start, end, CLEARANCE_M, beside_a_post(free_m)) is None
+    assert time.process_time() - begin < 0.2
+
+
+@pytest.mark.parametrize("free_m", [1e-4, 0.001, 0.005, 0.02])
+def test_a_gap_that_is_just_wide_enough_is_driven_through(free_m: float) -> None:
+    path = way_round(DOOR, np.array([1.0, 3.0]), np.array([9.0, 3.0]), CLEARANCE_M, beside_a_post(free_m))
+    assert path is not None
+    assert distance(path, (5.0, beside_a_post(free_m)[0, 1])) >= 0.177 + CLEARANCE_M - 1e-6
+
+
+@pytest.mark.parametrize("clearance_m", [0.1, 0.297, 0.6])
+def test_places_that_a_path_joins_are_never_proved_apart(clearance_m: float) -> None:
+    joined = apart = 0
+    for seed in range(8):
+        obstacles = random_obstacles(seed)
+        points = free_places(obstacles, seed, 4, clearance_m)
+        paths = plan_paths(obstacles, points, clearance_m)
+        for j in range(1, len(points)):
+            proved = proved_apart(obstacles, points[0], points[j], clearance_m)
+            assert not (proved and paths[0][j] is not None)
+            joined, apart = joined + (paths[0][j] is not None), apart + proved
+    assert joined > 3
+    assert apart or clearance_m < 0.5

@@ -18,9 +18,12 @@ from sva_bench.generate.terrain import DENSITY, random_places, random_terrain
 from sva_bench.geometry.distances import clearance
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.robot.model import BUILT_IN
-from sva_bench.travel.berths import NoRoomForBerths, NoRoomForSlots, gap_of, own_world, place_berths
+from sva_bench.travel.berths import NoRoomForBerths, NoRoomForSlots, own_world, place_berths
+from sva_bench.travel.narrowed import narrowed_by
 from sva_bench.travel.near_field import near_field
-from sva_bench.travel.times import plan_travel_times
+from sva_bench.travel.roadmap import plan_paths
+from sva_bench.travel.stand_ground import gap_of
+from sva_bench.travel.times import UnreachableSite, plan_travel_times
 from sva_bench.world.model import Robot, Site, World, nominal_of
 from sva_bench.world.noise import LocalisationError, Noise
 from sva_bench.world.places import field_of
@@ -176,6 +179,58 @@ def test_slots_in_a_dead_end_are_refused() -> None:
     # The station is at the end of a corridor 1 m wide: who stands before it shuts it.
     obstacles = rooms((9, 1.75, 3, 1.75), (9, 6.25, 3, 1.75))
     world = world_with(obstacles, (3, 4), [(1, 1)], FOUR, station=(11.3, 4), slots=2)
-    with pytest.raises(NoRoomForSlots, match="r1: no room for 2 slots: 1 robot can stand") as said:
+    with pytest.raises(NoRoomForSlots, match="r1: no room for 2 slots: of so many robots, 1 can stand") as said:
         own_world(world, place_berths(world), 1)
     assert str(pickle.loads(pickle.dumps(said.value))) == str(said.value)
+
+
+def test_no_slot_is_behind_a_wall_beside_the_station() -> None:
+    # A wall 0.4 m east of the station ends 0.5 m north of it: who drives round it is within 1.5 m all the time.
+    world = world_with(rooms((9.4, 2.25, 0.02, 2.25)), (2, 4), [(1, 1), (11.5, 7)], FOUR, station=(9, 4), slots=4)
+    berths = place_berths(world)
+    places = np.array([(own.sites[1].x_m, own.sites[1].y_m) for own in (own_world(world, berths, k) for k in range(4))])
+    for path, away in zip(plan_paths(world.obstacles, places, 0.29)[0][1:], np.hypot(*(places[1:] - places[0]).T),
+                          strict=True):
+        assert path is not None
+        assert np.hypot(*np.diff(path, axis=0).T).sum() <= 1.5 * away + 0.1
+
+
+WALLED_IN = (rooms((6, 1.75, 6, 1.75), (6, 6.25, 6, 1.75), (8, 4, 0.1, 0.6)), (4, 4))  # a corridor that is walled up
+
+
+def test_a_site_that_nobody_reaches_is_told_before_berths_that_find_no_room() -> None:
+    obstacles, base = WALLED_IN
+    world = world_with(obstacles, base, [(1, 4), (11, 4)], ["turtlebot2"] * 3)
+    with pytest.raises(UnreachableSite, match="no path from 'base' to 'p2'"):
+        place_berths(world)
+
+
+def test_a_site_that_nobody_reaches_is_told_before_slots_that_find_no_room() -> None:
+    # The station is in a cell of its own, 1 m wide.
+    obstacles = rooms((9, 4.6, 0.6, 0.1), (9, 3.4, 0.6, 0.1), (9.6, 4, 0.1, 0.7), (8.4, 4, 0.1, 0.7))
+    world = world_with(obstacles, (3, 4), [(1, 1)], ["turtlebot2"] * 2, station=(9, 4), slots=2)
+    with pytest.raises(UnreachableSite, match="no path from 'base' to 'r1'"):
+        own_world(world, place_berths(world), 1)
+
+
+def test_berths_that_narrow_the_only_door_are_told_of_with_its_width() -> None:
+    def door_of(wide: float) -> World:
+        deep = (8 - wide) / 4
+        return world_with(rooms((6, deep, 0.1, deep), (6, 8 - deep, 0.1, deep)), (6, 4), [(1, 1), (11, 7)], FOUR)
+
+    # Beside a door of 1.4 m stand robots 1.4 m apart, so that there is 1.05 m between their hulls.
+    world = door_of(1.4)
+    found = narrowed_by(world, place_berths(world))
+    assert found is not None
+    assert (found.one, found.other) == ("p1", "p2")
+    assert found.with_m == pytest.approx(1.4 - 0.354, abs=0.1)
+    assert found.with_m < found.without_m <= found.abreast_m == pytest.approx(1.15, abs=0.01)
+    for wide in (0.8, 3.0):  # as narrow without them; as wide as two robots need with them
+        assert narrowed_by(door_of(wide), place_berths(door_of(wide))) is None
+
+
+def test_berths_in_an_open_place_narrow_no_way() -> None:
+    world = world_with(rooms(), (6, 4), [(1, 1), (11, 7)], FOUR)
+    assert narrowed_by(world, place_berths(world)) is None
+    alone = replace(world, robots=world.robots[:1])
+    assert narrowed_by(alone, place_berths(alone)) is None

@@ -93,6 +93,12 @@ def test_an_unknown_interaction_is_refused_with_the_words_that_there_are(word: s
     assert all(name in caught.value.problem for name in INTERACTIONS)
 
 
+@pytest.mark.parametrize("word", ["Shared", "SHARED", "share", "sharred"])
+def test_a_mistyped_interaction_is_refused_with_the_word_that_was_meant(word: str, tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match=r"found .*; did you mean 'shared'\?"):
+        world_of(tmp_path, f"{SMALL}interaction: {word}\n")
+
+
 def test_the_schema_knows_every_interaction_and_the_bounds_of_slots() -> None:
     schema = WorldFile.model_json_schema()
     assert schema["properties"]["interaction"]["enum"] == list(INTERACTIONS)
@@ -111,6 +117,29 @@ def test_a_robot_that_others_wait_for_has_a_name_of_its_own(name: str, tmp_path:
     assert caught.value.key == f"robots.{name}"
     with pytest.raises(BadInput, match=rf"robots\.{name}: .*rename the robot"):
         adapted(alone, interaction="shared")
+
+
+@pytest.mark.parametrize("interaction", ["independent", "uncoordinated"])
+def test_departures_are_staggered_of_coordinated_robots_alone(interaction: Interaction, tmp_path: Path) -> None:
+    path = tmp_path / "staggered.yaml"
+    path.write_text(f"{SMALL}interaction: shared\ndepartures: staggered\n", encoding="utf-8")
+    assert load(path).departures == "staggered"
+    assert load(path, departures="together").departures == "together"
+    assert load(path, interaction=interaction, departures="together").interaction == interaction
+    with pytest.raises(BadInput, match=f"departures can't be staggered under interaction {interaction}"):
+        load(path, interaction=interaction)
+    path.write_text(f"{SMALL}departures: staggered\n", encoding="utf-8")  # what an option makes of it counts
+    assert load(path, interaction="shared").departures == "staggered"
+    with pytest.raises(BadInput, match="take departures together, or interaction shared"):
+        load(path)
+
+
+def test_staggered_departures_are_written_and_read_back_and_usual_ones_are_not(tmp_path: Path) -> None:
+    told = world_as_dict(world_of(tmp_path, f"{SMALL}interaction: shared\ndepartures: staggered\n"))
+    assert told["departures"] == "staggered"
+    assert "departures" not in world_as_dict(world_of(tmp_path, f"{SMALL}interaction: shared\n"))
+    with pytest.raises(BadFile, match="did you mean 'staggered'"):
+        world_of(tmp_path, f"{SMALL}departures: stagered\n")
 
 
 def test_an_option_takes_the_place_of_what_the_file_says(tmp_path: Path) -> None:

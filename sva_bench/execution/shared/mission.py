@@ -16,6 +16,7 @@ from sva_bench.arrays import IntArray
 from sva_bench.execution.noise import NoiseDraw
 from sva_bench.execution.outcome import HELD_S, Assignment, RobotFate, Wait
 from sva_bench.execution.rules import LegDriven, RobotMission
+from sva_bench.execution.shared.departures import staggered
 from sva_bench.execution.shared.driver import Happening, Hold, LegWait, TeamDriver
 from sva_bench.execution.shared.lanes import Lane, Order
 from sva_bench.execution.shared.own_ways import Disc, Ways
@@ -61,8 +62,10 @@ class SharedMission:
         self._switching = None if order is None else Switching(order.crossings, range(len(orders)))
         driver.ask(ASK_S if switches and order is not None else 0.0)
         self._names = [own.robot for own in orders]
+        departs = [0.0] * len(orders) if order is None else self._departures(order)
         self._players = [
-            Player(number=number, mission=RobotMission(own, fate), drawn=mine, stops=list(own.route[:1]))
+            Player(number=number, mission=RobotMission(own, fate, start_s=departs[number]), drawn=mine,
+                   stops=list(own.route[:1]))
             for number, (own, fate, mine) in enumerate(zip(orders, fates, drawn, strict=True))]
         for player in self._players:
             number, route = player.number, player.mission.orders.route
@@ -97,6 +100,10 @@ class SharedMission:
     def _until_s(self) -> float:
         """When to look at the mission next, whatever happens [s]."""
         return math.inf
+
+    def _departures(self, order: Order) -> Sequence[float]:
+        """When each robot leaves its berth by a plan in space and time [s]."""
+        return staggered(order) if self._world.departures == "staggered" else [0.0] * len(order.lanes)
 
     def _take(self, happening: Happening) -> None:
         """React to what happened."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Self
@@ -51,7 +52,7 @@ _OF_ALL: Mapping[int, HappeningKind] = {REST: "rest", TIME: "time", NOBODY: "idl
 _SAME = 1e-6  # of a control step: rounding of clocks
 
 
-class TeamMotion:
+class TeamMotion(ABC):
     """A team in motion, as of ``TeamDriver``, but for what moves it."""
 
     def __init__(self, members: Sequence[Member], *, traced: bool = False, checked: bool = False) -> None:
@@ -194,13 +195,14 @@ class TeamMotion:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(  # noqa: B027 - there is nothing to close
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """Nothing to close."""
 
+    @abstractmethod
     def _until_something(self, ways: Ways) -> int:
         """Drive until something happens; why compiled code came back, as of ``ticks``."""
-        raise NotImplementedError
 
     @property
     def _placed(self) -> tuple[Ways, Places]:

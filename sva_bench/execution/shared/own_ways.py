@@ -21,8 +21,9 @@ from sva_bench.robot.follower import CONTROL_HZ, Stretch, arc_lengths, stretches
 from sva_bench.robot.model import RobotModel
 from sva_bench.travel.alternatives import Ways as Lines
 from sva_bench.travel.alternatives import alternatives, way_round, ways_among
-from sva_bench.travel.berths import gap_of, own_world, place_berths
+from sva_bench.travel.berths import own_world, place_berths
 from sva_bench.travel.fuel import FuelCosts
+from sva_bench.travel.stand_ground import gap_of
 from sva_bench.world.model import World
 
 _STANDS_OFF_M = 0.08  # between the hull of a robot that stands and one that goes by

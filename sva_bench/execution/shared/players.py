@@ -155,7 +155,7 @@ class Player:
 def driven_by(player: Player) -> Driven:
     """What a robot drove, leg by leg; poses are in its trail."""
     return Driven(
-        fault=player.fault,
+        fault=player.fault, start_s=player.mission.start_s,
         leg_s=np.array([leg.time_s for leg in player.legs]), stuck=bool(player.legs) and player.legs[-1].stuck,
         leg_of=np.empty(0), clock_s=np.empty(0), pose=np.empty((0, 3)), capacity=player.drawn.capacity,
         touches=tuple(touch for leg in player.legs for touch in leg.touches),

@@ -49,7 +49,8 @@ class ReactingMission(SharedMission):
         super().__init__(world, ways, team.orders, fates, drawn, order, driver, noise_index)
         self._known = KnownTeam(team, [
             KnownRobot(number=player.number, mission=player.mission if own.route else None, stops=[team.base],
-                       remaining=own.route[1:]) for player, own in zip(self._players, team.orders, strict=True)])
+                       remaining=own.route[1:], ready_s=player.mission.start_s)
+            for player, own in zip(self._players, team.orders, strict=True)])
         for robot, own, fate in zip(self._known.robots, team.orders, fates, strict=True):
             if fate.before_poi == 0 and own.route:
                 self._never_leaves(robot, 0.0)
@@ -210,11 +211,21 @@ class ReactingMission(SharedMission):
         order = first_order(self._ways, orders, [player.active for player in self._players])
         if order is not None:
             self._switching = Switching(order.crossings, range(len(orders)))
-            for player in self._players:
+            for player, robot, start_s in zip(self._players, self._known.robots, self._departures(order), strict=True):
                 if player.active:
+                    if robot.leg is None:
+                        self._leave_at(player, robot, start_s)
                     self._follow(player, order, (self._team.base, *player.mission.ahead))
                     self._set_off(player, player.mission.clock_s)
         return order is not None
+
+    def _leave_at(self, player: Player, robot: KnownRobot, start_s: float) -> None:
+        """Let a robot that has not left yet do so at another time."""
+        player.mission.leave_at(start_s)
+        robot.ready_s = start_s
+        self._events = [(start_s, _STOP, robot.number) if event[1:] == (_STOP, robot.number) else event
+                        for event in self._events]
+        heapq.heapify(self._events)
 
     def _take_up(self, player: Player, then: Onward) -> None:
         before = player.mission.ahead

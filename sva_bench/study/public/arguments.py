@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import numpy as np
 
-from sva_bench.choices import Interaction
+from sva_bench.choices import Departures, Interaction
 from sva_bench.errors import BadInput, SvaBenchError, nearest
 from sva_bench.interrupts import as_ctrl_c
 from sva_bench.study.inputs import load
@@ -209,7 +209,7 @@ def refuse_other_world(name: str, times: TravelTimes, world: World) -> None:
 
 def world_given(
     value: object, scenario: object = None, margin: object = None, plan_failure: Any = None,
-    execute_failure: Any = None, interaction: Any = None,
+    execute_failure: Any = None, interaction: Any = None, departures: Any = None,
 ) -> tuple[World, Path | None]:
     """The world, with these settings in place of its own, and its file if it was read from one here.
 
@@ -220,10 +220,11 @@ def world_given(
     names = names_of("scenario", scenario)
     share = None if margin is None else number("margin", margin, 0, 1)
     meeting = optional(chosen(Interaction), "interaction", interaction)
+    leaving = optional(chosen(Departures), "departures", departures)
     if isinstance(value, World):
-        return adapted(value, names, share, plan_failure, execute_failure, meeting), None
+        return adapted(value, names, share, plan_failure, execute_failure, meeting, leaving), None
     path = path_of("world", value, "a world or the path of its file")
-    return load(path, names, share, plan_failure, execute_failure, meeting), path
+    return load(path, names, share, plan_failure, execute_failure, meeting, leaving), path
 
 
 def progress_of(progress: OnProgress | None) -> OnProgress:

@@ -12,7 +12,7 @@ from typing import cast
 from sva_bench.analysis.calibration import Target, target_of
 from sva_bench.analysis.precision import Precision, precision_of
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
-from sva_bench.choices import NEWS, FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
+from sva_bench.choices import NEWS, Departures, FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadInput, nearest
 from sva_bench.files.outputs import check_folder, check_output
 from sva_bench.mission.plan import Plan
@@ -63,8 +63,8 @@ def run(
     news: News | Sequence[News] | None = None, anticipate: bool = False, time_limit: float | None = None,
     gap: float = 1e-6, evpi: bool = False, informed: bool = False, assumptions: bool = False,
     calibrate: float | str | None = None, precision: float | str | None = None, max_trials: int | None = None,
-    interaction: Interaction | None = None, out: PathLike | None = None, workers: int | None = None,
-    progress: OnProgress | None = None,
+    interaction: Interaction | None = None, departures: Departures | None = None, out: PathLike | None = None,
+    workers: int | None = None, progress: OnProgress | None = None,
 ) -> Result[Summary]:
     """Plan, execute and measure a mission, as ``sva-bench run`` does; nothing is written unless ``out`` says where.
 
@@ -93,7 +93,7 @@ def run(
         assumptions: Execute the plans made for each failure process under all of them.
         precision: Go on until the executed VSS is known to so many per cent of the stochastic mean: 1 or ``"1%"``.
         max_trials: With ``precision``: trials at which to stop all the same, 100 000 by default.
-        interaction: ``independent``, ``uncoordinated`` or ``shared``, as in world files; by default the world's.
+        interaction, departures: As in world files: ``shared`` and its like, ``together`` or ``staggered``.
         out: Folder that receives the run folder.
         workers: Processes that drive; by default one a core. A script needs no guard of its main module for them.
         progress: Called with what is being done, how much of it is done, and how much there is.
@@ -119,7 +119,7 @@ def run(
         anticipate=flag("anticipate", anticipate), calibrate=_target(calibrate),
         precision=_precision(precision, max_trials, trials, rollouts)))
     read, path = world_given(world, scenario, margin, _process("plan_failure", plan_failure),
-                             _process("execute_failure", execute_failure), interaction)
+                             _process("execute_failure", execute_failure), interaction, departures)
     check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
     with nullcontext() if path is None else about(path), local_workers(_workers(workers), PRELOAD) as executor:
         done = measure(read, options, executor, told)
@@ -135,7 +135,8 @@ def execute(
     planner: PathPlanner = "prmstar", scenario: str | Sequence[str] | None = None, margin: float | None = None,
     execute_failure: FailureProcess | None = None, policy: PolicyName | Sequence[PolicyName] | None = None,
     news: News | Sequence[News] | None = None, anticipate: bool = False, interaction: Interaction | None = None,
-    out: PathLike | None = None, workers: int | None = None, progress: OnProgress | None = None,
+    departures: Departures | None = None, out: PathLike | None = None, workers: int | None = None,
+    progress: OnProgress | None = None,
 ) -> Result[ComparisonSummary]:
     """Execute plans from anywhere in a world and compare them pair by pair, as ``sva-bench execute`` does.
 
@@ -145,7 +146,7 @@ def execute(
         allow_infeasible: Drive plans that break fuel capacity or mission limit too; each is warned of.
         seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure, policy, news, anticipate: As for
             ``run``.
-        interaction, out, workers, progress: As for ``run``.
+        interaction, departures, out, workers, progress: As for ``run``.
 
     Returns:
         Summary with the comparisons, and the outcomes and legs as Arrow tables.
@@ -167,7 +168,8 @@ def execute(
         anticipate=flag("anticipate", anticipate)))
     allowed = flag("allow_infeasible", allow_infeasible)
     named = _named(plans)
-    read, path = world_given(world, scenario, margin, None, _process("execute_failure", execute_failure), interaction)
+    read, path = world_given(world, scenario, margin, None, _process("execute_failure", execute_failure), interaction,
+                             departures)
     check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
     refuse_the_name(named, anticipate=options.anticipate)
     bare = without_times(read)

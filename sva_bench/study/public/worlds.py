@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
-from sva_bench.choices import FailureProcess, Interaction
+from sva_bench.choices import Departures, FailureProcess, Interaction
 from sva_bench.study.public.arguments import PathLike, called_from_python, chosen, optional, path_of, world_given
 from sva_bench.world.model import World
 
@@ -14,7 +14,7 @@ from sva_bench.world.model import World
 def load_world(
     path: PathLike, *, scenario: str | Sequence[str] | None = None, margin: float | None = None,
     plan_failure: FailureProcess | None = None, execute_failure: FailureProcess | None = None,
-    interaction: Interaction | None = None,
+    interaction: Interaction | None = None, departures: Departures | None = None,
 ) -> World:
     """Read a world file (YAML), and resolve what it leaves to us: headings, random sites and incentives.
 
@@ -26,6 +26,7 @@ def load_world(
             file's.
         interaction: What robots are to each other, ``independent``, ``uncoordinated`` or ``shared``; by default the
             file's.
+        departures: When robots that share it leave, ``together`` or ``staggered``; by default as the file says.
 
     Raises:
         BadFile: With file, line, key and what to change.
@@ -34,4 +35,5 @@ def load_world(
     """
     processes = [cast("FailureProcess | None", optional(chosen(FailureProcess), name, value)) for name, value in
                  (("plan_failure", plan_failure), ("execute_failure", execute_failure))]
-    return world_given(path_of("path", path), scenario, margin, processes[0], processes[1], interaction)[0]
+    return world_given(path_of("path", path), scenario, margin, processes[0], processes[1], interaction,
+                       departures)[0]

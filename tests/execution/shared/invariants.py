@@ -120,7 +120,7 @@ def _sums(ready: Ready, mission: TeamDriven, number: int) -> list[str]:
     if not math.isclose(outcome.waited_s, sum(waited), abs_tol=1e-6) and outcome.end != "out_of_fuel":
         said.append(f"waited {outcome.waited_s} s, not {sum(waited)} s")
     charged, stood = _stopped(ready, mission, number)
-    total = outcome.driven_s + outcome.waited_s + charged + stood
+    total = driven.start_s + outcome.driven_s + outcome.waited_s + charged + stood
     if abs(total - outcome.end_time_s) > 1e-6 and outcome.end != "out_of_fuel":
         said.append(f"{total} s of driving, waits and stops end at {outcome.end_time_s} s")
     burnt = outcome.driven_s + own.idle_share * (outcome.waited_s + stood)

@@ -1,21 +1,39 @@
-"""Teams for tests: lanes through given places, planned in order, and a mission that hands out leg after leg."""
+"""Teams for tests: lanes through given places, missions that hand out leg after leg, and teams that react."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from sva_bench.choices import News
+from sva_bench.execution.case import Case, Settings
+from sva_bench.execution.known_legs import KnownLegs
+from sva_bench.execution.known_team import Team
+from sva_bench.execution.noise import draw_noise
+from sva_bench.execution.orders import orders_of, planned_legs
+from sva_bench.execution.outcome import RobotFate
+from sva_bench.execution.policies.policy import Orders, Policy, TeamState
+from sva_bench.execution.shared.drive import TeamRun, drive_team
 from sva_bench.execution.shared.driver import Happening, Hold, LegSoFar, Member, TeamDriver
 from sva_bench.execution.shared.lanes import Cut, Itinerary, Lane, Order, cut
+from sva_bench.execution.shared.own_ways import Ways
+from sva_bench.execution.shared.planning import first_order
+from sva_bench.execution.shared.players import TeamDriven
 from sva_bench.execution.shared.space_time import plan_order
+from sva_bench.execution.team_outcome import TeamOutcome
+from sva_bench.mission.plan import Plan
 from sva_bench.robot.disturbance import UNDISTURBED, Disturbance
 from sva_bench.robot.follower import stretches
 from sva_bench.robot.model import BUILT_IN, RobotModel
+from sva_bench.study.costs import plan_costs
+from sva_bench.travel.fuel import FuelCosts
+from sva_bench.world.model import World
 
 MODEL = BUILT_IN["turtlebot2"]
+SURE, ABSENT = RobotFate(), RobotFate(before_poi=0)
 Place = tuple[float, float]
 Tour = Sequence[Sequence[Place]]
 """Paths of the legs; each begins where the one before ends."""
@@ -106,6 +124,13 @@ class Mission:
         return [legs[-1].clock_s for legs in self.legs.values()]
 
 
+def begun(driver: TeamDriver, order: Order, stop_s: float = 0.0) -> Mission:
+    """A mission whose robots have set off on the lanes of an order, and heed its gates."""
+    mission = Mission(driver, order.lanes, stop_s=stop_s)
+    mission.begin(order)
+    return mission
+
+
 def there_and_back(path: Sequence[Place]) -> Tour:
     """A leg to the end of a path and one back."""
     return [path, list(reversed(path))]
@@ -120,3 +145,47 @@ DOOR: tuple[Tour, ...] = tuple(  # from four berths through one door to four pla
 CROSSING: tuple[Tour, ...] = (
     [*there_and_back([(-4.0, -4.0), (4.0, 4.0)]), *there_and_back([(-4.0, -4.0), (3.0, 3.1)])],
     [*there_and_back([(-4.0, 4.0), (4.0, -4.0)]), *there_and_back([(-4.0, 4.0), (3.0, -3.1)])])
+
+
+class Asked:
+    """A policy that gives the orders it is told to, and keeps what it was asked."""
+
+    def __init__(self, answer: Callable[[TeamState], Orders] = lambda state: {}) -> None:  # noqa: ARG005
+        self.states: list[TeamState] = []
+        self._answer = answer
+
+    def __call__(self, state: TeamState) -> Orders:
+        self.states.append(state)
+        return self._answer(state)
+
+
+class Stage:
+    """A world of two robots in which missions are played by hand."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.costs: Mapping[str, FuelCosts] = plan_costs(world, "prmstar", lambda *_: None)
+        self.ways = Ways(world, self.costs)
+
+    def play(self, routes: Mapping[str, tuple[str, ...]], fates: tuple[RobotFate, ...], news: News,
+             policy: Policy) -> TeamDriven:
+        """A mission of a team that reacts."""
+        case = Case(scenario=self.world.scenarios[0], planner="given", plan=Plan(routes=routes))
+        orders = tuple(orders_of(self.world, case, planned_legs(self.world, self.costs, [case])))
+        settings = Settings(seed=0, trials=1, rollouts=1, fidelity="kinematic")
+        team = Team(orders=orders, base="base", pois=frozenset(site.name for site in self.world.pois), policy=policy,
+                    news=news, scheduled_s=KnownLegs(self.world, self.costs, settings).scheduled_s)
+        leaves = [bool(own.route) and fate.before_poi > 0 for own, fate in zip(orders, fates, strict=True)]
+        return drive_team(TeamRun(
+            world=self.world, ways=self.ways, orders=orders, fates=fates, noise_index=(0, 0), team=team,
+            drawn=[draw_noise(self.world.noise, 0, 0, number) for number in range(len(orders))],
+            order=first_order(self.ways, orders, leaves) if self.world.interaction == "shared" else None),
+            "kinematic", traced=False)
+
+    def told(self, routes: Mapping[str, tuple[str, ...]], fates: tuple[RobotFate, ...], news: News,
+             policy: Policy) -> TeamOutcome:
+        """The same, of which nobody touches another."""
+        driven = self.play(routes, fates, news, policy)
+        assert driven.contacts == 0
+        assert driven.told is not None
+        return driven.told

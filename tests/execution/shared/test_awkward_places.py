@@ -148,7 +148,7 @@ def test_who_is_shut_in_behind_a_failed_robot_is_stuck_by_it() -> None:
 
 def test_more_robots_than_fit_are_refused() -> None:
     with pytest.raises(NoRoomForBerths):
-        mission_in(world(((6, 3, 7.6, 6), (1.1, 3.9, 2.2, 4.2)), 8, {"p1": (11, 3)}, base=(1.2, 0.9)),
+        mission_in(world(((6, 3, 7.6, 6), (1.1, 3.9, 2.2, 4.2)), 8, {"p1": (0.5, 0.5)}, base=(1.2, 0.9)),
                    routes(*[("p1",)] * 8))
 
 

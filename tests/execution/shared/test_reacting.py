@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,68 +11,24 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from sva_bench.choices import NEWS, News
-from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.known_legs import KnownLegs
-from sva_bench.execution.known_team import Team
-from sva_bench.execution.noise import draw_noise
-from sva_bench.execution.orders import orders_of, planned_legs
+from sva_bench.execution.case import Settings
 from sva_bench.execution.outcome import RobotFate
 from sva_bench.execution.policies.none import none
-from sva_bench.execution.policies.policy import Orders, Policy, TeamState
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import react
 from sva_bench.execution.reacted import Reacted
-from sva_bench.execution.shared.drive import TeamRun, drive_team
 from sva_bench.execution.shared.execute import execute_team
-from sva_bench.execution.shared.own_ways import Ways
-from sva_bench.execution.shared.planning import first_order
-from sva_bench.execution.shared.players import TeamDriven
 from sva_bench.execution.team_outcome import TeamOutcome
-from sva_bench.mission.plan import Plan
 from sva_bench.solver.rest import plan_rest
-from sva_bench.study.costs import instance_of, plan_costs
-from sva_bench.travel.fuel import FuelCosts
-from sva_bench.world.model import World
+from sva_bench.study.costs import instance_of
 from tests.execution.shared.random_missions import Ready, random_mission
+from tests.execution.shared.teams import ABSENT, SURE, Asked, Stage
 from tests.worlds_for_tests import SMALL, world_of
 
 SHARED = SMALL.replace("stop_s: 4}", "stop_s: 4, slots: 2}") + "interaction: shared\n"
 UNCOORDINATED = SHARED.replace("shared", "uncoordinated")
-SURE, ABSENT = RobotFate(), RobotFate(before_poi=0)
 FIGURES = ("incentive", "value", "end", "end_time_s", "fuel_used_s", "waited_s", "pois_reached", "stops_reached",
            "contacts", "lost")
-
-
-class Stage:
-    """A world of two robots in which missions are played by hand."""
-
-    def __init__(self, world: World) -> None:
-        self.world = world
-        self.costs: Mapping[str, FuelCosts] = plan_costs(world, "prmstar", lambda *_: None)
-        self.ways = Ways(world, self.costs)
-
-    def play(self, routes: Mapping[str, tuple[str, ...]], fates: tuple[RobotFate, ...], news: News,
-             policy: Policy) -> TeamDriven:
-        """A mission of a team that reacts."""
-        case = Case(scenario=self.world.scenarios[0], planner="given", plan=Plan(routes=routes))
-        orders = tuple(orders_of(self.world, case, planned_legs(self.world, self.costs, [case])))
-        settings = Settings(seed=0, trials=1, rollouts=1, fidelity="kinematic")
-        team = Team(orders=orders, base="base", pois=frozenset(site.name for site in self.world.pois), policy=policy,
-                    news=news, scheduled_s=KnownLegs(self.world, self.costs, settings).scheduled_s)
-        leaves = [bool(own.route) and fate.before_poi > 0 for own, fate in zip(orders, fates, strict=True)]
-        return drive_team(TeamRun(
-            world=self.world, ways=self.ways, orders=orders, fates=fates, noise_index=(0, 0), team=team,
-            drawn=[draw_noise(self.world.noise, 0, 0, number) for number in range(len(orders))],
-            order=first_order(self.ways, orders, leaves) if self.world.interaction == "shared" else None),
-            "kinematic", traced=False)
-
-    def told(self, routes: Mapping[str, tuple[str, ...]], fates: tuple[RobotFate, ...], news: News,
-             policy: Policy) -> TeamOutcome:
-        """The same, of which nobody touches another."""
-        driven = self.play(routes, fates, news, policy)
-        assert driven.contacts == 0
-        assert driven.told is not None
-        return driven.told
 
 
 @pytest.fixture(scope="module")
@@ -84,18 +39,6 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Stage:
 @pytest.fixture(scope="module")
 def loose(tmp_path_factory: pytest.TempPathFactory) -> Stage:
     return Stage(world_of(tmp_path_factory.mktemp("uncoordinated"), UNCOORDINATED))
-
-
-class Asked:
-    """A policy that gives the orders it is told to, and keeps what it was asked."""
-
-    def __init__(self, answer: Callable[[TeamState], Orders] = lambda state: {}) -> None:  # noqa: ARG005
-        self.states: list[TeamState] = []
-        self._answer = answer
-
-    def __call__(self, state: TeamState) -> Orders:
-        self.states.append(state)
-        return self._answer(state)
 
 
 BOTH = {"uv1": ("base", "p1", "r1", "p4", "base"), "uv2": ("base", "p2", "p3", "base")}

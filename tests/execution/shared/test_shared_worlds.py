@@ -13,7 +13,8 @@ from sva_bench.execution.shared.lanes import Itinerary, cut
 from sva_bench.execution.shared.space_time import plan_order
 from sva_bench.robot.follower import stretches
 from sva_bench.travel.alternatives import alternatives, ways_among
-from sva_bench.travel.berths import gap_of, own_world, place_berths
+from sva_bench.travel.berths import own_world, place_berths
+from sva_bench.travel.stand_ground import gap_of
 from sva_bench.travel.times import plan_travel_times
 from sva_bench.world.model import World
 from tests.execution.shared.test_space_time import assert_cells_are_ordered_once, drive_late

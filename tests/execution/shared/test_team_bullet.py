@@ -24,6 +24,7 @@ from tests.execution.shared.teams import (
     Mission,
     Place,
     Tour,
+    begun,
     cuts_of,
     lane_of,
     members_of,
@@ -75,12 +76,10 @@ def test_a_robot_alone_is_driven_as_in_a_world_of_its_own_to_the_bit(disturbance
 def test_physics_and_twin_agree_on_sites_ends_and_times(tours: tuple[Tour, ...], boxes: np.ndarray) -> None:
     order = planned(tours, 2.0)
     members = members_of(tours)
-    twin = Mission(TeamTwin(members), order.lanes, stop_s=2.0)
-    twin.begin(order)
+    twin = begun(TeamTwin(members), order, 2.0)
     assert twin.go_on().kind == "idle"
     with TeamBullet(replace(ROOM, boxes=boxes), members) as driver:
-        physics = Mission(driver, order.lanes, stop_s=2.0)
-        physics.begin(order)
+        physics = begun(driver, order, 2.0)
         assert physics.go_on().kind == "idle"
         assert not any(leg.touches for legs in physics.legs.values() for leg in legs)
     assert {robot: len(legs) for robot, legs in physics.legs.items()} == {
@@ -94,8 +93,7 @@ def test_a_team_in_physics_repeats_to_the_bit() -> None:
     order, seen = planned(CROSSING, 1.0), []
     for _ in range(2):
         with TeamBullet(ROOM, members_of(CROSSING, [NOISY] * 2)) as driver:
-            mission = Mission(driver, order.lanes, stop_s=1.0)
-            mission.begin(order)
+            mission = begun(driver, order, 1.0)
             mission.go_on()
             seen.append((mission.happened, [driver.pose(robot) for robot in range(2)]))
     assert seen[0] == seen[1]
@@ -105,8 +103,7 @@ def test_coming_back_at_some_time_changes_nothing_in_physics() -> None:
     order, seen = planned(CROSSING, 1.0), []
     for stops in ((), (0.0, 1.003, 4.5, 4.51)):
         with TeamBullet(ROOM, members_of(CROSSING, [NOISY] * 2)) as driver:
-            mission = Mission(driver, order.lanes, stop_s=1.0)
-            mission.begin(order)
+            mission = begun(driver, order, 1.0)
             for until_s in stops:
                 assert driver.run(until_s).kind == "time"
             mission.go_on()
@@ -146,8 +143,7 @@ def test_a_robot_before_a_wall_is_stuck_and_one_that_waits_for_another_is_not() 
     tours = [there_and_back([(0.0, 0.0), (4.0, 0.0)]), there_and_back([(0.0, 1.5), (2.0, 0.0), (4.5, 0.0)])]
     order = planned(tours, 300.0)
     with TeamBullet(ROOM, members_of(tours)) as driver:
-        mission = Mission(driver, order.lanes, stop_s=300.0)
-        mission.begin(order)
+        mission = begun(driver, order, 300.0)
         assert mission.go_on().kind == "idle"
         waited = max(wait.lasts_s for legs in mission.legs.values() for leg in legs for wait in leg.waits)
         assert waited > 200.0

@@ -25,6 +25,7 @@ from tests.execution.shared.teams import (
     Mission,
     Place,
     Tour,
+    begun,
     cuts_of,
     geared,
     lane_of,
@@ -179,8 +180,7 @@ def test_whatever_their_speeds_robots_on_a_planned_order_never_touch_and_always_
     tours = TOURS[name]
     order = ORDERS[name]
     disturbances = [Disturbance(wheel_gains=(factor, factor), delay_s=delay_s) for factor in factors[:len(tours)]]
-    mission = Mission(TeamTwin(members_of(tours, disturbances)), order.lanes, stop_s=3.0)
-    mission.begin(order)
+    mission = begun(TeamTwin(members_of(tours, disturbances)), order, 3.0)
     assert mission.go_on().kind == "idle"
     assert {happening.kind for happening in mission.happened} == {"arrived", "idle"}
     assert [len(legs) for legs in mission.legs.values()] == [len(lane.cuts) for lane in order.lanes]
@@ -192,8 +192,7 @@ ORDERS = {name: planned(tours, 3.0) for name, tours in TOURS.items()}
 @pytest.mark.parametrize("name", TOURS)
 def test_robots_that_drive_as_planned_end_when_planned(name: str) -> None:
     order = ORDERS[name]
-    mission = Mission(TeamTwin(members_of(TOURS[name])), order.lanes, stop_s=3.0)
-    mission.begin(order)
+    mission = begun(TeamTwin(members_of(TOURS[name])), order, 3.0)
     mission.go_on()
     # A gate lets a robot in when the other is out, the plan keeps 0.3 s between them.
     assert mission.ends_s == pytest.approx(order.ends_s - 3.0, abs=3.0)
@@ -233,8 +232,7 @@ def test_a_wait_names_the_robot_that_is_waited_for_and_takes_no_driving_time() -
 def test_two_teams_drive_alike_to_the_bit() -> None:
     ends = []
     for _ in range(2):
-        mission = Mission(TeamTwin(members_of(DOOR, [NOISY] * 4)), ORDERS["door"].lanes, stop_s=1.0)
-        mission.begin(ORDERS["door"])
+        mission = begun(TeamTwin(members_of(DOOR, [NOISY] * 4)), ORDERS["door"], 1.0)
         mission.go_on()
         ends.append((mission.happened, [mission.driver.pose(robot) for robot in range(4)]))
     assert ends[0] == ends[1]
@@ -467,7 +465,6 @@ def test_a_leg_is_not_started_twice_nor_beyond_the_last() -> None:
 
 
 def test_a_robot_of_another_speed_keeps_its_own_figures() -> None:
-    mission = Mission(TeamTwin(members_of(CROSSING, [geared(0.5), geared(1.0)])), ORDERS["crossing"].lanes)
-    mission.begin(ORDERS["crossing"])
+    mission = begun(TeamTwin(members_of(CROSSING, [geared(0.5), geared(1.0)])), ORDERS["crossing"])
     assert mission.go_on().kind == "idle"
     assert mission.legs[0][0].driving_s > 1.6 * mission.legs[1][0].driving_s
