@@ -235,7 +235,7 @@ def test_whatever_happens_nobody_touches_and_nobody_waits_for_ever(seed: int, ne
 
 
 def test_a_typical_mission_is_shown_as_it_was_played() -> None:
-    run = resolved(random(2), "report", settings_of(2))
+    run = resolved(random(1), "report", settings_of(1))
     assert run.shown is not None
     row = int(np.flatnonzero(run.trial == run.shown.trial)[0])
     mission = run.played[row]
