@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from sva_bench.solver.polling import poll
+from sva_bench.solver.routes.pool import keep
 from sva_bench.solver.routes.tours import EPSILON, improve_tour, tour_time
 
 _POLL_EVERY = 64  # rounds
@@ -20,33 +21,40 @@ _LONG = 0.1  # share of the rounds with long strings
 _GAPS = 0.3  # share of the rounds in which some visits within a string stay
 _BANS = 0.5  # share of the rounds in which some vehicles are barred from some POIs
 _MOST_BANNED = 0.3  # of all pairs
+_GOOD = 0.985  # value of a plan whose routes are kept, relative to the best
 _NOISE = 0.5  # greatest, on the merit of an insertion
 POWERS = np.linspace(0.6, 1.5, 10)
 """Powers of the reward in the merit of an insertion; each round takes one of them."""
 
 
 @njit(cache=True)
-def anneal(rng, count, hot, cold, price, detour, vehicle_class, time, into, symmetric, limit, near, weights, powers, allowed,
-           current, current_length, best, best_length, stop):
-    """Rounds of annealing, which change ``current`` and ``best`` in place.
+def anneal(rng, begin, end, count, hot, cold, price, detour, vehicle_class, time, into, symmetric, limit, near,
+           weights, powers, allowed, current, current_length, best, best_length, pool, pool_length, pool_class,
+           pool_size, pool_table, keys, stop):
+    """The size of the pool after some rounds of annealing, which change ``current``, ``best`` and ``pool`` in place.
+
+    Long because compiled: scratch arrays are made once, and each part would need nearly all of them.
 
     Args:
         rng: Random numbers.
-        count: Rounds.
-        hot: Loss that is accepted with probability 1/e in the first round.
+        begin: Number of the first of these rounds; ``end``: of the first after them.
+        count: Rounds in all, over which the heat falls.
+        hot: Loss that is accepted with probability 1/e in round 0.
         cold: The same in the last one.
         price: What a second of a route costs, in rewards.
         detour: Added to each detour, so that the ratio stays finite [s].
         vehicle_class: Class of each vehicle, shape (M,).
-        time: Time from a site to another, shape (classes, n, n); site 0 is the base.
+        time: Time from a site to another, shape (classes, n, n); site 0 is the base; ``into``: its transposes.
         symmetric: Whether it is the same both ways.
         limit: Mission limit [s], shape (classes,).
-        near: For each site the POIs by their distance, shape (n, n - 1).
+        near: For each site the POIs by their distance, itself included, shape (n, n - 1).
         weights: Reward of a visit by vehicle m to site j, shape (M, n).
         powers: Its ``POWERS``, shape (powers, M, n).
         allowed: Whether vehicle m may visit site j, shape (M, n).
         current: POIs of each vehicle, in order, shape (M, n); ``current_length``: how many, shape (M,).
         best: The best plan, in the same form.
+        pool: Routes of good plans, shape (most, n), with length, class and a hash table of twice their number or more.
+        keys: Random keys of the sites for hashing, shape (n,).
         stop: The flag of ``polling``: not 0 once Ctrl-C was pressed.
     """
     vehicles, n = weights.shape
@@ -54,13 +62,13 @@ def anneal(rng, count, hot, cold, price, detour, vehicle_class, time, into, symm
     total, changed = np.zeros(vehicles), np.zeros(vehicles, np.bool_)
     merit, score, least = np.zeros((vehicles, n)), np.zeros((vehicles, n)), np.zeros((vehicles, n))
     place, where, legs = np.zeros((vehicles, n), np.int64), np.zeros(n, np.int64), np.zeros(n + 1)
-    out, spare, gone = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.bool_)
+    out, spare = np.zeros(n, np.int64), np.zeros(n, np.int64)
     following, previous = np.full(n, -1), np.full(n, -1)
     fresh, new = np.zeros(n + 1, np.bool_), np.zeros(n + 1, np.int64)
     improved_orders, improved_lengths = orders.copy(), lengths.copy()
     current_value, current_time = _worth(current, current_length, vehicle_class, time, weights)
     best_value, best_time = _worth(best, best_length, vehicle_class, time, weights)
-    for number in range(count):
+    for number in range(begin, end):
         if number % _POLL_EVERY == 0 and poll(stop):
             break
         heat = hot * (cold / hot) ** (number / count)
@@ -70,7 +78,7 @@ def anneal(rng, count, hot, cold, price, detour, vehicle_class, time, into, symm
         if vehicles > 1 and rng.random() < _SWAP:
             _swap(rng, orders, lengths, allowed, changed, spare)
         else:
-            _remove_strings(rng, orders, lengths, near, where, gone, changed)
+            _remove_strings(rng, orders, lengths, near, where, changed)
         for m in range(vehicles):
             k = vehicle_class[m]
             total[m] = tour_time(orders[m], lengths[m], time[k])
@@ -108,6 +116,12 @@ def anneal(rng, count, hot, cold, price, detour, vehicle_class, time, into, symm
             if value > best_value + EPSILON or (value > best_value - EPSILON and seconds < best_time - EPSILON):
                 best_value, best_time = value, seconds
                 best[:], best_length[:] = current, current_length
+            if value >= _GOOD * best_value:
+                for m in range(vehicles):
+                    if changed[m]:
+                        pool_size = keep(orders[m], lengths[m], vehicle_class[m], pool, pool_length, pool_class,
+                                         pool_size, pool_table, keys, False)
+    return pool_size
 
 
 @njit(cache=True)
@@ -159,7 +173,7 @@ def _swap(rng, orders, lengths, allowed, changed, spare):
 
 
 @njit(cache=True)
-def _remove_strings(rng, orders, lengths, near, where, gone, changed):
+def _remove_strings(rng, orders, lengths, near, where, changed):
     """Remove strings of consecutive visits around a random POI."""
     vehicles, n = len(lengths), len(where)
     where[:] = -1

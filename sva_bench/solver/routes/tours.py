@@ -41,7 +41,7 @@ def improve_tour(order, length, time, into, symmetric, following, previous, fres
     improved = length > 1
     while improved:
         count = _new_legs(order, length, symmetric, following, previous, fresh, new)
-        improved = _reversals(order, length, time, into, symmetric, following, previous, fresh, new, count)
+        improved = _reversals(order, length, time, symmetric, following, previous, fresh, new, count)
         if improved:
             count = _new_legs(order, length, symmetric, following, previous, fresh, new)
         improved |= _moves(order, length, time, into, symmetric, following, previous, fresh, new, count, spare)
@@ -67,7 +67,7 @@ def _new_legs(order, length, symmetric, following, previous, fresh, new):
 
 
 @njit(cache=True)
-def _reversals(order, length, time, into, symmetric, following, previous, fresh, new, count):
+def _reversals(order, length, time, symmetric, following, previous, fresh, new, count):
     """One pass of 2-opt over a route; whether it found any move."""
     improved = False
     for i in range(length - 1):
