@@ -35,8 +35,11 @@ def measure(case: Case, seconds: float, seed: int) -> str:
         tables = leg_tables(instance)
         weights = np.array([v.incentives * v.availability for v in instance.vehicles])
         began = time.process_time()
-        found = search(tables, weights, None, tuple(() for _ in weights), seed=seed,
-                       stop=lambda value, began=began: time.process_time() - began >= seconds)  # type: ignore[misc]
+
+        def stop(value: float, until: float = began + seconds) -> bool:  # noqa: ARG001
+            return time.process_time() >= until
+
+        found = search(tables, weights, None, tuple(() for _ in weights), seed=seed, stop=stop)
         used.append(time.process_time() - began)
         value = math.fsum(weights[m, j] for m, order in enumerate(found.orders) for j in order)
         off.append(100 * (best - value) / best)
