@@ -99,7 +99,7 @@ def _geographical(at: FloatArray) -> FloatArray:
     q2 = np.cos(latitude[:, None] - latitude[None])
     q3 = np.cos(latitude[:, None] + latitude[None])
     cosine = np.clip(0.5 * ((1.0 + q1) * q2 - (1.0 - q1) * q3), -1.0, 1.0)
-    return np.trunc(EARTH_KM * np.arccos(cosine) + 1.0)
+    return np.asarray(np.trunc(EARTH_KM * np.arccos(cosine) + 1.0))
 
 
 def _distances(at: FloatArray) -> FloatArray:
