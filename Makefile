@@ -49,6 +49,7 @@ clean:
 	rm -rf .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 bench-solver: setup  ## the speed that the solver promises, by class: takes an hour
+	$(BIN)/python -m benchmarks.solver.heuristic
 	$(BIN)/python -m benchmarks.solver.classes
 
 bench-paper: setup  ## a part of the paper's own table of runtimes: under ten minutes on an idle core

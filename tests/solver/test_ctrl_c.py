@@ -34,7 +34,7 @@ from sva_bench.solver.flow import branch_and_cut, lshaped
 from sva_bench.solver.preprocess import scope_of
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes import fronts as routes
-from sva_bench.solver.routes import heuristic
+from sva_bench.solver.routes import heuristic, long_routes
 from sva_bench.solver.two_stage import plan_averse, plan_deterministic, plan_stochastic
 
 SOON_S = 0.2  # from the outside: compiled code keeps this process from doing anything
@@ -79,7 +79,8 @@ def by(method: Method) -> Callable[[Instance], Plan]:
 
 
 @pytest.mark.parametrize(("where", "name", "instance", "solve"), [
-    (heuristic, "run_rounds", hard(pois=150), by("auto")),
+    (heuristic, "run_rounds", hard("B", 150), by("auto")),
+    (long_routes, "anneal", hard(pois=150), by("auto")),
     (column_generation, "best_routes", hard(), by("auto")),
     (column_generation, "best_routes", replace(hard(), failure="per_leg"), by("auto")),
     (column_generation, "best_routes", hard(vehicles=4), averse),
@@ -87,14 +88,17 @@ def by(method: Method) -> Callable[[Instance], Plan]:
     (branch_and_cut, "Relaxation", hard("B", 30, directed=False), by("dep")),
     (branch_and_cut, "Relaxation", hard(pois=150, directed=False), by("undirected")),
     (lshaped, "maximise", hard("B", 30, directed=False), by("lshaped")),
-], ids=["heuristic", "columns", "along the route", "risk", "directed model", "second stage", "edge model", "L-shaped"])
+], ids=["heuristic", "annealing", "columns", "along the route", "risk", "directed model", "second stage", "edge model",
+        "L-shaped"])
 def test_ctrl_c_keeps_the_best_plan_wherever_it_comes(
     where: object, name: str, instance: Instance, solve: Callable[[Instance], Plan], monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # The first rounds of the heuristic make a first plan.
-    at_call(monkeypatch, where, name, number=2 if where is heuristic else 1)
-    if where is not heuristic:
-        monkeypatch.setattr(heuristic, "ROUNDS", 20)  # it is not what is interrupted
+    searches = heuristic, long_routes
+    at_call(monkeypatch, where, name, number=2 if where in searches else 1)
+    if where not in searches:
+        for search in searches:
+            monkeypatch.setattr(search, "ROUNDS", 20)  # it is not what is interrupted
     plan = solve(instance)
     assert plan.status == "interrupted"
     assert plan.value is not None

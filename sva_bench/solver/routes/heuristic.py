@@ -1,4 +1,6 @@
-"""A good plan quickly: ruin and recreate from several starts, then the best combination of all routes found; no proof.
+"""A good plan quickly: a search from several starts, then the best combination of all routes found; no proof.
+
+Over many visits on long routes, where fuel can't bind, the search anneals; else it ruins and recreates.
 
 Deterministic: it counts iterations, and reads the clock only to stop early.
 """
@@ -7,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,12 +19,13 @@ from sva_bench.solver.polling import stop_flag
 from sva_bench.solver.routes.charged_fronts import FRONT
 from sva_bench.solver.routes.fronts import LegTables
 from sva_bench.solver.routes.local_search import improve_order
+from sva_bench.solver.routes.long_routes import guided, search_long, serves
 from sva_bench.solver.routes.packing import Route, best_packing
+from sva_bench.solver.routes.plans import Found, VisitOrders, as_arrays, as_orders
 from sva_bench.solver.routes.ruin_recreate import rounds as run_rounds
-from sva_bench.solver.routes.worth import worth_of
+from sva_bench.solver.routes.worth import Worth, worth_of
 
-VisitOrders = tuple[tuple[int, ...], ...]
-"""POIs of each vehicle, in order of visit."""
+__all__ = ["STARTS", "Found", "VisitOrders", "guided", "search", "shorten"]
 
 STARTS = 4
 ROUNDS = 1000  # iterations from each start
@@ -31,21 +33,11 @@ _LARGE = 120  # sites beyond which there are fewer iterations, as each takes lon
 _POOL = 5000  # routes kept of one start
 _CYCLE = 50  # iterations between two restarts, from the best plan or the empty one
 _HEAT = 0.03  # loss that is accepted at the start of a cycle, relative to the best value
+_PAIRS = 150  # POIs times vehicles beyond which the search anneals
+_LONG = 2.0  # mission limit, in longest legs, from which it does
+_LONG_STARTS = 2.5  # so many times as many starts: these instances take long to prove
 _POLLS = 4  # times that each start reads the clock
 _DETOUR = 0.01  # of the median leg; keeps the ratio finite for a POI that costs no detour
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Found:
-    """The result of the search.
-
-    Attributes:
-        orders: The best plan.
-        routes: The routes of greatest reduced cost in the set-packing relaxation, each with its vehicle.
-    """
-
-    orders: VisitOrders
-    routes: tuple[Route, ...]
 
 
 def search(
@@ -65,20 +57,49 @@ def search(
         stop: Whether to stop, given the best value so far.
         offer: Takes every better plan as it is found, since Ctrl-C ends the search.
     """
-    vehicles, n = weights.shape
-    best = start
-    routes: dict[Route, None] = {}
-    if not vehicles or not (weights > 0).any():
-        return Found(orders=best, routes=())
-    near, detour = _distances(tables)
+    if not len(weights) or not (weights > 0).any():
+        return Found(orders=start, routes=())
     worth = worth_of(tables, weights, discounts)
+    if _anneals(tables, worth):
+        best, routes = search_long(tables, weights, start, seed=seed, starts=round(_LONG_STARTS * starts), stop=stop,
+                                   offer=offer)
+    else:
+        best, routes = _ruin_and_recreate(tables, worth, start, seed, starts, stop, offer)
+    good: tuple[Route, ...] = ()
+    if not stop(worth.of(best)):
+        packed, good = best_packing(tables, worth, routes, best)
+        if worth.of(packed) > worth.of(best):
+            best = packed
+    return Found(orders=best, routes=good)
+
+
+def _anneals(tables: LegTables, worth: Worth) -> bool:
+    """Whether annealing is the better search, by measurement: over many visits on long routes where fuel can't bind.
+
+    With few it is no better than ruin and recreate; and short routes are proved by columns, for which more of them are
+    worth more than a better plan.
+    """
+    pairs = int((worth.weights > 0).any(axis=0).sum()) * len(worth.weights)
+    longest = float(tables.time_s[np.isfinite(tables.time_s)].max())
+    return (pairs > _PAIRS and bool(tables.limit_s.min() >= _LONG * longest) and serves(tables)
+            and not worth.discounted.any())
+
+
+def _ruin_and_recreate(
+    tables: LegTables, worth: Worth, start: VisitOrders, seed: int, starts: int, stop: Callable[[float], bool],
+    offer: Callable[[VisitOrders], None],
+) -> tuple[VisitOrders, tuple[Route, ...]]:
+    """A plan by ruin and recreate, for any instance, and the routes met, each with its vehicle class."""
+    n, weights, best = worth.weights.shape[1], worth.weights, start
+    routes: dict[Route, None] = {}
+    near, detour = _distances(tables)
     ordered = bool(worth.discounted.any())
     rounds = int(ROUNDS * min(1.0, (_LARGE / n) ** 1.5)) + 1
     for number in range(starts):
         if number and stop(worth.of(best)):
             break
         rng = np.random.default_rng((seed, number))
-        current, current_length = _as_arrays(start if number == 0 else tuple(() for _ in start), n)
+        current, current_length = as_arrays(start if number == 0 else tuple(() for _ in start), n)
         incumbent, incumbent_length = current.copy(), current_length.copy()
         pool = np.zeros((_POOL, n), np.int16)
         length, vehicle_class = np.zeros(_POOL, np.int64), np.zeros(_POOL, np.int64)
@@ -93,7 +114,7 @@ def search(
                     tables.limit_s, near, weights, worth.discounted, worth.survival, worth.departure, worth.home,
                     detour, current, current_length, incumbent, incumbent_length, pool, length, vehicle_class, size,
                     table, keys, ordered, stop_flag())
-                found = _as_orders(incumbent, incumbent_length)
+                found = as_orders(incumbent, incumbent_length)
                 if worth.of(found) > worth.of(best):
                     best = found
                     offer(best)
@@ -101,12 +122,7 @@ def search(
                 break
         routes.update(dict.fromkeys(
             (int(vehicle_class[k]), tuple(pool[k, :length[k]].tolist())) for k in range(size)))
-    good: tuple[Route, ...] = ()
-    if not stop(worth.of(best)):
-        packed, good = best_packing(tables, worth, tuple(routes), best)
-        if worth.of(packed) > worth.of(best):
-            best = packed
-    return Found(orders=best, routes=good)
+    return best, tuple(routes)
 
 
 def _distances(tables: LegTables) -> tuple[IntArray, float]:
@@ -120,7 +136,7 @@ def _distances(tables: LegTables) -> tuple[IntArray, float]:
 def shorten(tables: LegTables, orders: VisitOrders) -> VisitOrders:
     """The same visits in orders that are locally optimal in time, under 2-opt and Or-opt moves."""
     n = tables.fuel_s.shape[1]
-    array, length = _as_arrays(orders, n)
+    array, length = as_arrays(orders, n)
     spare, sums = np.zeros(n, np.int64), np.zeros((2, n + 2))
     with deferring_ctrl_c():
         for m, k in enumerate(tables.vehicle_class):
@@ -128,15 +144,4 @@ def shorten(tables: LegTables, orders: VisitOrders) -> VisitOrders:
                 improve_order(array[m], length[m], tables.base, tables.fuel_s[k], tables.time_s[k], tables.first[k],
                            tables.last[k], tables.hops, tables.capacity_s[k], tables.limit_s[k], np.zeros(n), False,
                            np.zeros((n, n)), 0.0, 0.0, np.zeros((4, FRONT)), spare, sums, stop_flag())
-    return _as_orders(array, length)
-
-
-def _as_arrays(orders: VisitOrders, n: int) -> tuple[IntArray, IntArray]:
-    array, length = np.zeros((len(orders), n), np.int64), np.array([len(order) for order in orders], dtype=np.int64)
-    for m, order in enumerate(orders):
-        array[m, :len(order)] = order
-    return array, length
-
-
-def _as_orders(array: IntArray, length: IntArray) -> VisitOrders:
-    return tuple(tuple(array[m, :length[m]].tolist()) for m in range(len(length)))
+    return as_orders(array, length)

@@ -13,6 +13,7 @@ from sva_bench.solver.polling import poll
 from sva_bench.solver.routes.charged_fronts import FRONT
 from sva_bench.solver.routes.fronts import fronts, route_time, time_with
 from sva_bench.solver.routes.local_search import improve_order, route_value
+from sva_bench.solver.routes.pool import keep
 
 _RUIN = 0.6  # greatest share of the visits removed
 _BAN = 0.7  # share of the iterations in which POIs are barred from a random vehicle
@@ -110,8 +111,8 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
         for m in range(vehicles):
             value += route_value(orders[m], lengths[m], base, weights[m], discounted[m], survival[m], departure[m],
                                  home[m])
-            pool_size = _keep(orders[m], lengths[m], vehicle_class[m], pool, pool_length, pool_class, pool_size,
-                              pool_table, keys, ordered)
+            pool_size = keep(orders[m], lengths[m], vehicle_class[m], pool, pool_length, pool_class, pool_size,
+                             pool_table, keys, ordered)
         if value > best_value + _EPSILON:
             best[:], best_length[:] = orders, lengths
             best_value = value
@@ -296,43 +297,3 @@ def _chances(order, length, base, weights, survival, home, chance, rest):
         chance[k + 1] = chance[k] * survival[base if k == 0 else order[k - 1], order[k]]
     for k in range(length - 1, -1, -1):
         rest[k + 1] = weights[order[k]] + survival[order[k], base if k == length - 1 else order[k + 1]] * rest[k + 2]
-
-
-@njit(cache=True)
-def _keep(order, length, vehicle_class, pool, pool_length, pool_class, size, table, keys, ordered):
-    """Put a route into the pool unless it is there or the pool is full; the size of the pool."""
-    if length == 0 or size == len(pool):
-        return size
-    code = np.uint64(vehicle_class + 1) * np.uint64(0x9E3779B97F4A7C15)
-    for k in range(length):
-        code += keys[order[k]] * np.uint64(k + 1) if ordered else keys[order[k]]
-    code ^= code >> np.uint64(29)
-    slot = np.int64(code % np.uint64(len(table)))
-    while table[slot] >= 0:
-        other = table[slot]
-        if pool_length[other] == length and pool_class[other] == vehicle_class and \
-                _same(pool[other], order, length, ordered):
-            return size
-        slot = (slot + 1) % len(table)
-    table[slot] = size
-    pool[size, :length] = order[:length]
-    pool_length[size], pool_class[size] = length, vehicle_class
-    return size + 1
-
-
-@njit(cache=True)
-def _same(one, other, length, ordered):
-    if ordered:
-        for k in range(length):  # noqa: SIM110 - all() takes seconds to compile
-            if one[k] != other[k]:
-                return False
-        return True
-    for k in range(length):
-        there = False
-        for i in range(length):
-            if one[k] == other[i]:
-                there = True
-                break
-        if not there:
-            return False
-    return True
