@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event, Thread
 from typing import Any, Literal
 
@@ -17,8 +17,15 @@ from sva_bench.solver.program import LinearModel, Rows
 _LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
 _AGGREGATOR = 1 << 12  # HiGHS's number of this rule of presolve
 _POLL_S = 0.1  # between two polls for Ctrl-C
+_NO_LIMIT = 2**31 - 1  # HiGHS's own
 
+EndOfSimplex = Literal["optimal", "cutoff", "infeasible", "iterations", "time_limit"]
 SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
+_ENDS: dict[Any, EndOfSimplex] = {
+    highspy.HighsModelStatus.kOptimal: "optimal", highspy.HighsModelStatus.kModelEmpty: "optimal",
+    highspy.HighsModelStatus.kObjectiveBound: "cutoff", highspy.HighsModelStatus.kInfeasible: "infeasible",
+    highspy.HighsModelStatus.kIterationLimit: "iterations", highspy.HighsModelStatus.kTimeLimit: "time_limit",
+}
 INTEGRALITY = 1e-9
 """How far from an integer a column may be, and a row from its bounds: legs last 20 s, and fuel must hold to 1e-6 s."""
 
@@ -126,6 +133,134 @@ class Relaxation:
                                  heuristics=0.05, has_integers=len(columns) > 0)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Basis:
+    """A basis of a ``Simplex``: what HiGHS holds, for as many rows as there were.
+
+    Attributes:
+        raw: HiGHS's basis.
+    """
+
+    raw: Any
+
+    def columns(self) -> IntArray:
+        """Status of each column, as HiGHS numbers it, shape (columns,)."""
+        return np.array([int(status) for status in self.raw.col_status], dtype=np.int64)
+
+    def rows(self) -> IntArray:
+        """Status of each row, shape (rows,)."""
+        return np.array([int(status) for status in self.raw.row_status], dtype=np.int64)
+
+    def row_count(self) -> int:
+        """Number of rows."""
+        return len(self.raw.row_status)
+
+    @classmethod
+    def of(cls, columns: IntArray, rows: IntArray) -> Basis:
+        """A basis from the status of each column and row; it need not be one, HiGHS repairs it."""
+        raw = highspy.HighsBasis()
+        raw.col_status = [_STATUSES[k] for k in columns.tolist()]
+        raw.row_status = [_STATUSES[k] for k in rows.tolist()]
+        raw.valid = raw.alien = True
+        return cls(raw=raw)
+
+
+_STATUSES = {int(status): status for status in highspy.HighsBasisStatus.__members__.values()}
+AT_LOWER, BASIC = int(highspy.HighsBasisStatus.kLower), int(highspy.HighsBasisStatus.kBasic)
+
+
+class Simplex:
+    """A linear program that is solved over and over by the dual simplex method, from bases of the caller's choice.
+
+    It maximises; HiGHS minimises the negative, as its bound on the objective works for minima alone.
+    """
+
+    def __init__(self, model: LinearModel) -> None:
+        self._solver = _open(replace(model, objective=-model.objective), maximises=False)
+        _option(self._solver, "presolve", "off")
+        self._entries = len(model.rows.value)
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add rows; they are basic."""
+        self._entries += len(rows.value)
+        _check(self._solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1],
+                                    rows.column, rows.value), "addRows")
+
+    def add_columns(self, objective: FloatArray, upper: FloatArray, start: IntArray, row: IntArray, value: FloatArray,
+                    ) -> None:
+        """Add columns from 0 up; they are at 0."""
+        self._entries += len(value)
+        _check(self._solver.addCols(len(objective), -objective, np.zeros(len(objective)), upper, len(value), start[:-1],
+                                    row, value), "addCols")
+
+    def set_bounds(self, columns: IntArray, lower: FloatArray, upper: FloatArray) -> None:
+        """Change the bounds of columns."""
+        _check(self._solver.changeColsBounds(len(columns), columns.astype(np.int32), lower, upper), "changeColsBounds")
+
+    def basis(self) -> Basis:
+        """The basis of the last solve."""
+        return Basis(raw=self._solver.getBasis())
+
+    def set_basis(self, basis: Basis) -> None:
+        """Start the next solve from a basis."""
+        _check(self._solver.setBasis(basis.raw), "setBasis")
+
+    def forget(self) -> None:
+        """Start the next solve from nothing."""
+        _check(self._solver.clearSolver(), "clearSolver")
+
+    def solve(self, time_limit_s: float, *, cutoff: float = -math.inf, iterations: int | None = None) -> EndOfSimplex:
+        """Solve from the basis; how it ended.
+
+        Args:
+            time_limit_s: Wall-clock limit [s]; ``inf`` = none.
+            cutoff: Objective below which the optimum is of no interest.
+            iterations: Iterations after which it stops; ``None`` = none.
+
+        Raises:
+            KeyboardInterrupt: If Ctrl-C is pressed during a large program.
+        """
+        _option(self._solver, "time_limit", time_limit_s)
+        _option(self._solver, "objective_bound", -cutoff)
+        _option(self._solver, "simplex_iteration_limit", _NO_LIMIT if iterations is None else iterations)
+        ended = self._run()
+        if ended is None:  # HiGHS gave up, which is rare: from nothing it finds its way
+            self.forget()
+            ended = self._run()
+        if ended is None:
+            raise RuntimeError("HiGHS: unexpected model status "
+                               f"{self._solver.modelStatusToString(self._solver.getModelStatus())}")
+        return ended
+
+    def _run(self) -> EndOfSimplex | None:
+        if self._entries < _LARGE:
+            self._solver.run()
+        else:
+            with deferring_ctrl_c():
+                interrupted = _run_interruptibly(self._solver, checked=False)
+            if interrupted:
+                raise KeyboardInterrupt
+        return _ENDS.get(self._solver.getModelStatus())
+
+    def objective(self) -> float:
+        """Objective at the end of the last solve: that of a relaxation where it stopped early."""
+        return -float(self._solver.getInfo().objective_function_value)
+
+    def values(self) -> FloatArray:
+        """Value of each column, shape (columns,)."""
+        return np.array(self._solver.getSolution().col_value)
+
+    def duals(self) -> FloatArray:
+        """Dual value of each row: gain in the objective per unit of its bound, shape (rows,)."""
+        return -np.array(self._solver.getSolution().row_dual)
+
+    def ray(self) -> FloatArray | None:
+        """Multipliers of the rows that prove an infeasible program infeasible, shape (rows,); ``None`` if there are
+        none at hand."""
+        _, there, values = self._solver.getDualRay()
+        return -np.array(values) if there else None
+
+
 def maximise(
     model: LinearModel, rows: Rows, *, gap: float, absolute_gap: float, time_limit_s: float,
     start: FloatArray | None = None, most_nodes: int | None = None, heuristics: float = 0.0,
@@ -208,7 +343,7 @@ class _Silent(highspy.Highs):  # type: ignore[misc]
         super().enableCallbacks()
 
 
-def _open(model: LinearModel) -> Any:
+def _open(model: LinearModel, *, maximises: bool = True) -> Any:
     """A solver that holds the model's linear relaxation."""
     solver = _Silent()
     # From 1.16 on HiGHS branches on several threads by default, and ties would depend on the machine.
@@ -221,7 +356,7 @@ def _open(model: LinearModel) -> Any:
     columns, rows = len(model.objective), model.rows
     program = highspy.HighsLp()
     program.num_col_, program.num_row_ = columns, len(rows.lower)
-    program.sense_ = highspy.ObjSense.kMaximize
+    program.sense_ = highspy.ObjSense.kMaximize if maximises else highspy.ObjSense.kMinimize
     program.col_cost_ = model.objective
     program.col_lower_, program.col_upper_ = np.zeros(columns), model.upper
     program.row_lower_, program.row_upper_ = rows.lower, rows.upper
@@ -233,7 +368,7 @@ def _open(model: LinearModel) -> Any:
     return solver
 
 
-def _run_interruptibly(solver: Any) -> bool:
+def _run_interruptibly(solver: Any, *, checked: bool = True) -> bool:
     """Run the solver in a thread, so that Ctrl-C cancels it at once; whether it did.
 
     Ctrl-C is then handled: the caller still uses what the solver has found.
@@ -259,7 +394,8 @@ def _run_interruptibly(solver: Any) -> bool:
     thread.join()
     if not ended:
         raise RuntimeError("HiGHS: the solve ended without a status")
-    _check(ended[0], "run")
+    if checked:
+        _check(ended[0], "run")
     return interrupted
 
 

@@ -12,6 +12,7 @@ from sva_bench import choices
 from sva_bench.choices import Method
 from sva_bench.errors import BadInput
 from sva_bench.solver.columns.prove import prove_by_columns
+from sva_bench.solver.edges.tree import prove_by_tree
 from sva_bench.solver.flow.branch_and_cut import prove_by_cuts
 from sva_bench.solver.flow.expected import DirectedModel
 from sva_bench.solver.flow.lshaped import prove_by_lshaped
@@ -59,6 +60,10 @@ def _directed(problem: Problem) -> None:
 
 
 def _undirected(problem: Problem) -> None:
+    prove_by_tree(problem)
+
+
+def _edge_mip(problem: Problem) -> None:
     prove_by_cuts(UndirectedModel(problem.instance, problem.scopes, problem.goal), problem)
 
 
@@ -81,6 +86,7 @@ _ALL = (
     SolutionMethod(name="relaxed", prove=_relaxed, second_stage=True),
     SolutionMethod(name="lshaped", prove=prove_by_lshaped, second_stage=True),
     SolutionMethod(name="undirected", prove=_undirected, serves=_is_undirected),
+    SolutionMethod(name="edge-mip", prove=_edge_mip, serves=_is_undirected),
     SolutionMethod(name="branch-and-price", prove=prove_by_columns, discounts=True, risk=True),
 )
 METHODS: Mapping[Method, SolutionMethod] = {method.name: method for method in _ALL}
