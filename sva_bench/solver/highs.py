@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass, replace
 from threading import Event, Thread
 from typing import Any, Literal
@@ -17,7 +18,8 @@ from sva_bench.solver.program import LinearModel, Rows
 _LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
 _AGGREGATOR = 1 << 12  # HiGHS's number of this rule of presolve
 _POLL_S = 0.1  # between two polls for Ctrl-C
-_NO_LIMIT = 2**31 - 1  # HiGHS's own
+_FEWEST_ITERATIONS, _MOST_ITERATIONS = 100, 5000  # of the simplex method, between two chances to hear Ctrl-C ...
+_WORK = 50_000_000  # ... and in between so many, divided by the entries of the program: some tenths of a second
 
 EndOfSimplex = Literal["optimal", "cutoff", "infeasible", "iterations", "time_limit"]
 SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
@@ -218,29 +220,30 @@ class Simplex:
             iterations: Iterations after which it stops; ``None`` = none.
 
         Raises:
-            KeyboardInterrupt: If Ctrl-C is pressed during a large program.
+            KeyboardInterrupt: If Ctrl-C is pressed, where it is heard.
         """
-        _option(self._solver, "time_limit", time_limit_s)
+        deadline = time.monotonic() + time_limit_s
         _option(self._solver, "objective_bound", -cutoff)
-        _option(self._solver, "simplex_iteration_limit", _NO_LIMIT if iterations is None else iterations)
-        ended = self._run()
-        if ended is None:  # HiGHS gave up, which is rare: from nothing it finds its way
-            self.forget()
-            ended = self._run()
-        if ended is None:
-            raise RuntimeError("HiGHS: unexpected model status "
-                               f"{self._solver.modelStatusToString(self._solver.getModelStatus())}")
-        return ended
-
-    def _run(self) -> EndOfSimplex | None:
-        if self._entries < _LARGE:
+        # Runs of a bounded number of iterations, after each of which Python hears of Ctrl-C.
+        at_a_time = max(_FEWEST_ITERATIONS, min(_MOST_ITERATIONS, _WORK // max(self._entries, 1)))
+        failed = False
+        while True:
+            left = at_a_time if iterations is None else min(iterations, at_a_time)
+            _option(self._solver, "simplex_iteration_limit", left)
+            _option(self._solver, "time_limit", max(deadline - time.monotonic(), 0.0))
             self._solver.run()
-        else:
-            with deferring_ctrl_c():
-                interrupted = _run_interruptibly(self._solver, checked=False)
-            if interrupted:
-                raise KeyboardInterrupt
-        return _ENDS.get(self._solver.getModelStatus())
+            ended = _ENDS.get(self._solver.getModelStatus())
+            if ended == "iterations":
+                iterations = None if iterations is None else iterations - left
+                if iterations is None or iterations > 0:
+                    continue
+            if ended is not None:
+                return ended
+            if failed:
+                raise RuntimeError("HiGHS: unexpected model status "
+                                   f"{self._solver.modelStatusToString(self._solver.getModelStatus())}")
+            self.forget()  # it gave up, which is rare: from nothing it finds its way
+            failed = True
 
     def objective(self) -> float:
         """Objective at the end of the last solve: that of a relaxation where it stopped early."""
@@ -368,7 +371,7 @@ def _open(model: LinearModel, *, maximises: bool = True) -> Any:
     return solver
 
 
-def _run_interruptibly(solver: Any, *, checked: bool = True) -> bool:
+def _run_interruptibly(solver: Any) -> bool:
     """Run the solver in a thread, so that Ctrl-C cancels it at once; whether it did.
 
     Ctrl-C is then handled: the caller still uses what the solver has found.
@@ -394,8 +397,7 @@ def _run_interruptibly(solver: Any, *, checked: bool = True) -> bool:
     thread.join()
     if not ended:
         raise RuntimeError("HiGHS: the solve ended without a status")
-    if checked:
-        _check(ended[0], "run")
+    _check(ended[0], "run")
     return interrupted
 
 

@@ -10,7 +10,7 @@ _ZERO = 1e-9  # residual capacity that counts as none
 
 @njit(cache=True)
 def minimum_cuts(n, ends, capacity, base, demand):
-    """Sets that enclose a site with less capacity across than the site demands.
+    """Sets that enclose a site with less capacity across than the site demands; compiled.
 
     For every site of positive demand whose maximum flow from the base falls short of it: the smallest and the largest
     of the sets S with the site, but without the base, across whose border that flow is the capacity.

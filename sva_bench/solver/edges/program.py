@@ -14,7 +14,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.solver.edges.box import Box
+from sva_bench.solver.edges.cut_duals import ACROSS, WITHIN, subtract_cuts
 from sva_bench.solver.flow.undirected import UndirectedModel
 from sva_bench.solver.highs import AT_LOWER, BASIC, Basis, EndOfSimplex, Simplex
 from sva_bench.solver.knowledge import Cut
@@ -22,7 +24,6 @@ from sva_bench.solver.program import LinearModel, RowBuilder, Rows
 
 _PROOF = 1e-9  # by how much multipliers of at most 1 must contradict themselves to prove a program infeasible
 _CUTOFF = 1e-6  # relative; the dual simplex method goes on for so much beyond the cutoff
-_WITHIN, _ACROSS, _OUTSIDE = range(3)  # over which edges a cut is written
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,10 +69,12 @@ class EdgeProgram:
         self.solves = 0
         rows, count = flow.model.rows, len(objective)
         self._matrix = csr_array((rows.value, rows.column, rows.start), shape=(len(rows.lower), count))
+        self._transposed = self._matrix.T.tocsr()
         self._place = np.full(count, -1)
         self._place[columns] = np.arange(len(columns))
-        self._inside: list[BoolArray] = []
-        self._over: list[int] = []
+        # Of the cuts; grown ahead of their number.
+        self._inside: BoolArray = np.zeros((64, flow.edge.shape[1]), dtype=np.bool_)
+        self._of, self._poi, self._over = (np.zeros(64, dtype=np.int64) for _ in range(3))
         self._simplex = Simplex(LinearModel(
             objective=objective[columns], upper=flow.model.upper[columns], integer=np.zeros(len(columns), np.bool_),
             rows=_part(rows, self._place)))
@@ -106,32 +109,39 @@ class EdgeProgram:
             over = int(np.argmin(sizes))
             visit = int(self._place[visits[cut.poi]])
             used = mine[count == 2 - over]
-            if over == _ACROSS:
+            if over == ACROSS:
                 build.add([*used, visit], [1.0] * len(used) + [-2.0], 0.0, np.inf)
-            elif over == _WITHIN:
+            elif over == WITHIN:
                 minus = self._place[visits[others]]
                 build.add([*used, *minus], [1.0] * len(used) + [-1.0] * len(minus), -np.inf, 0.0)
             else:
                 minus = self._place[[*visits[there & ~inside], self.flow.leaves[cut.vehicle]]]
                 build.add([*used, *minus, visit], [1.0] * len(used) + [-1.0] * len(minus) + [1.0], -np.inf, 0.0)
-            self._inside.append(inside)
-            self._over.append(over)
-        self.cuts += cuts
+            self._note(cut, inside, over)
         if len(cuts):
             self._simplex.add_rows(build.rows())
+
+    def _note(self, cut: Cut, inside: BoolArray, over: int) -> None:
+        """Keep a cut as arrays."""
+        if len(self.cuts) == len(self._of):
+            self._inside = np.concatenate([self._inside, np.zeros_like(self._inside)])
+            self._of, self._poi, self._over = (np.concatenate([a, np.zeros_like(a)])
+                                               for a in (self._of, self._poi, self._over))
+        k = len(self.cuts)
+        self._inside[k], self._of[k], self._poi[k], self._over[k] = inside, cut.vehicle, cut.poi, over
+        self.cuts.append(cut)
 
     def add_columns(self, columns: IntArray) -> None:
         """Add columns of the model that are edges."""
         part = self._matrix[:, columns].tocsc()
         first = len(self.flow.model.rows.lower)
         build = RowBuilder()
-        inside = np.array(self._inside).reshape(len(self.cuts), self.flow.edge.shape[1])
-        over = np.array(self._over, dtype=np.int64)
-        of = np.array([cut.vehicle for cut in self.cuts], dtype=np.int64)
+        count = len(self.cuts)
+        inside, over, of = self._inside[:count], self._over[:count], self._of[:count]
         for k, column in enumerate(columns):
             i, j = self.flow.ends[column]
-            count = inside[:, i].astype(np.int64) + inside[:, j]
-            own = np.flatnonzero((of == self.flow.vehicle[column]) & (count == 2 - over))
+            within = inside[:, i].astype(np.int64) + inside[:, j]
+            own = np.flatnonzero((of == self.flow.vehicle[column]) & (within == 2 - over))
             rows = part.indices[part.indptr[k]:part.indptr[k + 1]]
             build.add([*rows, *(first + own)], [*part.data[part.indptr[k]:part.indptr[k + 1]], *np.ones(len(own))],
                       0.0, 0.0)
@@ -213,37 +223,16 @@ class EdgeProgram:
         rows, count = self.flow.model.rows, len(self.flow.model.rows.lower)
         y, of_cuts = duals[:count], duals[count:]
         y = np.where(((y > 0) & np.isinf(rows.upper)) | ((y < 0) & np.isinf(rows.lower)), 0.0, y)
-        over = np.array(self._over, dtype=np.int64)
-        of_cuts = np.where(over == _ACROSS, np.minimum(of_cuts, 0.0), np.maximum(of_cuts, 0.0))
-        reduced = objective - self._matrix.T @ y - self._of_cuts(of_cuts, over)
+        over = self._over[:len(self.cuts)]
+        of_cuts = np.where(over == ACROSS, np.minimum(of_cuts, 0.0), np.maximum(of_cuts, 0.0))
+        reduced: FloatArray = objective - self._transposed @ y
+        edges = np.flatnonzero((self._box.upper > 0) & (self.flow.ends[:, 0] >= 0))
+        with deferring_ctrl_c():
+            subtract_cuts(edges, self.flow.ends, self.flow.vehicle, self.flow.visit, self.flow.leaves, self._of,
+                          self._inside, self._poi, over, of_cuts, reduced)
         at = np.where(y > 0, rows.upper, np.where(y < 0, rows.lower, 0.0))
-        bound = float(y @ at) + float(np.where(reduced > 0, self._box.upper, self._box.lower) @ reduced)
+        bound = float((y * at).sum()) + float((np.where(reduced > 0, self._box.upper, self._box.lower) * reduced).sum())
         return bound, reduced
-
-    def _of_cuts(self, duals: FloatArray, over: IntArray) -> FloatArray:
-        """Products of the cuts' columns with their duals, shape (columns,)."""
-        flow = self.flow
-        product = np.zeros(len(self.objective))
-        used = np.flatnonzero(duals)
-        for m in range(len(flow.leaves)):
-            own = np.array([k for k in used if self.cuts[k].vehicle == m], dtype=np.int64)
-            if not len(own):
-                continue
-            y, form = duals[own], over[own]
-            inside = np.array([self._inside[k] for k in own], dtype=np.float64)
-            poi = np.array([self.cuts[k].poi for k in own])
-            outside = y * (form == _OUTSIDE)
-            pairs = inside.T @ (np.where(form == _ACROSS, -2 * y, y)[:, None] * inside)
-            single = (y * (form == _ACROSS) - outside) @ inside
-            edges = pairs + single[:, None] + single[None, :] + outside.sum()
-            mine = np.flatnonzero((flow.vehicle == m) & (flow.ends[:, 0] >= 0))
-            product[mine] = edges[flow.ends[mine, 0], flow.ends[mine, 1]]
-            visits = -(y * (form == _WITHIN)) @ inside - outside @ (1 - inside)
-            np.add.at(visits, poi, np.where(form == _ACROSS, -2 * y, y))
-            there = flow.visit[m] >= 0
-            product[flow.visit[m, there]] = visits[there]
-            product[flow.leaves[m]] = -outside.sum()
-        return product
 
     def warm_start(self) -> WarmStart:
         """The basis of the last solve."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+from sva_bench.interrupts import deferring_ctrl_c
 from sva_bench.solver.edges.max_flow import minimum_cuts
 from sva_bench.solver.flow.undirected import UndirectedModel
 from sva_bench.solver.knowledge import Cut
@@ -28,7 +29,8 @@ def violated_cuts(flow: UndirectedModel, values: FloatArray, *, tolerance: float
         mine = used[flow.vehicle[used] == m]
         visits = np.where(visit >= 0, values[visit], 0.0)
         demand = 2 * (visits - tolerance)
-        sets, across = minimum_cuts(n, flow.ends[mine], values[mine], flow.base, demand)
+        with deferring_ctrl_c():
+            sets, across = minimum_cuts(n, flow.ends[mine], values[mine], flow.base, demand)
         if not len(sets):
             continue
         poi = np.where(sets, visits[None, :], -1.0).argmax(axis=1)  # the cut that S violates most

@@ -33,7 +33,7 @@ _MOST_CUTS = 20  # of a vehicle in a round
 _ROUNDS = 8  # of cuts at a node
 _STALL = 0.02  # of the node's gap: a round that gains less counts as idle
 _IDLE_ROUNDS = 2
-_SPARE_CUTS = 0.7  # of the model's rows: so many more than after the last purge cause another
+_SPARE_CUTS = 1.2  # of the model's rows: so many more than after the last purge cause another
 GUIDED = {1: 4, 2: 2, 6: 2, 11: 2}
 """Searches of the heuristic at a node, by its number."""
 GUIDED_EVERY = 25
