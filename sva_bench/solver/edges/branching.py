@@ -31,12 +31,14 @@ class Branch:
     Attributes:
         column: The column that divides it.
         least: Its least value in the upper part; it is below in the lower part.
-        gains: What the relaxation loses in the lower and in the upper part, estimated.
+        losses: What the relaxation loses in the lower and in the upper part, estimated.
+        bounds: Upper bounds on the parts; ``inf`` = unknown.
     """
 
     column: int
     least: int
-    gains: tuple[float, float]
+    losses: tuple[float, float]
+    bounds: tuple[float, float]
 
 
 class PseudoCosts:
@@ -100,7 +102,7 @@ def choose(
     empty: list[tuple[int, int, bool]] = []
     for k in order:
         column, least = int(columns[k]), math.floor(values[columns[k]]) + 1
-        losses = estimate[:, k].copy()
+        losses, bounds = estimate[:, k].copy(), [math.inf, math.inf]
         if not costs.is_reliable(column) and probed < _CANDIDATES and in_vain < _LOOKAHEAD and not clock.is_over():
             warm = warm or program.warm_start()
             probed += 1
@@ -108,7 +110,7 @@ def choose(
                 program.start_from(warm)
                 lower, upper = int(box.lower[column]), int(box.upper[column])
                 lower, upper = (lower, least - 1) if side == 0 else (least, upper)
-                end, objective = program.probe(column, lower, upper, cutoff, _ITERATIONS, clock.left_s())
+                end, objective, bounds[side] = program.probe(column, lower, upper, cutoff, _ITERATIONS, clock.left_s())
                 if end in ("infeasible", "cutoff"):  # both are proved; at its limit of iterations it proves nothing
                     empty.append((column, least, side == 1))
                     losses[side] = gap
@@ -118,7 +120,8 @@ def choose(
                     costs.learn(side, column, bound - objective, fraction[k] if side == 0 else 1 - fraction[k])
         score = float(_score(losses[:, None], gap)[0])
         if score > best_score:
-            best, best_score, in_vain = Branch(column=column, least=least, gains=(losses[0], losses[1])), score, 0
+            best, best_score, in_vain = Branch(column=column, least=least, losses=(losses[0], losses[1]),
+                                               bounds=(bounds[0], bounds[1])), score, 0
         else:
             in_vain += 1
     if warm is not None:

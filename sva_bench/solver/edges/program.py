@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c
@@ -133,21 +133,13 @@ class EdgeProgram:
 
     def add_columns(self, columns: IntArray) -> None:
         """Add columns of the model that are edges."""
-        part = self._matrix[:, columns].tocsc()
-        first = len(self.flow.model.rows.lower)
-        build = RowBuilder()
         count = len(self.cuts)
-        inside, over, of = self._inside[:count], self._over[:count], self._of[:count]
-        for k, column in enumerate(columns):
-            i, j = self.flow.ends[column]
-            within = inside[:, i].astype(np.int64) + inside[:, j]
-            own = np.flatnonzero((of == self.flow.vehicle[column]) & (within == 2 - over))
-            rows = part.indices[part.indptr[k]:part.indptr[k + 1]]
-            build.add([*rows, *(first + own)], [*part.data[part.indptr[k]:part.indptr[k + 1]], *np.ones(len(own))],
-                      0.0, 0.0)
-        entries = build.rows()
-        self._simplex.add_columns(self.objective[columns], self.flow.model.upper[columns], entries.start,
-                                  entries.column, entries.value)
+        inside = self._inside[:count].astype(np.int64)
+        within = inside[:, self.flow.ends[columns, 0]] + inside[:, self.flow.ends[columns, 1]]
+        in_cut = (self._of[:count, None] == self.flow.vehicle[columns]) & (within == 2 - self._over[:count, None])
+        entries = vstack([self._matrix[:, columns], csr_array(in_cut.astype(np.float64))]).tocsc()
+        self._simplex.add_columns(self.objective[columns], self.flow.model.upper[columns],
+                                  entries.indptr.astype(np.int64), entries.indices.astype(np.int64), entries.data)
         self._place[columns] = len(self.columns) + np.arange(len(columns))
         self.columns = np.concatenate([self.columns, columns])
         at = self._place[columns]
@@ -185,11 +177,11 @@ class EdgeProgram:
         return Solved(status="unclear", bound=np.inf, values=nothing, reduced=nothing)
 
     def probe(self, column: int, lower: int, upper: int, cutoff: float, iterations: int, left_s: float,
-              ) -> tuple[EndOfSimplex, float]:
-        """Change the bounds of a column and solve a few iterations: how it ended, and the objective by then.
+              ) -> tuple[EndOfSimplex, float, float]:
+        """Change the bounds of a column and solve a few iterations: how it ended, the objective by then, and a bound.
 
-        Ends as ``cutoff`` and ``infeasible`` are checked; else they become ``iterations``, which proves nothing. The
-        bounds are restored, the basis isn't.
+        Ends as ``cutoff`` and ``infeasible`` are checked; else they become ``iterations``, which proves nothing: its
+        bound is ``inf``. The column's bounds are restored, the basis isn't.
         """
         at = self._place[[column]]
         before, self._box = self._box, Box(lower=self._box.lower.copy(), upper=self._box.upper.copy())
@@ -200,10 +192,12 @@ class EdgeProgram:
             value = self._simplex.objective()
             if end == "infeasible" and not self._is_infeasible():
                 end = "iterations"
-            if end in ("cutoff", "optimal"):
-                is_empty = value <= cutoff and self._bound(self._simplex.duals(), self.objective)[0] <= cutoff
-                end = "cutoff" if is_empty else "optimal" if end == "optimal" else "iterations"
-            return end, value
+            if end not in ("cutoff", "optimal"):
+                return end, value, np.inf
+            bound, _ = self._bound(self._simplex.duals(), self.objective)
+            if bound <= cutoff:
+                return "cutoff", value, bound
+            return ("optimal", value, bound) if end == "optimal" else ("iterations", value, np.inf)
         finally:
             self._box = before
             self._simplex.set_bounds(at, before.lower[[column]].astype(np.float64),

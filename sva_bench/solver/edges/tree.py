@@ -77,6 +77,7 @@ def prove_by_tree(problem: Problem, guide: Guide | None = None, inspect: Inspect
         root = solve_root(incumbent, flow.model.objective / size)
         progress.seconds["root"], began = clock.used_s() - began, clock.used_s()
         if root is not None:
+            problem.known.cuts.update(dict.fromkeys(root[0].cuts))
             tree = Tree(incumbent, *root)
             tree.run()
         incumbent.tighten(-math.inf)
@@ -87,7 +88,6 @@ def prove_by_tree(problem: Problem, guide: Guide | None = None, inspect: Inspect
         if tree is not None:
             progress.rounds += tree.program.solves
             progress.cuts = len(tree.program.cuts)
-            problem.known.cuts.update(dict.fromkeys(tree.program.cuts))
 
 
 class Tree:
@@ -127,15 +127,16 @@ class Tree:
             bounds = [each.bound for each in self._open] + [each.bound for each in [following] if each]
             self._incumbent.tighten(max(bounds, default=-math.inf))
             if _log.isEnabledFor(logging.DEBUG) and number % 20 == 0:
-                _log.debug("node %d: bound %.6g, value %.6g, %d open, %d cuts", number, progress.bound,
-                           progress.value, len(self._open), len(self.program.cuts))
+                _log.debug("node %d: bound %.6g, value %.6g, gap %.2f %%, %d open, %d cuts", number, progress.bound,
+                           progress.value, 100 * (progress.bound / progress.value - 1) if progress.value else math.nan,
+                           len(self._open), len(self.program.cuts))
             if progress.closed(problem.gap):
                 return
 
     def _next(self) -> Node | None:
-        """The open node of best estimate, taken off the list."""
+        """The open node of greatest bound, taken off the list."""
         while self._open:
-            node = max(self._open, key=lambda each: each.estimate)
+            node = max(self._open, key=lambda each: (each.bound, each.estimate))
             self._open.remove(node)
             if node.bound > self._incumbent.cutoff:
                 return node
@@ -229,8 +230,9 @@ class Tree:
 
     def _children(self, box: Box, bound: float, branch: Branch) -> list[Node]:
         warm = self.program.warm_start()
-        return [Node(box=part, bound=bound, estimate=bound - max(loss, 0.0), warm=warm)
-                for part, loss in zip(box.split(branch.column, branch.least), branch.gains, strict=True)]
+        return [Node(box=part, bound=min(bound, own), estimate=bound - max(loss, 0.0), warm=warm)
+                for part, loss, own in zip(box.split(branch.column, branch.least), branch.losses, branch.bounds,
+                                           strict=True)]
 
     def _halves(self, box: Box, bound: float) -> list[Node]:
         """Divide a node by a column that is not fixed, whichever; if there is none, its point is no plan."""
