@@ -103,7 +103,7 @@ class Relaxation:
         Raises:
             KeyboardInterrupt: If Ctrl-C is pressed during a large program.
         """
-        _option(self._solver, "time_limit", time_limit_s)
+        _limit(self._solver, time_limit_s)
         if self._entries < _LARGE:
             _check(self._solver.run(), "run")
         else:
@@ -230,7 +230,7 @@ class Simplex:
         while True:
             left = at_a_time if iterations is None else min(iterations, at_a_time)
             _option(self._solver, "simplex_iteration_limit", left)
-            _option(self._solver, "time_limit", max(deadline - time.monotonic(), 0.0))
+            _limit(self._solver, max(deadline - time.monotonic(), 0.0))
             self._solver.run()
             ended = _ENDS.get(self._solver.getModelStatus())
             if ended == "iterations":
@@ -413,6 +413,11 @@ def _status(solver: Any) -> SolveStatus:
     if status == kinds.kInterrupt:
         return "interrupted"
     raise RuntimeError(f"HiGHS: unexpected model status {solver.modelStatusToString(status)}")
+
+
+def _limit(solver: Any, time_limit_s: float) -> None:
+    """Limit the time of the next run of a linear program, which HiGHS adds to that of the runs before."""
+    _option(solver, "time_limit", solver.getRunTime() + time_limit_s)
 
 
 def _option(solver: Any, name: str, value: bool | int | float | str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -310,6 +311,16 @@ def test_the_heuristic_is_asked_near_relaxations_and_its_plan_is_taken() -> None
     assert problem.progress.value == pytest.approx(best.value, rel=1e-9)
     assert asked
     assert all(allowed.shape == goal.weights.shape and 0 < allowed.sum() < allowed.size for allowed in asked)
+
+
+def test_the_time_limit_of_a_solve_is_not_used_up_by_those_before_it() -> None:
+    instance, goal = long_routes(60)
+    problem = problem_of(instance, goal)
+    model = UndirectedModel(instance, problem.scopes, problem.goal, linked=False).model
+    simplex, spent = Simplex(model), time.monotonic()
+    while time.monotonic() < spent + 2.0:  # each takes some hundredths of a second
+        simplex.forget()
+        assert simplex.solve(1.0) == "optimal"
 
 
 def test_a_time_limit_keeps_the_plan_and_a_bound() -> None:
