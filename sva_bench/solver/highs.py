@@ -13,7 +13,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c, heard_ctrl_c, pressed
-from sva_bench.solver.program import LinearModel, Rows
+from sva_bench.solver.program import LinearModel, MipResult, Relaxed, Rows, SolveStatus
 
 _LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
 _AGGREGATOR = 1 << 12  # HiGHS's number of this rule of presolve
@@ -22,7 +22,6 @@ _FEWEST_ITERATIONS, _MOST_ITERATIONS = 100, 5000  # of the simplex method, betwe
 _WORK = 50_000_000  # ... and in between so many, divided by the entries of the program: some tenths of a second
 
 EndOfSimplex = Literal["optimal", "cutoff", "infeasible", "iterations", "time_limit"]
-SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
 _ENDS: dict[Any, EndOfSimplex] = {
     highspy.HighsModelStatus.kOptimal: "optimal", highspy.HighsModelStatus.kModelEmpty: "optimal",
     highspy.HighsModelStatus.kObjectiveBound: "cutoff", highspy.HighsModelStatus.kInfeasible: "infeasible",
@@ -30,46 +29,6 @@ _ENDS: dict[Any, EndOfSimplex] = {
 }
 INTEGRALITY = 1e-9
 """How far from an integer a column may be, and a row from its bounds: legs last 20 s, and fuel must hold to 1e-6 s."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MipResult:
-    """The result of a mixed-integer program.
-
-    Attributes:
-        status: How it ended.
-        values: The best point found, shape (columns,); ``None`` if none was.
-        objective: Its objective; ``-inf`` if none was found.
-        bound: Upper bound on the objective; ``inf`` if none is known.
-        nodes: Branch-and-bound nodes.
-    """
-
-    status: SolveStatus
-    values: FloatArray | None
-    objective: float
-    bound: float
-    nodes: int
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Relaxed:
-    """The optimum of a linear program.
-
-    Attributes:
-        status: How it ended.
-        values: The optimum, shape (columns,); ``None`` if there is none, or it was not reached.
-        objective: Its objective; ``-inf`` if there is none, ``inf`` if it was not reached.
-        reduced: Reduced cost of each column, positive where raising it would improve the objective, shape (columns,).
-        activity: Value of each row, shape (rows,).
-        duals: Dual value of each row: gain in the objective per unit of its bound, shape (rows,).
-    """
-
-    status: SolveStatus
-    values: FloatArray | None
-    objective: float
-    reduced: FloatArray
-    activity: FloatArray
-    duals: FloatArray
 
 
 class Relaxation:
