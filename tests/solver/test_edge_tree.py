@@ -313,6 +313,14 @@ def test_the_heuristic_is_asked_near_relaxations_and_its_plan_is_taken() -> None
     assert all(allowed.shape == goal.weights.shape and 0 < allowed.sum() < allowed.size for allowed in asked)
 
 
+def test_a_plan_of_the_heuristic_that_no_vehicle_can_drive_is_not_believed() -> None:
+    instance, goal = long_routes(20)
+    best = proved(by_highs, instance, goal, None)
+    problem = problem_of(instance, goal)
+    prove_by_tree(problem, lambda allowed: (instance.pois, *[()] * (len(allowed) - 1)))
+    assert problem.progress.value == pytest.approx(best.value, rel=1e-9)
+
+
 def test_the_time_limit_of_a_solve_is_not_used_up_by_those_before_it() -> None:
     instance, goal = long_routes(60)
     problem = problem_of(instance, goal)

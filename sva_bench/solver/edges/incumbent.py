@@ -90,7 +90,7 @@ class Incumbent:
         """
         instance, goal, known = self.problem.instance, self.problem.goal, self.problem.known
         driven = tuple(self.flow.order(values, m) for m in range(len(instance.vehicles)))
-        if any(quickest_route(legs, order) is None for legs, order in zip(known.legs_by_vehicle, driven, strict=True)):
+        if not self._is_feasible(driven):
             return False  # by less than tolerances: its node is divided further
         before = self.problem.progress.value
         short = tuple(without_idle_stops(legs, order, goal.rewarded()[m]) for m, (legs, order) in
@@ -104,6 +104,11 @@ class Incumbent:
         return bound - own <= _EXACT * max(abs(bound), abs(own)) and bool(
             self.problem.progress.value / self.size >= own - _EXACT * abs(own))
 
+    def _is_feasible(self, orders: VisitOrders) -> bool:
+        """Whether every vehicle has a route over its POIs."""
+        return all(quickest_route(legs, order) is not None
+                   for legs, order in zip(self.problem.known.legs_by_vehicle, orders, strict=True))
+
     def search(self, values: FloatArray, times: int) -> None:
         """Let the heuristic look for plans near a relaxation's optimum."""
         if self.guide is None:
@@ -115,7 +120,7 @@ class Incumbent:
             if self.problem.clock.is_over():
                 return
             found = self.guide(allowed)
-            if found is not None:
+            if found is not None and self._is_feasible(found):  # a wrong incumbent would be a wrong proof
                 adopt(self.problem.progress, self.problem.goal, self.problem.known, found)
         if self.problem.progress.value > before:
             self._improved()
