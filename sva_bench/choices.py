@@ -42,7 +42,7 @@ PlanObjective = Literal["stochastic", "deterministic", "cvar", "excess", "antici
 """What a plan was made for; ``cvar`` and ``excess`` are the stochastic objective with a risk, and ``anticipative`` is
 the value with a reaction."""
 RiskKind = Literal["cvar", "excess"]
-Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "branch-and-price"]
+Method = Literal["auto", "expected", "dep", "relaxed", "lshaped", "undirected", "edge-mip", "branch-and-price"]
 METHODS: Mapping[Method, str] = {
     "auto": "chooses by the instance",
     "expected": "the collapsed model by branch and cut, a column for each leg",
@@ -50,6 +50,7 @@ METHODS: Mapping[Method, str] = {
     "relaxed": "the same with the recourse relaxed",
     "lshaped": "the paper's L-shaped method",
     "undirected": "the collapsed model with a column for each edge, for symmetric costs without refuelling",
+    "edge-mip": "the same with HiGHS's own branch and bound",
     "branch-and-price": "routes as columns",
 }
 """How a plan is proved, in a few words each."""

@@ -45,7 +45,7 @@ CASES = (
     Case(name="A-30", family="A", pois=30, vehicles=2, limit_s=10),
     Case(name="A-60", family="A", pois=60, vehicles=2, limit_s=10),
     Case(name="A-100", family="A", pois=100, vehicles=2, limit_s=90),
-    Case(name="A-200", family="A", pois=200, vehicles=2, limit_s=180, seeds=1),
+    Case(name="A-200", family="A", pois=200, vehicles=2, limit_s=180),
     Case(name="A-60-M4", family="A", pois=60, vehicles=4, limit_s=90),
     Case(name="B-30", family="B", pois=30, vehicles=2, limit_s=4),
     Case(name="B-40", family="B", pois=40, vehicles=2, limit_s=40),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from threading import Event, Thread
 from typing import Any, Literal
 
@@ -12,55 +13,22 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.interrupts import deferring_ctrl_c, heard_ctrl_c, pressed
-from sva_bench.solver.program import LinearModel, Rows
+from sva_bench.solver.program import LinearModel, MipResult, Relaxed, Rows, SolveStatus
 
 _LARGE = 20_000  # entries of a linear program that may take long enough to be interrupted
 _AGGREGATOR = 1 << 12  # HiGHS's number of this rule of presolve
 _POLL_S = 0.1  # between two polls for Ctrl-C
+_FEWEST_ITERATIONS, _MOST_ITERATIONS = 100, 5000  # of the simplex method, between two chances to hear Ctrl-C ...
+_WORK = 50_000_000  # ... and in between so many, divided by the entries of the program: some tenths of a second
 
-SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
+EndOfSimplex = Literal["optimal", "cutoff", "infeasible", "iterations", "time_limit"]
+_ENDS: dict[Any, EndOfSimplex] = {
+    highspy.HighsModelStatus.kOptimal: "optimal", highspy.HighsModelStatus.kModelEmpty: "optimal",
+    highspy.HighsModelStatus.kObjectiveBound: "cutoff", highspy.HighsModelStatus.kInfeasible: "infeasible",
+    highspy.HighsModelStatus.kIterationLimit: "iterations", highspy.HighsModelStatus.kTimeLimit: "time_limit",
+}
 INTEGRALITY = 1e-9
 """How far from an integer a column may be, and a row from its bounds: legs last 20 s, and fuel must hold to 1e-6 s."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MipResult:
-    """The result of a mixed-integer program.
-
-    Attributes:
-        status: How it ended.
-        values: The best point found, shape (columns,); ``None`` if none was.
-        objective: Its objective; ``-inf`` if none was found.
-        bound: Upper bound on the objective; ``inf`` if none is known.
-        nodes: Branch-and-bound nodes.
-    """
-
-    status: SolveStatus
-    values: FloatArray | None
-    objective: float
-    bound: float
-    nodes: int
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Relaxed:
-    """The optimum of a linear program.
-
-    Attributes:
-        status: How it ended.
-        values: The optimum, shape (columns,); ``None`` if there is none, or it was not reached.
-        objective: Its objective; ``-inf`` if there is none, ``inf`` if it was not reached.
-        reduced: Reduced cost of each column, positive where raising it would improve the objective, shape (columns,).
-        activity: Value of each row, shape (rows,).
-        duals: Dual value of each row: gain in the objective per unit of its bound, shape (rows,).
-    """
-
-    status: SolveStatus
-    values: FloatArray | None
-    objective: float
-    reduced: FloatArray
-    activity: FloatArray
-    duals: FloatArray
 
 
 class Relaxation:
@@ -94,7 +62,7 @@ class Relaxation:
         Raises:
             KeyboardInterrupt: If Ctrl-C is pressed during a large program.
         """
-        _option(self._solver, "time_limit", time_limit_s)
+        _limit(self._solver, time_limit_s)
         if self._entries < _LARGE:
             _check(self._solver.run(), "run")
         else:
@@ -124,6 +92,135 @@ class Relaxation:
         _set_integer(self._solver, columns)
         return _branch_and_bound(self._solver, gap=0.0, absolute_gap=1e-6, time_limit_s=time_limit_s, most_nodes=None,
                                  heuristics=0.05, has_integers=len(columns) > 0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Basis:
+    """A basis of a ``Simplex``: what HiGHS holds, for as many rows as there were.
+
+    Attributes:
+        raw: HiGHS's basis.
+    """
+
+    raw: Any
+
+    def columns(self) -> IntArray:
+        """Status of each column, as HiGHS numbers it, shape (columns,)."""
+        return np.array([int(status) for status in self.raw.col_status], dtype=np.int64)
+
+    def rows(self) -> IntArray:
+        """Status of each row, shape (rows,)."""
+        return np.array([int(status) for status in self.raw.row_status], dtype=np.int64)
+
+    def row_count(self) -> int:
+        """Number of rows."""
+        return len(self.raw.row_status)
+
+    @classmethod
+    def of(cls, columns: IntArray, rows: IntArray) -> Basis:
+        """A basis from the status of each column and row; it need not be one, HiGHS repairs it."""
+        raw = highspy.HighsBasis()
+        raw.col_status = [_STATUSES[k] for k in columns.tolist()]
+        raw.row_status = [_STATUSES[k] for k in rows.tolist()]
+        raw.valid = raw.alien = True
+        return cls(raw=raw)
+
+
+_STATUSES = {int(status): status for status in highspy.HighsBasisStatus.__members__.values()}
+AT_LOWER, BASIC = int(highspy.HighsBasisStatus.kLower), int(highspy.HighsBasisStatus.kBasic)
+
+
+class Simplex:
+    """A linear program that is solved over and over by the dual simplex method, from bases of the caller's choice.
+
+    It maximises; HiGHS minimises the negative, as its bound on the objective works for minima alone.
+    """
+
+    def __init__(self, model: LinearModel) -> None:
+        self._solver = _open(replace(model, objective=-model.objective), maximises=False)
+        _option(self._solver, "presolve", "off")
+        self._entries = len(model.rows.value)
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add rows; they are basic."""
+        self._entries += len(rows.value)
+        _check(self._solver.addRows(len(rows.lower), rows.lower, rows.upper, len(rows.value), rows.start[:-1],
+                                    rows.column, rows.value), "addRows")
+
+    def add_columns(self, objective: FloatArray, upper: FloatArray, start: IntArray, row: IntArray, value: FloatArray,
+                    ) -> None:
+        """Add columns from 0 up; they are at 0."""
+        self._entries += len(value)
+        _check(self._solver.addCols(len(objective), -objective, np.zeros(len(objective)), upper, len(value), start[:-1],
+                                    row, value), "addCols")
+
+    def set_bounds(self, columns: IntArray, lower: FloatArray, upper: FloatArray) -> None:
+        """Change the bounds of columns."""
+        _check(self._solver.changeColsBounds(len(columns), columns.astype(np.int32), lower, upper), "changeColsBounds")
+
+    def basis(self) -> Basis:
+        """The basis of the last solve."""
+        return Basis(raw=self._solver.getBasis())
+
+    def set_basis(self, basis: Basis) -> None:
+        """Start the next solve from a basis."""
+        _check(self._solver.setBasis(basis.raw), "setBasis")
+
+    def forget(self) -> None:
+        """Start the next solve from nothing."""
+        _check(self._solver.clearSolver(), "clearSolver")
+
+    def solve(self, time_limit_s: float, *, cutoff: float = -math.inf, iterations: int | None = None) -> EndOfSimplex:
+        """Solve from the basis; how it ended.
+
+        Args:
+            time_limit_s: Wall-clock limit [s]; ``inf`` = none.
+            cutoff: Objective below which the optimum is of no interest.
+            iterations: Iterations after which it stops; ``None`` = none.
+
+        Raises:
+            KeyboardInterrupt: If Ctrl-C is pressed, where it is heard.
+        """
+        deadline = time.monotonic() + time_limit_s
+        _option(self._solver, "objective_bound", -cutoff)
+        # Runs of a bounded number of iterations, after each of which Python hears of Ctrl-C.
+        at_a_time = max(_FEWEST_ITERATIONS, min(_MOST_ITERATIONS, _WORK // max(self._entries, 1)))
+        failed = False
+        while True:
+            left = at_a_time if iterations is None else min(iterations, at_a_time)
+            _option(self._solver, "simplex_iteration_limit", left)
+            _limit(self._solver, max(deadline - time.monotonic(), 0.0))
+            self._solver.run()
+            ended = _ENDS.get(self._solver.getModelStatus())
+            if ended == "iterations":
+                iterations = None if iterations is None else iterations - left
+                if iterations is None or iterations > 0:
+                    continue
+            if ended is not None:
+                return ended
+            if failed:
+                raise RuntimeError("HiGHS: unexpected model status "
+                                   f"{self._solver.modelStatusToString(self._solver.getModelStatus())}")
+            self.forget()  # it gave up, which is rare: from nothing it finds its way
+            failed = True
+
+    def objective(self) -> float:
+        """Objective at the end of the last solve: that of a relaxation where it stopped early."""
+        return -float(self._solver.getInfo().objective_function_value)
+
+    def values(self) -> FloatArray:
+        """Value of each column, shape (columns,)."""
+        return np.array(self._solver.getSolution().col_value)
+
+    def duals(self) -> FloatArray:
+        """Dual value of each row: gain in the objective per unit of its bound, shape (rows,)."""
+        return -np.array(self._solver.getSolution().row_dual)
+
+    def ray(self) -> FloatArray | None:
+        """Multipliers of the rows that prove an infeasible program infeasible, shape (rows,); ``None`` if there are
+        none at hand."""
+        _, there, values = self._solver.getDualRay()
+        return -np.array(values) if there else None
 
 
 def maximise(
@@ -208,7 +305,7 @@ class _Silent(highspy.Highs):  # type: ignore[misc]
         super().enableCallbacks()
 
 
-def _open(model: LinearModel) -> Any:
+def _open(model: LinearModel, *, maximises: bool = True) -> Any:
     """A solver that holds the model's linear relaxation."""
     solver = _Silent()
     # From 1.16 on HiGHS branches on several threads by default, and ties would depend on the machine.
@@ -221,7 +318,7 @@ def _open(model: LinearModel) -> Any:
     columns, rows = len(model.objective), model.rows
     program = highspy.HighsLp()
     program.num_col_, program.num_row_ = columns, len(rows.lower)
-    program.sense_ = highspy.ObjSense.kMaximize
+    program.sense_ = highspy.ObjSense.kMaximize if maximises else highspy.ObjSense.kMinimize
     program.col_cost_ = model.objective
     program.col_lower_, program.col_upper_ = np.zeros(columns), model.upper
     program.row_lower_, program.row_upper_ = rows.lower, rows.upper
@@ -275,6 +372,11 @@ def _status(solver: Any) -> SolveStatus:
     if status == kinds.kInterrupt:
         return "interrupted"
     raise RuntimeError(f"HiGHS: unexpected model status {solver.modelStatusToString(status)}")
+
+
+def _limit(solver: Any, time_limit_s: float) -> None:
+    """Limit the time of the next run of a linear program, which HiGHS adds to that of the runs before."""
+    _option(solver, "time_limit", solver.getRunTime() + time_limit_s)
 
 
 def _option(solver: Any, name: str, value: bool | int | float | str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,12 +13,15 @@ from sva_bench import choices
 from sva_bench.choices import Method
 from sva_bench.errors import BadInput
 from sva_bench.solver.columns.prove import prove_by_columns
+from sva_bench.solver.edges.incumbent import Guide
+from sva_bench.solver.edges.tree import prove_by_tree
 from sva_bench.solver.flow.branch_and_cut import prove_by_cuts
 from sva_bench.solver.flow.expected import DirectedModel
 from sva_bench.solver.flow.lshaped import prove_by_lshaped
 from sva_bench.solver.flow.recourse import EquivalentModel
 from sva_bench.solver.flow.undirected import UndirectedModel, serves
 from sva_bench.solver.problem import Problem
+from sva_bench.solver.routes.long_routes import guided
 
 LONG = {1: 2.0, 2: 2.0, 3: 2.6, 4: 2.6}
 """Mission limit, in longest legs, from which the edge model is faster than branch-and-price, by number of vehicles."""
@@ -59,6 +63,20 @@ def _directed(problem: Problem) -> None:
 
 
 def _undirected(problem: Problem) -> None:
+    prove_by_tree(problem, _guide(problem))
+
+
+def _guide(problem: Problem) -> Guide | None:
+    """The search over long routes near a node's relaxation; ``None`` for goals and tanks that it doesn't know."""
+    goal, tables = problem.goal, problem.known.tables
+    if goal.floors or goal.driving or (goal.weights < 0).any() or np.isfinite(tables.capacity_s).any():
+        return None
+    seeds = itertools.count()
+    return lambda allowed: guided(tables, goal.weights, problem.progress.orders, allowed, seed=next(seeds),
+                                  stop=lambda _: problem.clock.is_over())
+
+
+def _edge_mip(problem: Problem) -> None:
     prove_by_cuts(UndirectedModel(problem.instance, problem.scopes, problem.goal), problem)
 
 
@@ -81,6 +99,7 @@ _ALL = (
     SolutionMethod(name="relaxed", prove=_relaxed, second_stage=True),
     SolutionMethod(name="lshaped", prove=prove_by_lshaped, second_stage=True),
     SolutionMethod(name="undirected", prove=_undirected, serves=_is_undirected),
+    SolutionMethod(name="edge-mip", prove=_edge_mip, serves=_is_undirected),
     SolutionMethod(name="branch-and-price", prove=prove_by_columns, discounts=True, risk=True),
 )
 METHODS: Mapping[Method, SolutionMethod] = {method.name: method for method in _ALL}

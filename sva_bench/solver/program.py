@@ -1,13 +1,16 @@
-"""Linear programs as arrays: rows, columns and objective."""
+"""Linear programs as arrays, rows, columns and objective, and their results."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from sva_bench.arrays import BoolArray, FloatArray, IntArray
+
+SolveStatus = Literal["optimal", "infeasible", "time_limit", "interrupted"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,6 +56,46 @@ class LinearModel:
     integer: BoolArray
     rows: Rows
     aggregates: bool = True
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MipResult:
+    """The result of a mixed-integer program.
+
+    Attributes:
+        status: How it ended.
+        values: The best point found, shape (columns,); ``None`` if none was.
+        objective: Its objective; ``-inf`` if none was found.
+        bound: Upper bound on the objective; ``inf`` if none is known.
+        nodes: Branch-and-bound nodes.
+    """
+
+    status: SolveStatus
+    values: FloatArray | None
+    objective: float
+    bound: float
+    nodes: int
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Relaxed:
+    """The optimum of a linear program.
+
+    Attributes:
+        status: How it ended.
+        values: The optimum, shape (columns,); ``None`` if there is none, or it was not reached.
+        objective: Its objective; ``-inf`` if there is none, ``inf`` if it was not reached.
+        reduced: Reduced cost of each column, positive where raising it would improve the objective, shape (columns,).
+        activity: Value of each row, shape (rows,).
+        duals: Dual value of each row: gain in the objective per unit of its bound, shape (rows,).
+    """
+
+    status: SolveStatus
+    values: FloatArray | None
+    objective: float
+    reduced: FloatArray
+    activity: FloatArray
+    duals: FloatArray
 
 
 class RowBuilder:

@@ -30,6 +30,8 @@ from sva_bench.solver.columns.listing import counts
 from sva_bench.solver.columns.pricing import Priced, price
 from sva_bench.solver.columns.subset_row import cut_duals_of
 from sva_bench.solver.discounts import Discount
+from sva_bench.solver.edges import program as edge_program
+from sva_bench.solver.edges import tree as edge_tree
 from sva_bench.solver.flow import branch_and_cut, lshaped
 from sva_bench.solver.preprocess import scope_of
 from sva_bench.solver.risk import RiskMeasure
@@ -86,10 +88,12 @@ def by(method: Method) -> Callable[[Instance], Plan]:
     (column_generation, "best_routes", hard(vehicles=4), averse),
     (branch_and_cut, "maximise", hard("B", 30, directed=False), by("expected")),
     (branch_and_cut, "Relaxation", hard("B", 30, directed=False), by("dep")),
-    (branch_and_cut, "Relaxation", hard(pois=150, directed=False), by("undirected")),
+    (branch_and_cut, "Relaxation", hard(pois=150, directed=False), by("edge-mip")),
+    (edge_program, "Simplex", hard(pois=150, directed=False), by("undirected")),
+    (edge_tree, "choose", hard(pois=60, vehicles=4, directed=False), by("undirected")),
     (lshaped, "maximise", hard("B", 30, directed=False), by("lshaped")),
-], ids=["heuristic", "annealing", "columns", "along the route", "risk", "directed model", "second stage", "edge model",
-        "L-shaped"])
+], ids=["heuristic", "annealing", "columns", "along the route", "risk", "directed model", "second stage",
+        "edge model by HiGHS", "edge model", "nodes of the edge model", "L-shaped"])
 def test_ctrl_c_keeps_the_best_plan_wherever_it_comes(
     where: object, name: str, instance: Instance, solve: Callable[[Instance], Plan], monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -30,9 +30,10 @@ from sva_bench.solver import solve as solving
 from sva_bench.solver.columns import column_generation
 from sva_bench.solver.flow import branch_and_cut
 from sva_bench.solver.flow.expected import euler_walk
-from sva_bench.solver.highs import MipResult, maximise
+from sva_bench.solver.highs import maximise
 from sva_bench.solver.knowledge import SolveLimits
 from sva_bench.solver.preprocess import is_metric, scope_of
+from sva_bench.solver.program import MipResult
 from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.routes.refuelling import quickest_route, vehicle_legs
 from sva_bench.solver.two_stage import (

@@ -17,7 +17,7 @@ import numpy as np
 
 from sva_bench.solver.columns.column_generation import ColumnGeneration, Generated
 from sva_bench.solver.columns.master import BranchState, Column, Duals, VehicleGroup, without
-from sva_bench.solver.highs import Relaxed
+from sva_bench.solver.program import Relaxed
 
 _log = logging.getLogger(__name__)
 

@@ -25,8 +25,8 @@ from sva_bench.solver.columns.pricing import Priced
 from sva_bench.solver.columns.pricing import price as best_routes
 from sva_bench.solver.columns.subset_row import Counter, SubsetRow, cut_duals_of, separate
 from sva_bench.solver.goal import Goal, sizes_of
-from sva_bench.solver.highs import Relaxed
 from sva_bench.solver.preprocess import Scope
+from sva_bench.solver.program import Relaxed
 
 _log = logging.getLogger(__name__)
 

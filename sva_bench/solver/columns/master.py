@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sva_bench.arrays import FloatArray, IntArray
-from sva_bench.solver.highs import MipResult, Relaxation, Relaxed
-from sva_bench.solver.program import LinearModel, RowBuilder
+from sva_bench.solver.highs import Relaxation
+from sva_bench.solver.program import LinearModel, MipResult, Relaxed, RowBuilder
 from sva_bench.solver.risk import Risk
 
 Stops = tuple[int, ...]

@@ -16,10 +16,10 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance
 from sva_bench.solver.flow.cuts import violated_by_fractions, violated_by_integers
-from sva_bench.solver.highs import MipResult, Relaxation, maximise
+from sva_bench.solver.highs import Relaxation, maximise
 from sva_bench.solver.knowledge import Cut, adopt, without_idle_stops
 from sva_bench.solver.problem import Problem
-from sva_bench.solver.program import LinearModel, Rows
+from sva_bench.solver.program import LinearModel, MipResult, Rows
 from sva_bench.solver.routes.heuristic import VisitOrders
 from sva_bench.solver.routes.refuelling import quickest_route
 from sva_bench.solver.units import LARGEST

@@ -23,45 +23,67 @@ from sva_bench.solver.routes.heuristic import VisitOrders
 
 
 class UndirectedModel:
-    """The edge model of one goal: a ``FlowModel`` of ``branch_and_cut``."""
+    """The edge model of one goal: a ``FlowModel`` of ``branch_and_cut``.
 
-    def __init__(self, instance: Instance, scopes: Sequence[Scope], goal: Goal) -> None:
+    Args:
+        instance: The instance.
+        scopes: What each vehicle may do.
+        goal: Objective and floors.
+        linked: Whether it has the rows ``s_j <= u``, which are cuts too: of all sites but the base.
+
+    Attributes:
+        model: The linear model.
+        base: The base.
+        leaves: Column u of each vehicle, shape (M,).
+        visit: Column s of vehicle m and site j, -1 = none, shape (M, n).
+        edge: Column x of vehicle m between two sites, -1 = none, shape (M, n, n).
+        vehicle: Vehicle of each column, shape (columns,).
+        ends: Sites that a column x joins; -1 for other columns, shape (columns, 2).
+    """
+
+    def __init__(self, instance: Instance, scopes: Sequence[Scope], goal: Goal, *, linked: bool = True) -> None:
         self._instance, self._scopes = instance, scopes
         n, base, pois = len(instance.sites), instance.base, instance.pois
         half = instance.stop_s[:, None] / 2 + instance.stop_s[None, :] / 2
         build = RowBuilder()
         objective: list[float] = []
         upper: list[float] = []
-        self._leaves: list[int] = []  # column u of each vehicle
-        self._visit = np.full((len(scopes), n), -1)  # column s
-        self._edge = np.full((len(scopes), n, n), -1)  # column x
+        leaves: list[int] = []
+        joins: list[IntArray] = [np.zeros((0, 2), dtype=np.int64)]
+        self.base = base
+        self.visit: IntArray = np.full((len(scopes), n), -1)
+        self.edge: IntArray = np.full((len(scopes), n, n), -1)
         for m, scope in enumerate(scopes):
             time = scope.leg_time_s + half
             ends = np.argwhere(np.triu(scope.legs))
             reachable = [j for j in pois if scope.legs[j].any()]
             first = len(objective)
-            self._leaves.append(first)
-            self._visit[m, reachable] = first + 1 + np.arange(len(reachable))
+            leaves.append(first)
+            self.visit[m, reachable] = first + 1 + np.arange(len(reachable))
             edges = first + 1 + len(reachable) + np.arange(len(ends))
-            self._edge[m, ends[:, 0], ends[:, 1]] = self._edge[m, ends[:, 1], ends[:, 0]] = edges
+            self.edge[m, ends[:, 0], ends[:, 1]] = self.edge[m, ends[:, 1], ends[:, 0]] = edges
+            joins += [np.full((1 + len(reachable), 2), -1), ends]
             costs = time[ends[:, 0], ends[:, 1]]
             objective += [0.0, *goal.weights[m, reachable], *(-goal.driving * costs)]
             upper += [1.0] * (1 + len(reachable)) + np.where((ends == base).any(axis=1), 2.0, 1.0).tolist()
             for site in (base, *reachable):
-                of_site = self._edge[m, site][self._edge[m, site] >= 0]
-                total = first if site == base else int(self._visit[m, site])
+                of_site = self.edge[m, site][self.edge[m, site] >= 0]
+                total = first if site == base else int(self.visit[m, site])
                 build.add([*of_site, total], [1.0] * len(of_site) + [-2.0], 0.0, 0.0)
             size = max(scope.limit_s, 1.0)
             build.add([*edges, first], [*(costs / size), -(scope.limit_s + SLACK_S) / size], -np.inf, 0.0)
-            for j in reachable:
-                build.add([int(self._visit[m, j]), first], [1.0, -1.0], -np.inf, 0.0)
+            for j in reachable if linked else ():
+                build.add([int(self.visit[m, j]), first], [1.0, -1.0], -np.inf, 0.0)
         for j in pois:
-            of_poi = self._visit[:, j][self._visit[:, j] >= 0]
+            of_poi = self.visit[:, j][self.visit[:, j] >= 0]
             if len(of_poi) > 1:
                 build.add(of_poi, np.ones(len(of_poi)), -np.inf, 1.0)
         for (weights, floor), size in zip(goal.floors, sizes_of(goal.floors), strict=True):
-            used = np.argwhere((self._visit >= 0) & (weights != 0))
-            build.add(self._visit[used[:, 0], used[:, 1]], weights[used[:, 0], used[:, 1]] / size, floor / size, np.inf)
+            used = np.argwhere((self.visit >= 0) & (weights != 0))
+            build.add(self.visit[used[:, 0], used[:, 1]], weights[used[:, 0], used[:, 1]] / size, floor / size, np.inf)
+        self.leaves: IntArray = np.array(leaves, dtype=np.int64)
+        self.ends: IntArray = np.concatenate(joins)
+        self.vehicle: IntArray = np.searchsorted(self.leaves, np.arange(len(objective)), side="right") - 1
         self.model = LinearModel(objective=np.array(objective), upper=np.array(upper),
                                  integer=np.ones(len(objective), dtype=np.bool_), rows=build.rows())
 
@@ -69,16 +91,16 @@ class UndirectedModel:
         """The connectivity cuts as rows over the model's columns."""
         build = RowBuilder()
         for cut in cuts:
-            inside = np.array([j for j in cut.inside if self._visit[cut.vehicle, j] >= 0], dtype=np.int64)
-            visit = int(self._visit[cut.vehicle, cut.poi])
+            inside = np.array([j for j in cut.inside if self.visit[cut.vehicle, j] >= 0], dtype=np.int64)
+            visit = int(self.visit[cut.vehicle, cut.poi])
             if visit < 0:
                 build.add([], [], -np.inf, np.inf)
                 continue
-            edge = self._edge[cut.vehicle]
+            edge = self.edge[cut.vehicle]
             within = _positive(np.triu(edge[np.ix_(inside, inside)], 1))
             outside = np.setdiff1d(np.arange(len(edge)), inside)
             across = _positive(edge[np.ix_(inside, outside)])
-            others = self._visit[cut.vehicle, inside[inside != cut.poi]]
+            others = self.visit[cut.vehicle, inside[inside != cut.poi]]
             if len(within) + len(others) < len(across):
                 build.add([*within, *others], [1.0] * len(within) + [-1.0] * len(others), -np.inf, 0.0)
             else:
@@ -87,7 +109,7 @@ class UndirectedModel:
 
     def visits(self, values: FloatArray, vehicle: int) -> FloatArray:
         """How often a vehicle drives each edge, half of it in either direction, shape (n, n)."""
-        edge = self._edge[vehicle]
+        edge = self.edge[vehicle]
         return np.where(edge >= 0, values[edge], 0.0) / 2
 
     def order(self, values: FloatArray, vehicle: int) -> tuple[int, ...]:
@@ -113,13 +135,13 @@ class UndirectedModel:
         for m, order in enumerate(orders):
             if not order:
                 continue
-            point[self._leaves[m]] = 1.0
+            point[self.leaves[m]] = 1.0
             stops = (self._instance.base, *order, self._instance.base)
             for i, j in itertools.pairwise(stops):
-                if self._edge[m, i, j] < 0:
+                if self.edge[m, i, j] < 0:
                     return None
-                point[self._edge[m, i, j]] += 1.0
-            point[self._visit[m, list(order)]] = 1.0
+                point[self.edge[m, i, j]] += 1.0
+            point[self.visit[m, list(order)]] = 1.0
         return point
 
 
