@@ -118,7 +118,7 @@ def test_what_is_no_value_of_the_type_is_refused(content: bytes) -> None:
 
 
 def test_an_array_declared_larger_than_its_file_allocates_nothing() -> None:
-    head = b"[[99999999999],false,[0],[0],[0,3],[],[],1.0,0.0,null,false]"
+    head = b"[[99999999999],false,[0],[0],[0,3],[],[],1.0,0.0,null,false,0.0]"
     with pytest.raises(NotOfType, match="cut off"):
         decoded(len(head).to_bytes(8, "little") + head, Driven)
 

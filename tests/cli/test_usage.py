@@ -186,7 +186,8 @@ def test_an_empty_value_is_refused_by_the_name_of_its_option(
     parameter.param_type_name == "argument" for parameter in command.params)], ids=" ".join)
 def test_an_empty_argument_is_refused(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line([*words, "", ""]) == 2
-    assert "its value is empty" in capsys.readouterr().err or words in (("view",), ("report",), ("replay",))
+    assert "its value is empty" in capsys.readouterr().err or words in (
+        ("view",), ("report",), ("replay",), ("verify",))
 
 
 SEEDED = [words for words, parameter in OPTIONS if parameter.name == "seed"]
