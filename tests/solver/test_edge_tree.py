@@ -16,7 +16,7 @@ from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.solver.edges import branching, tree
 from sva_bench.solver.edges.box import Box
 from sva_bench.solver.edges.max_flow import minimum_cuts
-from sva_bench.solver.edges.program import EdgeProgram
+from sva_bench.solver.edges.program import EdgeProgram, Solved
 from sva_bench.solver.edges.separation import violated_cuts
 from sva_bench.solver.edges.tree import prove_by_tree
 from sva_bench.solver.flow.branch_and_cut import prove_by_cuts
@@ -189,6 +189,17 @@ def test_what_highs_says_without_proof_prunes_nothing(
 
     monkeypatch.setattr(Simplex, "solve", lying)
     assert searched(instance, goal, None, by_mip).value == pytest.approx(by_mip.value, rel=2e-6)
+
+
+def test_where_highs_never_gets_clear_every_point_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    # To the right and back takes 8, to the left and back 10: the limit lets one of them, or the near one alone.
+    instance = line(4.0, -5.0, limit=10.0)
+    goal = Goal(weights=incentives_of(instance) * np.array([0.0, 1.0, 2.0]))
+    by_mip = proved(by_highs, instance, goal, None)
+    nothing = np.zeros(0)
+    monkeypatch.setattr(tree.Tree, "_solve", lambda self, box: Solved(  # noqa: ARG005
+        status="unclear", bound=np.inf, values=nothing, reduced=nothing))
+    assert searched(instance, goal, None, by_mip).value == by_mip.value > 0
 
 
 @pytest.mark.parametrize("seed", range(40))

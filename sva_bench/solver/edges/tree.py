@@ -235,9 +235,10 @@ class Tree:
                                            strict=True)]
 
     def _halves(self, box: Box, bound: float) -> list[Node]:
-        """Divide a node by a column that is not fixed, whichever; if there is none, its point is no plan."""
+        """Divide a node by a column that is not fixed, whichever; if there is none, its point is all that it holds."""
         free = np.flatnonzero(box.free)
         if not len(free):
+            self._incumbent.offer(box.lower.astype(np.float64), bound)
             self._incumbent.pruned(box)
             return []
         column = int(free[0])
