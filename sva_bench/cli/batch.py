@@ -83,7 +83,8 @@ def over(
         show_default="prmstar")] = None,
     scenario: ScenarioNames = None,
     vary: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=V1,V2,...", help="Vary a key of the world "
-                                                   "files, e.g. robots.uv2.fuel_capacity_s=200,250; may be repeated.",
+                                                   "files, e.g. robots.uv2.fuel_capacity_s=200,250; robots.* moves all "
+                                                   "together, x1.2 is relative to the file; may be repeated.",
                                                    show_default=False)] = None,
     margin: MarginOption = None,
     plan_failure: PlanFailure = None,

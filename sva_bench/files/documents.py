@@ -11,7 +11,7 @@ import json
 import math
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +79,35 @@ class Document:
                 at[name] = value
                 return Document(self.path, data, self.text, self._root)
             at = at.setdefault(name, {}) if isinstance(at, dict) else at[name]
+
+
+def places_of(data: Any, key: str) -> list[str]:
+    """The dotted keys that one with ``*`` in it stands for: of all names, or items of a list, that there are; itself if
+    it has none."""
+    return [".".join(words) for words in _spread(data, key.split("."))]
+
+
+def _spread(at: Any, words: list[str]) -> Iterator[list[str]]:
+    if "*" not in words:
+        yield words
+    elif words[0] == "*":
+        for name in list(at) if isinstance(at, dict) else range(len(at)) if isinstance(at, list) else ():
+            yield from ([str(name), *rest] for rest in _spread(at[name], words[1:]))
+    else:
+        name, rest = _next_name(at, words)
+        if (isinstance(at, dict) and name in at) or (isinstance(at, list) and name in range(len(at))):
+            yield from ([str(name), *further] for further in _spread(at[name], rest))
+
+
+def value_at(data: Any, key: str) -> Any:
+    """The value at a dotted key; ``None`` where there is none."""
+    words = key.split(".")
+    while words:
+        name, words = _next_name(data, words)
+        if not ((isinstance(data, dict) and name in data) or (isinstance(data, list) and name in range(len(data)))):
+            return None
+        data = data[name]
+    return data
 
 
 def _next_name(at: Any, words: list[str]) -> tuple[Any, list[str]]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sva_bench.choices import Departures, FailureProcess, Interaction
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
-from sva_bench.files.documents import Document, Loc
+from sva_bench.files.documents import Document, Loc, places_of, value_at
 from sva_bench.mission.failures import undefined_under, without_joint
 from sva_bench.world.load import AMBIGUOUS, world_of
 from sva_bench.world.model import World, nominal_of
@@ -22,13 +23,16 @@ _NAMED: dict[Loc, str] = {("robots",): "robot", ("sites", "stations"): "station"
                           ("scenarios",): "scenario", ("passages",): "passage"}
 """Sections whose keys are names given in the file: values can be set below existing names only."""
 
+_RELATIVE = re.compile(r"x(\d+(?:\.\d*)?|\.\d+)")
+
 
 def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> World:
     """The world of a file with other values at some dotted keys.
 
     Args:
         document: The world file.
-        values: The values by key.
+        values: The values by key. A ``*`` in a key stands for all names or items there, and a value such as ``x1.2``
+            for so many times the number that the file has.
         blame: Makes the error if one of them is wrong.
 
     Raises:
@@ -39,9 +43,12 @@ def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> W
     noise = document.data.get("noise", {}) if isinstance(document.data, dict) else {}
     if not isinstance(noise, dict) and any(key.startswith("noise.") for key in values):
         changed = document.changed("noise", spelled_out(noise))
+    changes: list[_Change] = []
     for key, value in values.items():
         try:
-            changed = changed.changed(key, value, _NAMED)
+            for change in _changes(changed, key, value):
+                changed = changed.changed(change.place, change.value, _NAMED)
+                changes.append(change)
         except BadFile as error:
             raise blame(key, f"{error.problem.removeprefix(f'{key}: ')} (in {document.path})") from None
     try:
@@ -50,24 +57,59 @@ def world_with(document: Document, values: Mapping[str, Any], blame: Blame) -> W
         if not values:
             raise
         world_of(document)  # an error without the values is the file's
-        key = _key_at_fault(document, values, error)
-        where = "" if error.key == _with_indices(key) else f"{error.key}: "
-        raise blame(key, f"{where}{error.problem} (in {document.path})") from None
+        fault = _at_fault(document, changes, error)
+        where = "" if error.key == _with_indices(fault.key) else f"{error.key}: "
+        raise blame(fault.key, f"{where}{error.problem} (in {document.path})") from None
 
 
-def _key_at_fault(document: Document, values: Mapping[str, Any], error: BadFile) -> str:
-    """The key whose value causes an error: one that the error is about, else one that is wrong alone."""
-    for key in values:
-        dotted = _with_indices(key)
+@dataclass(frozen=True, kw_only=True)
+class _Change:
+    """A value at one place of a file, and the key that it is set by, which may stand for several."""
+
+    key: str
+    place: str
+    value: Any
+
+
+def _changes(document: Document, key: str, value: Any) -> list[_Change]:
+    """What is changed by a key and its value.
+
+    Raises:
+        BadFile: If a ``*`` stands for nothing, or a value is relative to what is no number.
+    """
+    places = places_of(document.data, key)
+    if not places:
+        raise document.error((), "there is nothing that * could stand for")
+    factor = _RELATIVE.fullmatch(value) if isinstance(value, str) else None
+    if factor is None:
+        return [_Change(key=key, place=place, value=value) for place in places]
+    changes = []
+    for place in places:
+        base = value_at(document.data, place)
+        if isinstance(base, str):  # of which x1 may be another
+            changes.append(_Change(key=key, place=place, value=value))
+        elif isinstance(base, bool) or not isinstance(base, int | float):
+            raise document.error((), f"{value} is relative to the file, which has no number at {place}; give a number")
+        else:
+            product = float(f"{base * float(factor[1]):.12g}")  # without the last digits, which come of rounding
+            whole = isinstance(base, int) and product.is_integer()
+            changes.append(_Change(key=key, place=place, value=int(product) if whole else product))
+    return changes
+
+
+def _at_fault(document: Document, changes: Sequence[_Change], error: BadFile) -> _Change:
+    """The change that causes an error: one that the error is about, else one that is wrong alone."""
+    for change in changes:
+        dotted = _with_indices(change.place)
         if any(longer == shorter or longer.startswith((f"{shorter}.", f"{shorter}["))
                for longer, shorter in ((error.key, dotted), (dotted, error.key))):
-            return key
-    for key, value in values.items():
+            return change
+    for change in changes:
         try:
-            world_of(document.changed(key, value))
+            world_of(document.changed(change.place, change.value))
         except BadFile:
-            return key
-    return list(values)[-1]
+            return change
+    return changes[-1]
 
 
 def _with_indices(key: str) -> str:

@@ -133,6 +133,13 @@ WRONG = [
     ("scenarios.hlaf.uv2", 1, "there is no scenario 'hlaf'; did you mean 'half'?"),
     ("robots.uv1.incentives.p9", 1, "there is no POI 'p9'; did you mean 'p4'?"),
     ("sites.pois.p1.at_m", [3.0, 1.0], "inside an obstacle"),
+    ("robots.*.fuel_capacity_s", -1, "robots.uv1.fuel_capacity_s: expected at least"),
+    ("robots.*.fuel_capacity_s.*", 1, "there is nothing that * could stand for"),
+    ("robot.*.fuel_capacity_s", 1, "there is nothing that * could stand for"),
+    ("robots.*.loss_cost", "x2", "x2 is relative to the file, which has no number at robots.uv1.loss_cost"),
+    ("robots.uv2.availability", "x2", "expected at most 1.0, found 1.5"),
+    ("robots.uv1.fuel_capacity_s", "x1.2.3", "expected"),
+    ("robots.uv1.model", "x2", "x2"),  # the file has no number there, but a name
 ]
 
 
@@ -158,6 +165,22 @@ def test_an_invalid_value_is_an_error_of_its_line_in_the_sweep_file(
         grid_of(sweep_of([path], Sweep()))
     assert str(caught.value).startswith(f"{path}:10: set.{key}: ")
     assert told in str(caught.value)
+
+
+def test_a_star_moves_all_robots_together_and_a_factor_is_of_what_the_file_says(tmp_path: Path) -> None:
+    grid = grid_of(Sweep(worlds=(world(tmp_path),), vary=varied(
+        ["robots.*.fuel_capacity_s=40,x1.5"])))
+    assert [[robot.fuel_capacity_s for robot in point.world.robots] for point in grid.points] == [[40, 40], [90, 90]]
+    assert [point.variant for point in grid.points] == [
+        "robots.*.fuel_capacity_s=40", 'robots.*.fuel_capacity_s="x1.5"']
+
+
+def test_a_factor_moves_each_by_its_own_value_and_later_keys_build_on_earlier_ones(tmp_path: Path) -> None:
+    grid = grid_of(Sweep(worlds=(world(tmp_path),), vary=varied(
+        ["robots.uv1.mission_limit_s=200", "robots.*.mission_limit_s=x0.5", "robots.uv1.incentives.*=x1.1"])))
+    (point,) = grid.points
+    assert [robot.mission_limit_s for robot in point.world.robots] == [100, 60]
+    assert dict(point.world.robots[0].incentives) == {"p1": 11, "p2": 22, "p3": 33, "p4": 44}
 
 
 def test_of_two_values_the_one_that_is_wrong_alone_is_named(tmp_path: Path) -> None:
