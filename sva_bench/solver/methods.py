@@ -23,7 +23,7 @@ from sva_bench.solver.flow.undirected import UndirectedModel, serves
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.routes.long_routes import guided
 
-LONG = {1: 2.0, 2: 2.0, 3: 2.6, 4: 2.6}
+LONG = {1: 2.0, 2: 2.0, 3: 2.2, 4: 2.2}
 """Mission limit, in longest legs, from which the edge model is faster than branch-and-price, by number of vehicles."""
 
 
