@@ -108,7 +108,8 @@ def _instances(folder: Path, content: Content, costs: Mapping[str, FuelCosts]) -
         path = folder / f"instance-{scenario.name}.json"
         if not path.is_file():
             raise _Differs(f"{path.name} is missing")
-        if path.read_text(encoding="utf-8") != instance_text(instance_of(content.world, costs, scenario)):
+        expected = instance_text(instance_of(content.world, costs, scenario)).encode()
+        if path.stat().st_size != len(expected) or path.read_bytes() != expected:
             raise _Differs(f"{path.name}: not the instance that the world gives")
     return counted(len(content.world.scenarios), "instance")
 
@@ -155,8 +156,8 @@ def _figures(folder: Path, content: Content) -> str:
                 best, plain = (found[scenario.name, name, *key].mean for name in ("stochastic", "deterministic"))
                 _compare(f"{scenario.name}: vss.executed.mean", vss.executed.mean, best - plain, _SUMMED)
                 if vss.executed_pct is not None:
-                    _compare(f"{scenario.name}: vss.executed_pct", vss.executed_pct, 100 * (best - plain) / best,
-                             _SUMMED)
+                    _compare(f"{scenario.name}: vss.executed_pct", vss.executed_pct,
+                             100 * (best - plain) / best if best else None, _SUMMED)
     return f"figures of {counted(count, 'executed plan')}"
 
 

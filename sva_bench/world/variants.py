@@ -23,6 +23,7 @@ _NAMED: dict[Loc, str] = {("robots",): "robot", ("sites", "stations"): "station"
                           ("scenarios",): "scenario", ("passages",): "passage"}
 """Sections whose keys are names given in the file: values can be set below existing names only."""
 
+_MOST_PLACES = 200  # of a key with a star: as many as there may be robots; each is a copy of the file
 _RELATIVE = re.compile(r"x(\d+(?:\.\d*)?|\.\d+)")
 
 
@@ -80,6 +81,8 @@ def _changes(document: Document, key: str, value: Any) -> list[_Change]:
     places = places_of(document.data, key)
     if not places:
         raise document.error((), "there is nothing that * could stand for")
+    if len(places) > _MOST_PLACES:
+        raise document.error((), f"* stands for {len(places)} places; at most {_MOST_PLACES} are changed together")
     factor = _RELATIVE.fullmatch(value) if isinstance(value, str) else None
     if factor is None:
         return [_Change(key=key, place=place, value=value) for place in places]

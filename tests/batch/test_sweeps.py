@@ -175,6 +175,14 @@ def test_a_star_moves_all_robots_together_and_a_factor_is_of_what_the_file_says(
         "robots.*.fuel_capacity_s=40", 'robots.*.fuel_capacity_s="x1.5"']
 
 
+def test_a_star_that_stands_for_thousands_of_places_is_refused_at_once(tmp_path: Path) -> None:
+    solids = "".join(f"      - {{cylinder: [{5.0 + k / 10_000}, 5.0], radius_m: 0.01}}\n" for k in range(300))
+    path = tmp_path / "many.yaml"
+    path.write_text(SMALL.replace("sites:\n", solids + "sites:\n", 1), encoding="utf-8")
+    with pytest.raises(BadInput, match=r"\* stands for 303 places; at most 200"):
+        grid_of(Sweep(worlds=(path,), vary=varied(["map.shapes.obstacles.*.radius_m=0.02"])))
+
+
 def test_a_factor_moves_each_by_its_own_value_and_later_keys_build_on_earlier_ones(tmp_path: Path) -> None:
     grid = grid_of(Sweep(worlds=(world(tmp_path),), vary=varied(
         ["robots.uv1.mission_limit_s=200", "robots.*.mission_limit_s=x0.5", "robots.uv1.incentives.*=x1.1"])))

@@ -63,8 +63,8 @@ def in_instance(run: Path) -> None:
     path.write_text(path.read_text().replace('"availability": 0.5', '"availability": 0.6'))
 
 
-def exchange(values: list[Any], other: int) -> None:
-    values[0], values[other] = values[other], values[0]
+def no_text(run: Path) -> None:
+    (run / "instance-half.json").write_bytes(b"\xff" * 100)
 
 
 def promised_more(run: Path) -> None:
@@ -80,6 +80,7 @@ CHANGES = {
     "ends": in_summary(lambda s: add(s["plans"]["stochastic"]["ends"], "home", 1)),
     "resolve": in_summary(lambda s: add(s["reactions"][0]["plans"]["stochastic"]["by_robot"], "uv1", 1.0)),
     "instance-half.json": in_instance,
+    "an instance that is no text": no_text,
     "travel_times.parquet": in_table("travel_times.parquet", "raw_s", lambda v: v.__setitem__(3, v[3] + 0.001)),
     "end_time_s": in_table("outcomes.parquet", "end_time_s", lambda v: v.__setitem__(0, v[0] + 1e-9)),
     "executed.mean": in_table("outcomes.parquet", "value", lambda v: v.__setitem__(0, v[0] + 5.0)),
