@@ -11,7 +11,7 @@ BIN := $(VENV)/bin
 LOCK := requirements-$(VERSION).lock
 STAMP := $(VENV)/lib/python$(VERSION)/.installed
 
-.PHONY: run test test-long lint setup lock bench clean bench-solver bench-paper
+.PHONY: run test test-long lint docs setup lock bench clean bench-solver bench-paper
 
 run: setup  ## plan, execute and measure the four-rooms mission
 	$(BIN)/sva-bench run worlds/four-rooms.yaml
@@ -25,6 +25,10 @@ test-long: setup  ## everything, sweeps included
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+# Material's notice of its successor would stand above everything else: docs/development.md has it.
+docs: setup  ## the pages of docs/ as a site, in site/; a broken link is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 setup: $(STAMP)
 
