@@ -59,7 +59,7 @@ bench-solver: setup  ## the speed that the solver promises, by class: takes an h
 bench-paper: setup  ## a part of the paper's own table of runtimes: under ten minutes on an idle core
 	$(BIN)/sva-bench reproduce runtimes
 
-bench: setup  ## figures of the README; see benchmarks/
+bench: setup  ## figures of docs/measured.md; see benchmarks/
 	for file in travel_times physics maps recording solver_small batch; do $(BIN)/python benchmarks/$$file.py || exit 1; done
 	$(BIN)/python -m benchmarks.noise --speed
 	$(BIN)/python -m benchmarks.planners

@@ -1,4 +1,4 @@
-"""The VSS over twenty random worlds, five of each family, as the README tells it: six minutes of processor time.
+"""The VSS over twenty random worlds, five of each family, as docs/batches.md tells it: six minutes of processor time.
 
 Run: ``python benchmarks/twenty_worlds.py``, or with ``--out FOLDER`` to keep worlds and batch.
 """

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 
 class ExitCode(IntEnum):
-    """What a command's exit status means (``README.md``)."""
+    """What a command's exit status means (``docs/ci.md``)."""
 
     DONE = 0
     FAULT = 1

@@ -1,9 +1,10 @@
-"""What docs/tutorial.md tells of its world, on fewer draws."""
+"""What the tutorials tell of their worlds; of docs/tutorial.md on fewer draws."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,3 +31,20 @@ def test_the_nominal_plan_fails_in_a_fifth_of_missions_and_the_calibrated_one_in
     assert found.calibration.bad.share < 0.01
     assert found.calibration.nominal.bad.share > 0.2
     assert found.plans["calibrated"].executed.mean > 0.95 * found.plans["stochastic"].executed.mean
+
+
+@pytest.mark.long
+def test_the_figures_of_the_two_rooms_are_those_of_the_page(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "two-rooms.md").read_text(encoding="utf-8")
+    result = sb.run(ROOT / "examples" / "two-rooms.yaml", out=tmp_path)
+    (found,) = result.summary.scenarios
+    assert found.vss is not None
+    for name, plan in found.plans.items():
+        assert f"| {name} | {plan.promised:.1f} | {plan.expected:.1f} | {shown(plan.executed)} |" in page
+    assert f"| {shown(found.vss.executed)} |" in page
+    assert f"That is {found.evpi:.0f} more" in " ".join(page.split())
+
+
+def shown(figure: Any) -> str:
+    """A figure as tables show it."""
+    return f"{figure.mean:.1f} [{figure.ci95[0]:.1f}, {figure.ci95[1]:.1f}]"
