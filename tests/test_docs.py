@@ -147,6 +147,21 @@ def test_all_that_the_pages_say_to_type_works_batches_and_viewer_too(
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("page", ["two-rooms", "ci"])
+def test_what_commands_say_stands_on_the_page(page: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # As they are typed there, so that figures are those of the page.
+    said = ""
+    for _, command in typed_on(ROOT / "docs" / f"{page}.md"):
+        assert run_command_line(words_of(command, folder)[1:]) == 0, command
+        said += capsys.readouterr().out
+    shown = blocks(ROOT / "docs" / f"{page}.md", "text")
+    assert shown
+    for block in shown:
+        for line in block.splitlines():
+            assert line in said
+
+
 def test_every_command_in_the_text_of_a_page_is_one() -> None:
     from sva_bench.cli.app import app
 
