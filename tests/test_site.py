@@ -61,3 +61,11 @@ def test_a_link_that_leads_nowhere_is_an_error(tmp_path: Path) -> None:
                           capture_output=True, timeout=300, check=False)
     assert done.returncode != 0
     assert "#nowhere" in done.stderr
+
+
+def test_terms_of_the_glossary_are_in_order_and_each_there_once() -> None:
+    terms = re.findall(r"^\*\*([^*]+)\*\*", (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(terms) >= 40
+    assert terms == sorted(set(terms), key=str.lower)
+    assert {"Fuel", "Rollout", "Twin", "Promised", "Expected", "Executed", "VSS", "EVPI", "News", "Calibration",
+            "Interplay", "Anticipation"} <= set(terms)
