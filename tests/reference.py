@@ -30,8 +30,8 @@ Ctrl-C is `KeyboardInterrupt`. Workers need no guard of a script's main module.
 {example}```
 
 In a notebook (`examples/mission_value.ipynb` is one) plans, certificates, summaries and results show themselves as
-tables. `result.outcomes` and `result.legs` are Arrow tables with the columns of `outcomes.parquet` and `legs.parquet` ([files](formats.md));
-`.to_pandas()` makes data frames of them where pandas is installed.
+tables. `result.outcomes` and `result.legs` are Arrow tables with the columns of `outcomes.parquet` and `legs.parquet`
+([files](formats.md)); `.to_pandas()` makes data frames of them where pandas is installed.
 
 This page is made of the docstrings (`python -m tests.reference`).
 """
