@@ -17,7 +17,6 @@ from sva_bench.report.styles import robot_colour
 
 AnyScenario = ScenarioSummary | ComparedScenario
 
-_COLOURS = (*map(hex_of, PLANS.values()), "#000000")
 _HATCHES = ("", "///", "...", "xxx", "\\\\\\", "ooo", "+++", "---")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
@@ -36,7 +35,7 @@ def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence
     least, most = min(0.0, *shown), max(0.0, *shown)  # below 0: a robot's loss cost more than it collected
 
     def draw(axes: Axes) -> None:
-        _bars(axes, [s.name for s in scenarios], heights, {}, robot_colour)
+        _bars(axes, [s.name for s in scenarios], heights, robot_colour)
         axes.set_ylabel("mean value [world file's units]")
         axes.set_title(f"Value by robot, {plan} plan")
         if most > least:
@@ -59,7 +58,7 @@ def calibration_curve(scenario: str, found: Calibration) -> str:
 
     def draw(axes: Axes) -> None:
         for number, (name, values) in enumerate(lines.items()):
-            colour, shape = mark(number)
+            colour, shape = ("#000000", hex_of(PLANS["calibrated"]))[number], marker(number)
             # Where both coincide the first must still be seen: thin and dashed over wide, small on large.
             over = {"linewidth": 1.4, "linestyle": "--", "markersize": 4} if number else {
                 "linewidth": 4.0, "markersize": 9}
@@ -110,14 +109,11 @@ _MANY = 2000  # points from which on an SVG holds them as an image
 
 
 def _bars(axes: Axes, groups: Sequence[str], heights: Mapping[str, Sequence[float]],
-          ends: Mapping[str, Sequence[Sequence[float] | None]], colour: Callable[[int], str] | None = None) -> None:
+          colour: Callable[[int], str]) -> None:
     for number, (name, tall) in enumerate(heights.items()):
         at = [k + _offset(number, len(heights)) for k in range(len(groups))]
-        axes.bar(at, tall, width=0.8 / len(heights), facecolor=(colour or _colour)(number), hatch=_hatch(number),
+        axes.bar(at, tall, width=0.8 / len(heights), facecolor=colour(number), hatch=_hatch(number),
                  edgecolor="black", linewidth=0.6, label=name)
-        for x, interval in zip(at, ends.get(name, ()), strict=False):
-            if interval is not None:
-                axes.plot([x, x], interval, color="black", linewidth=1.6, marker="_", markersize=7)
     _names(axes, groups)
     _legend(axes)
 
@@ -162,13 +158,9 @@ def _offset(number: int, of: int) -> float:
     return 0.8 * ((number + 0.5) / of - 0.5)
 
 
-def mark(number: int) -> tuple[str, str]:
-    """Colour and shape of the points of a series."""
-    return _colour(number), _MARKERS[number % len(_MARKERS)]
-
-
-def _colour(number: int) -> str:
-    return _COLOURS[number % len(_COLOURS)]
+def marker(number: int) -> str:
+    """Shape of the points of a series."""
+    return _MARKERS[number % len(_MARKERS)]
 
 
 def _hatch(number: int) -> str:

@@ -88,7 +88,7 @@ def heading(words: str) -> str:
 
 
 def _slug(words: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
+    return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
 
 
 def details(summary: str, inner: str, *, opened: bool = False) -> str:

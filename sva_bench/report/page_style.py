@@ -39,6 +39,7 @@ h1{{font-size:1.5rem;line-height:1.25;margin:.4rem 0}}h2{{font-size:1.2rem;margi
 p{{margin:.5rem 0}}
 .answer{{border-left:.4rem solid var(--edge);background:var(--answer);padding:.6rem 1rem;margin:.8rem 0}}
 .answer p:first-child{{font-size:1.15rem;font-weight:600;margin-top:0}}.answer ul{{margin:.3rem 0;padding-left:1.2rem}}
+.answer .note{{max-width:none}}
 .doubt{{border-left:.25rem solid {hex_of(ALARM)};padding-left:.6rem}}
 nav{{font-size:.92rem;margin:.8rem 0;color:var(--soft)}}nav a{{margin-right:.9rem;display:inline-block}}
 .wide{{overflow-x:auto;max-width:max-content;background:linear-gradient(90deg,var(--paper) 30%,transparent),
@@ -57,18 +58,19 @@ td b{{font-weight:600}}
 figure.rows>figcaption{{padding-bottom:.3rem}}
 figure{{margin:1rem 0;break-inside:avoid}}figure svg{{max-width:100%;height:auto;display:block}}
 figure svg text{{fill:var(--ink)}}
-figcaption{{color:var(--soft);font-size:.92rem}}
-.pair{{display:flex;flex-wrap:wrap;gap:1rem 2rem}}.pair>*{{flex:1 1 22rem;min-width:0}}
+figcaption{{color:var(--soft);font-size:.92rem;margin-top:.3rem}}
+.pair{{display:flex;flex-wrap:wrap;gap:1rem 2rem}}.pair>*{{flex:1 1 26rem;min-width:0}}
 .note{{color:var(--soft);font-size:.92rem;max-width:60rem}}
 code{{background:var(--fill);padding:.1rem .3rem;overflow-wrap:anywhere}}
 pre{{background:var(--fill);padding:.6rem;white-space:pre-wrap}}pre code{{padding:0}}
 details{{margin:.6rem 0}}summary{{cursor:pointer;padding:.3rem .5rem;background:var(--fill);border-radius:.25rem}}
 summary h2{{display:inline;margin:0}}
-.maps{{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,21rem),1fr));gap:.6rem 1.6rem;
-align-items:start}}
-.map{{margin:.6rem 0;max-width:38rem}}
-.map figcaption{{color:var(--ink);border-left:.5rem solid var(--plan);padding-left:.5rem;margin-bottom:.4rem}}
-.map ul{{list-style:none;margin:.4rem 0;padding:0;font-size:.92rem}}.map li{{margin:.2rem 0;overflow-wrap:anywhere}}
+.maps{{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,max(20rem,40%)),1fr));gap:.4rem 1.6rem;
+align-items:start;margin-top:.6rem}}
+.map{{margin:0 0 .6rem;max-width:38rem;display:grid;grid-template-rows:subgrid;grid-row:span 3;justify-items:start}}
+.map svg{{width:100%}}.map b{{display:block}}.map li b{{display:inline}}
+.map figcaption{{color:var(--ink);border-left:.5rem solid var(--plan);padding-left:.5rem}}
+.map ul{{list-style:none;margin:0;padding:0;font-size:.92rem}}.map li{{margin:.2rem 0;overflow-wrap:anywhere}}
 .map span{{color:var(--soft)}}
 i.k{{display:inline-block;width:1.6rem;margin-right:.4rem;vertical-align:middle;height:0}}
 .solid{{fill:var(--solid)}}.free{{fill:var(--free)}}.cells{{image-rendering:pixelated}}
@@ -85,7 +87,7 @@ stroke-width:3px;stroke-linejoin:round}}
 .leg:hover path{{stroke-width:4.5}}.leg.replanned path{{stroke-dasharray:1.5 3.5;stroke-width:2}}
 {_robots()}.ended circle{{fill:var(--free);stroke:{hex_of(ALARM)};stroke-width:1.6}}
 .ended path{{stroke:{hex_of(ALARM)};stroke-width:2}}
-.plan .ended text,.plan .met text{{text-anchor:start;font-size:10px}}
+.plan .ended text,.plan .met text{{font-size:10px}}.plan .met text{{text-anchor:start}}
 .met path{{fill:{hex_of(ALARM)};stroke:var(--free)}}.met.wait path{{fill:#8a4fb0}}
 svg.rows{{font:12px system-ui,sans-serif;max-width:33rem;width:100%}}
 svg.rows .group{{font-weight:600}}svg.rows .told{{text-anchor:end}}

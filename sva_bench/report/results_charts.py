@@ -19,7 +19,7 @@ MOST_DOTS = 24
 """Different values of trials that are shown one by one; more are shown as an empirical distribution."""
 _MOST_STEPS = 240  # of an empirical distribution: more can't be told apart
 _LABELLED = 8  # values with their shares written below
-_UNIT = "value [world file's units]"
+_UNITS = "[world file's units]"
 
 
 def plans_compared(scenarios: Sequence[AnyScenario]) -> str:
@@ -33,7 +33,7 @@ def plans_compared(scenarios: Sequence[AnyScenario]) -> str:
                      colour=colour)]
             rows.append(Row(label=shown_name(scenario, name), told=told, group=scenario.name, marks=[
                 *spans, Dot(at=plan.executed.mean, said=f"mean: {told}", colour=colour)]))
-    return rows_chart("Mean executed value of each plan in each scenario, with 95 % intervals", _UNIT, rows)
+    return rows_chart("Mean executed value of each plan in each scenario, with 95 % intervals", f"value {_UNITS}", rows)
 
 
 def differences(scenarios: Sequence[ScenarioSummary]) -> str:
@@ -53,7 +53,7 @@ def differences(scenarios: Sequence[ScenarioSummary]) -> str:
                          colour="var(--soft)"))
         rows.append(Row(label=scenario.name, told=vss_verdict(scenario.vss), marks=marks))
     return rows_chart("Value of the stochastic solution in each scenario: plain, variance-reduced and modelled",
-                      f"VSS, {_UNIT}", rows, zero=True)
+                      f"VSS {_UNITS}", rows, zero=True)
 
 
 def distributions(scenarios: Sequence[AnyScenario], counts: TrialCounts) -> str:
@@ -70,7 +70,7 @@ def distributions(scenarios: Sequence[AnyScenario], counts: TrialCounts) -> str:
                 told=f"mean {plan.executed.mean:.1f}, worst tenth {spread.cvar10:.1f}",
                 marks=[*_of_trials(known, colour), mean, worst] if known else [
                     Span(low=spread.q05, high=spread.q95, said="5 to 95 % of trials", colour=colour), mean, worst]))
-    return rows_chart("What single trials are worth, by scenario and plan", f"value of a trial, {_UNIT[6:]}", rows)
+    return rows_chart("What single trials are worth, by scenario and plan", f"value of a trial {_UNITS}", rows)
 
 
 def _of_trials(known: Sequence[tuple[float, int]], colour: str) -> list[Dot | Span | Steps]:

@@ -148,7 +148,7 @@ class _Maps:
         if reacts:
             legs += self._replanned(plan)
         else:
-            marks += self._met_marks(plan)
+            marks = self._met_marks(plan) + marks  # where robots ended lies on top
         colour = hex_of(plan_color(plan.name, plan.number))
         picture = self._view.picture(f"Routes of the {plan.title} plan in {plan.key[0]}", "".join(legs), "".join(marks))
         robots = "".join(self._robot(robot, route, ended) for robot, route in plan.routes.items())
@@ -163,7 +163,7 @@ class _Maps:
                 "driven. ■ base, ▲ refuelling station, ● point of interest; point at a leg, a site or a mark for more."]
         if "ended" in self.seen:
             said.append("✕ in a ring: robots ended for good on this leg, in so many per cent of missions; where on the "
-                        "leg isn't told, the mark is in its middle.")
+                        "leg isn't told: the mark lies past its arrow.")
         if met := [what for kind, what in _TOUCHED.items() if kind in self.seen]:
             said.append(f"◆ with a number: {' or '.join(met)} there, so many times in all that was driven.")
         if "replanned" in self.seen:
@@ -199,19 +199,21 @@ class _Maps:
 
     def _ended_marks(self, plan: _Shown, ended: Sequence[Ended]) -> list[str]:
         """A mark on each leg on which robots ended for good."""
-        marks = []
+        marks: list[str] = []
+        on: dict[tuple[str, int], int] = {}  # marks on each leg: they lie one behind the other
         for found in ended:
             route = plan.routes.get(found.robot, ())
             if found.end not in _ENDED or not found.left or found.stops + 1 >= len(route):
                 continue
             ends = route[found.stops], route[found.stops + 1]
-            x, y = _along(self._path(found.robot, ends), 0.5)[0]
+            before = on[found.robot, found.stops] = on.get((found.robot, found.stops), -1) + 1
+            x, y = _along(self._path(found.robot, ends), min(0.62 + 0.16 * before, 1.0))[0]
             self.seen.add("ended")
             marks.append(
                 f"<g class=ended><title>{text(found.robot)} {_ENDED[found.end]} on leg {found.stops + 1}, "
                 f"{text(ends[0])} → {text(ends[1])}: {_often(found.share)} of missions</title>"
                 f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6"/><path d="M{x - 3:.1f} {y - 3:.1f}l6 6m0-6l-6 6"/>'
-                f'<text x="{x + 8:.1f}" y="{y + 4:.1f}">{_often(found.share)}</text></g>')
+                f'<text x="{x:.1f}" y="{y - 8:.1f}">{_often(found.share)}</text></g>')
         return marks
 
     def _met_marks(self, plan: _Shown) -> list[str]:

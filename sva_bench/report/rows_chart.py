@@ -127,7 +127,7 @@ def _drawn(mark: Dot | Span | Steps, x: _Scale, top: float, tall: float) -> str:
     if mark.shape == "tick":
         shape = f'<path d="M{at:.1f} {middle - 9:.1f}v18" style="stroke:{mark.colour};stroke-width:2">{said}</path>'
     elif mark.shape == "down":
-        shape = f'<path d="M{at:.1f} {middle - 3:.1f}l-5 -8h10z" style="fill:{mark.colour}">{said}</path>'
+        shape = f'<path d="M{at:.1f} {middle - 2:.1f}l-4.5 -7h9z" style="fill:{mark.colour}">{said}</path>'
     else:
         hollow = f"fill:var(--paper);stroke:{mark.colour};stroke-width:2" if mark.shape == "hollow" else \
             f"fill:{mark.colour}"

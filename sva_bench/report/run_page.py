@@ -38,7 +38,6 @@ from sva_bench.report.wording import (
     finding,
     listed,
     optional,
-    per_cent,
     ranked,
     reliability_told,
     remarks,
@@ -49,6 +48,8 @@ from sva_bench.storage.manifest import Manifest
 from sva_bench.storage.stored_run import Content
 from sva_bench.storage.trial_counts import TrialCounts
 from sva_bench.world.model import World
+
+_MOST_TOLD = 6  # scenarios of whose lost robots the answer tells
 
 Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
@@ -62,7 +63,7 @@ def write_report(path: Path, content: Content) -> None:
     question = "Is the stochastic plan worth it" if isinstance(summary, Summary) else "What are the plans worth"
     parts = [
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
-        *_answer(summary, content.world),
+        *_answer(summary, content.world, content.counts),
         *reactions_answered(summary),
         *(_comparison(summary, content.counts) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
@@ -94,7 +95,7 @@ def write_report(path: Path, content: Content) -> None:
     write_page(path, summary.world, parts)
 
 
-def _answer(summary: AnySummary, world: World) -> list[str]:
+def _answer(summary: AnySummary, world: World, counts: TrialCounts) -> list[str]:
     lines = []
     if not summary.reach.nothing:
         lines = [f"<li><b>{text(name)}</b>{line}</li>" for name, line in (
@@ -104,13 +105,42 @@ def _answer(summary: AnySummary, world: World) -> list[str]:
     return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
             *(f"<p class=doubt><b>{sentence(said)}</b></p>" for said in failed_physics(summary)),
             *(f"<p class=doubt><b>{CONTRADICTED}</b> {sentence(said)}</p>" for said in contradictions(summary)),
-            *(note(remark) for remark in (*upset_by_noise(summary), *remarks(summary))), unproved, "</div>"]
+            *(note(remark) for remark in (*_robots_lost(summary, counts), *upset_by_noise(summary), *remarks(summary),
+                                          *_reduced(summary))), unproved, "</div>"]
 
 
 def _findings(summary: Summary, world: World) -> Iterator[tuple[str, str]]:
     for scenario in summary.scenarios:
         known, told = reliability_told(world, scenario.name, summary), against_nominal(scenario)
-        yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}{sentence(told and f'. {told}')}"
+        reduced = f"; variance-reduced {with_interval(scenario.vss.executed_controlled)}" if _is_reduced(scenario) \
+            else ""
+        yield scenario.name, (f" ({sentence(known)}): {sentence(finding(scenario.vss))}{sentence(reduced)}"
+                              f"{sentence(told and f'. {told}')}")
+
+
+def _is_reduced(scenario: ScenarioSummary) -> bool:
+    """Whether the variance-reduced VSS is another figure than the plain one."""
+    return not scenario.vss.same_plan and with_interval(scenario.vss.executed_controlled) != with_interval(
+        scenario.vss.executed)
+
+
+def _reduced(summary: AnySummary) -> list[str]:
+    """What variance-reduced means, where there is such a figure."""
+    return ["Variance-reduced: the luck of the failures drawn is replaced by its expectation, known in closed form; "
+            "what noise did stays as measured."] if isinstance(summary, Summary) and any(
+                map(_is_reduced, summary.scenarios)) else []
+
+
+def _robots_lost(summary: AnySummary, counts: TrialCounts) -> list[str]:
+    """How many robots a mission were lost under each plan; nothing where none was, or nobody counted."""
+    told = []
+    for scenario in summary.scenarios:
+        lost = {shown_name(scenario, name): _lost(counts, scenario.name, name) for name in scenario.plans}
+        if any(amount not in ("0.00", "–") for amount in lost.values()):
+            told.append(f"{scenario.name}: {', '.join(f'{name} {amount}' for name, amount in lost.items())}")
+    more = [f"{len(told) - _MOST_TOLD} more scenarios"] if len(told) > _MOST_TOLD else []
+    return ["Robots lost a mission, on average (they left the base and never came back): "
+            f"{'; '.join([*told[:_MOST_TOLD], *more])}."] if told else []
 
 
 def _rankings(summary: ComparisonSummary, world: World) -> Iterator[tuple[str, str]]:
@@ -130,9 +160,8 @@ def _comparison(summary: Summary, counts: TrialCounts) -> list[str]:
             for s in summary.scenarios]
     return [table(head, rows, caption="Executed values of both plans, and the value of the stochastic solution "
                                       "(VSS): how much more the stochastic plan is worth, in the same trials"),
-            note("Variance-reduced: the luck of the failures drawn is replaced by its expectation, known in closed "
-                 "form; what noise did stays as measured. Robots lost: how many a mission left the base and never came "
-                 "back, on average, stochastic | deterministic.")]
+            note("Robots lost: how many a mission left the base and never came back, on average, stochastic | "
+                 "deterministic.")]
 
 
 def _lost(counts: TrialCounts, scenario: str, planner: str) -> str:
