@@ -69,7 +69,8 @@ summary h2{{display:inline;margin:0}}
 align-items:start;margin-top:.6rem}}
 .map{{margin:0 0 .6rem;max-width:38rem;display:grid;grid-template-rows:subgrid;grid-row:span 3;justify-items:start}}
 .map svg{{width:100%}}.map b{{display:block}}.map li b{{display:inline}}
-.map figcaption{{color:var(--ink);border-left:.5rem solid var(--plan);padding-left:.5rem}}
+.map figcaption{{color:var(--ink);padding-left:1rem;print-color-adjust:exact;
+background:linear-gradient(var(--plan) 50%,var(--other,var(--plan)) 50%) 0/.5rem 100% no-repeat}}
 .map ul{{list-style:none;margin:0;padding:0;font-size:.92rem}}.map li{{margin:.2rem 0;overflow-wrap:anywhere}}
 .map span{{color:var(--soft)}}
 i.k{{display:inline-block;width:1.6rem;margin-right:.4rem;vertical-align:middle;height:0}}
@@ -82,7 +83,8 @@ stroke-width:3px;stroke-linejoin:round}}
 .plan text.small{{font-weight:400;font-size:10px}}
 .plan .base{{fill:var(--ink);stroke:var(--free)}}.station{{fill:{hex_of(SITES["station"])};stroke:#0b3b2d}}
 .poi{{fill:{hex_of(SITES["poi"])};stroke:#4a4310}}
-.plan .scale path{{fill:none;stroke:var(--ink);stroke-width:1.2}}.plan .scale text{{font-weight:400;font-size:10px}}
+.plan .scale path{{fill:none;stroke:var(--ink);stroke-width:1.2}}
+.plan .scale text{{font-weight:400;font-size:10px;text-anchor:end;stroke:none}}
 .leg path{{fill:none;stroke-width:2.4;stroke-linejoin:round}}.leg .head{{stroke:none!important}}
 .leg:hover path{{stroke-width:4.5}}.leg.replanned path{{stroke-dasharray:1.5 3.5;stroke-width:2}}
 {_robots()}.ended circle{{fill:var(--free);stroke:{hex_of(ALARM)};stroke-width:1.6}}

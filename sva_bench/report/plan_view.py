@@ -27,6 +27,7 @@ GROUND = "ground"
 """Id of what all maps of a page share."""
 _LONGEST = 420.0
 _MARGIN = 5.0  # the wall about the map
+_SCALE = 13.0  # height of the scale below it
 _LETTER, _LINE = 6.3, 12.0  # width and height of a letter of a label, a little more than on average
 _RADII: dict[SiteKind, float] = {"base": 6.0, "station": 6.0, "poi": 4.5}
 _MOST_CELLS = 700  # of a grid along a side; finer ones are shown coarser
@@ -70,15 +71,17 @@ class PlanView:
     Args:
         world: The world.
         lines_m: Lines that labels had better leave free [m], each of shape (k, 2).
+        busy: Places of the picture that labels had better leave free, shape (k, 2).
         incentives: Whether what robots earn stands below each POI.
         drawn: Whether the page has the ground already.
     """
 
-    def __init__(self, world: World, lines_m: Iterable[FloatArray] = (), *, incentives: bool = False,
-                 drawn: bool = False) -> None:
+    def __init__(self, world: World, lines_m: Iterable[FloatArray] = (), busy: FloatArray | None = None, *,
+                 incentives: bool = False, drawn: bool = False) -> None:
         self.frame = frame_of(world)
         self._world, self._drawn = world, drawn
-        self._sites = _sites(world, self.frame, list(lines_m), incentives=incentives)
+        self._sites = _sites(world, self.frame, list(lines_m), np.empty((0, 2)) if busy is None else busy,
+                             incentives=incentives)
 
     def picture(self, title: str, inner: str = "", above: str = "") -> str:
         """A map as SVG.
@@ -93,8 +96,8 @@ class PlanView:
         self._drawn = True
         frame = self.frame
         return (f'<svg class=plan role=img aria-label="{text(title)}" viewBox="0 0 {_n(frame.width)} '
-                f'{_n(frame.height)}" style="max-width:{frame.width * 1.4:.0f}px">{ground}{inner}{self._sites}{above}'
-                f"{_scale(frame)}</svg>")
+                f'{_n(frame.height + _SCALE)}" style="max-width:{frame.width * 1.4:.0f}px">{ground}{inner}'
+                f"{self._sites}{above}{_scale(frame)}</svg>")
 
 
 def line(points: FloatArray) -> str:
@@ -184,7 +187,8 @@ def _png(occupied: BoolArray) -> bytes:
             + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b""))
 
 
-def _sites(world: World, frame: Frame, lines_m: Sequence[FloatArray], *, incentives: bool) -> str:
+def _sites(world: World, frame: Frame, lines_m: Sequence[FloatArray], busy: FloatArray, *, incentives: bool
+           ) -> str:
     """Markers of all sites with their tooltips, and their names."""
     at = frame.at(np.array([[site.x_m, site.y_m] for site in world.sites]))
     parts = []
@@ -199,7 +203,7 @@ def _sites(world: World, frame: Frame, lines_m: Sequence[FloatArray], *, incenti
     centres = place_labels(
         2 * at, 2 * sizes, radii=2 * np.array([_RADII[site.kind] for site in world.sites]),
         frame=2 * np.array([_MARGIN, _MARGIN, frame.width - _MARGIN, frame.height - _MARGIN]),
-        lines=2 * np.concatenate(drawn) if drawn else np.empty((0, 2)), solid=2 * frame.at(within(world))) / 2
+        lines=2 * np.concatenate([*drawn, busy]), solid=2 * frame.at(within(world))) / 2
     for lines, (x, y) in zip(labels, centres.tolist(), strict=True):
         top = y - _LINE * len(lines) / 2 + 0.78 * _LINE
         parts += [f'<text x="{_n(x)}" y="{_n(top + k * _LINE)}"{" class=small" if k else ""}>{text(words)}</text>'
@@ -238,9 +242,9 @@ def _marker(kind: SiteKind, x: float, y: float) -> str:
 
 
 def _scale(frame: Frame) -> str:
-    """A bar in the lower right corner, about a fifth of the map long."""
+    """A bar below the map, about a fifth of it long."""
     length_m = tick_step(2.4 * (frame.width - 2 * _MARGIN) / frame.per_m)
     length = length_m * frame.per_m
-    x, y = frame.width - _MARGIN - 6 - length, frame.height - _MARGIN - 6
-    return (f'<g class=scale><path d="M{_n(x)} {_n(y - 4)}v4h{_n(length)}v-4"/><text x="{_n(x + length / 2)}" '
-            f'y="{_n(y - 4)}">{length_m:g} m</text></g>')
+    x, y = frame.width - length - 1, frame.height + 9
+    return (f'<g class=scale><path d="M{_n(x)} {_n(y - 4)}v4h{_n(length)}v-4"/><text x="{_n(x - 4)}" '
+            f'y="{_n(y + 1)}">{length_m:g} m</text></g>')

@@ -18,7 +18,7 @@ AnyScenario = ScenarioSummary | ComparedScenario
 MOST_DOTS = 24
 """Different values of trials that are shown one by one; more are shown as an empirical distribution."""
 _MOST_STEPS = 240  # of an empirical distribution: more can't be told apart
-_LABELLED = 8  # values with their shares written below
+_APART = 0.085  # of the width of a chart: room that a share below a dot takes
 _UNITS = "[world file's units]"
 
 
@@ -59,6 +59,8 @@ def differences(scenarios: Sequence[ScenarioSummary]) -> str:
 def distributions(scenarios: Sequence[AnyScenario], counts: TrialCounts) -> str:
     """What single trials are worth: a dot for each value where they take few, else their empirical distribution."""
     rows = []
+    spreads = [plan.distribution for scenario in scenarios for plan in scenario.plans.values()]
+    apart = _APART * (max(each.greatest for each in spreads) - min(each.least for each in spreads))
     for scenario in scenarios:
         for number, (name, plan) in enumerate(scenario.plans.items()):
             colour, spread = hex_of(plan_color(name, number)), plan.distribution
@@ -68,12 +70,12 @@ def distributions(scenarios: Sequence[AnyScenario], counts: TrialCounts) -> str:
             rows.append(Row(
                 label=shown_name(scenario, name), group=scenario.name,
                 told=f"mean {plan.executed.mean:.1f}, worst tenth {spread.cvar10:.1f}",
-                marks=[*_of_trials(known, colour), mean, worst] if known else [
+                marks=[*_of_trials(known, colour, apart), mean, worst] if known else [
                     Span(low=spread.q05, high=spread.q95, said="5 to 95 % of trials", colour=colour), mean, worst]))
     return rows_chart("What single trials are worth, by scenario and plan", f"value of a trial {_UNITS}", rows)
 
 
-def _of_trials(known: Sequence[tuple[float, int]], colour: str) -> list[Dot | Span | Steps]:
+def _of_trials(known: Sequence[tuple[float, int]], colour: str, apart: float) -> list[Dot | Span | Steps]:
     trials = sum(count for _, count in known)
     if len(known) > MOST_DOTS:
         reached = [count / trials for count in accumulate(count for _, count in known)]
@@ -81,17 +83,19 @@ def _of_trials(known: Sequence[tuple[float, int]], colour: str) -> list[Dot | Sp
         kept = [*range(0, len(known) - 1, step), len(known) - 1]
         return [Steps(values=[known[k][0] for k in kept], shares=[reached[k] for k in kept], colour=colour,
                       said="share of trials that are worth at most this")]
-    told = len(known) <= _LABELLED
+    labelled = _with_room(known, apart)
     return [Dot(at=value, said=f"{value:g}: {per_cent(100 * count / trials)} of trials", colour=colour,
                 radius=max(8.0 * math.sqrt(count / trials), 1.5),
-                below=per_cent(100 * count / trials) if told and _apart(known, value) else "")
-            for value, count in known]
+                below=per_cent(100 * count / trials) if value in labelled else "") for value, count in known]
 
 
-def _apart(known: Sequence[tuple[float, int]], value: float) -> bool:
-    """Whether there is room below a value for its share."""
-    width = known[-1][0] - known[0][0]
-    return all(abs(other - value) > 0.09 * width or other == value for other, _ in known)
+def _with_room(known: Sequence[tuple[float, int]], apart: float) -> set[float]:
+    """Values below which there is room for their share, the most frequent first."""
+    kept: set[float] = set()
+    for value, _ in sorted(known, key=lambda item: -item[1]):
+        if all(abs(value - other) >= apart for other in kept):
+            kept.add(value)
+    return kept
 
 
 def over_maps(groups: Mapping[str, Mapping[str, Sequence[float]]], unit: str) -> str:

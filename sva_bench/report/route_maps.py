@@ -19,8 +19,8 @@ from sva_bench.palette import ROBOTS, hex_of, plan_color
 from sva_bench.report.marks import marks_of, met_in
 from sva_bench.report.overlays import Mark
 from sva_bench.report.page import details, heading, note, sentence, text
-from sva_bench.report.plan_view import PlanView, line
-from sva_bench.report.wording import listed, per_cent, with_interval
+from sva_bench.report.plan_view import PlanView, frame_of, line
+from sva_bench.report.wording import listed, per_cent, reliability_told, with_interval
 from sva_bench.storage.run_folder import made_for
 from sva_bench.storage.stored_run import Content
 from sva_bench.storage.trial_counts import Ended, Key
@@ -44,20 +44,18 @@ class _Shown:
     """A plan on its map.
 
     Attributes:
-        name: Of the plan.
         title: What stands above it.
         worth: Its value, executed.
         routes: Route of each robot.
         key: Whose trials tell how often.
-        number: Its position among the plans compared.
+        colours: Names of the plan and of those of the same routes, with their positions among the plans compared.
     """
 
-    name: str
     title: str
     worth: Estimate
     routes: Mapping[str, Route]
     key: Key
-    number: int
+    colours: Sequence[tuple[str, int]]
 
 
 def route_maps(content: Content) -> list[str]:
@@ -66,7 +64,7 @@ def route_maps(content: Content) -> list[str]:
     shown = {scenario.name: list(_plans(content, scenario)) for scenario in scenarios}
     if not any(shown.values()):
         return []
-    maps = _Maps(content)
+    maps = _Maps(content, [plan for plans in shown.values() for plan in plans])
     telling = _telling(scenarios)
     # The open one comes first into the budget; the page keeps the order of the scenarios.
     drawn: dict[str, str] = {}
@@ -92,8 +90,7 @@ def _telling(scenarios: Sequence[AnyScenario]) -> str:
 
 
 def _said(content: Content, scenario: AnyScenario) -> str:
-    doubtful = [f"{name} there in {per_cent(100 * p)}" for name, p in scenario.availability.items() if p < 1]
-    known = f" ({', '.join(doubtful)} of missions)" if doubtful and content.summary.failure.execute == "mission" else ""
+    known = f" ({reliability_told(content.world, scenario.name, content.summary)})"
     if not isinstance(scenario, ScenarioSummary):
         return known
     return f"{known}: " + ("the same plan" if scenario.vss.same_plan else f"VSS {with_interval(scenario.vss.executed)}")
@@ -107,40 +104,43 @@ def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
         if routes is not None and name != "informed":  # its routes are others in each outcome
             alike.setdefault(tuple((robot, tuple(route)) for robot, route in routes.items()), []).append(name)
     for names in itertools.islice(alike.values(), _MOST_PLANS):
-        first = names[0]
-        yield _Shown(name=first, title=listed([shown_name(scenario, name) for name in names]),
+        first, every = names[0], list(scenario.plans)
+        yield _Shown(title=listed([shown_name(scenario, name) for name in names]),
                      worth=scenario.plans[first].executed, routes=content.routes[scenario.name, first],
-                     key=(scenario.name, first, "none", "never"), number=list(scenario.plans).index(first))
+                     key=(scenario.name, first, "none", "never"), colours=[(name, every.index(name)) for name in names])
     for reaction in itertools.islice((r for r in scenario.reactions or () if r.policy != "none"), _MOST_REACTIONS):
         best = reaction.best.plan if hasattr(reaction, "best") else reaction.ranking[0].plan
         plan: PlanFigures | None = reaction.plans.get(best)
         routes = content.routes.get((scenario.name, best)) or content.routes.get(
             (scenario.name, made_for(best, reaction.news)))
         if plan is not None and routes is not None:
-            yield _Shown(name=best, title=f"{best}, team re-plans on {reaction.news} news", worth=plan.executed,
+            yield _Shown(title=f"{best}, team re-plans on {reaction.news} news", worth=plan.executed,
                          routes=routes, key=(scenario.name, best, reaction.policy, reaction.news),
-                         number=list(reaction.plans).index(best))
+                         colours=[(best, list(reaction.plans).index(best))])
 
 
 class _Maps:
     """Figures of plans of one run."""
 
-    def __init__(self, content: Content) -> None:
+    def __init__(self, content: Content, plans: Sequence[_Shown]) -> None:
         self._content = content
         self._met = met_in(content)
         self._kinds = {robot.name: content.world.kind_of(robot) for robot in content.world.robots}
         self._places = {site.name: (site.x_m, site.y_m) for site in content.world.sites}
         self._numbers = {robot.name: number for number, robot in enumerate(content.world.robots)}
         self._straight = False
-        self._view = PlanView(content.world, content.paths.values())
+        self._frame = frame_of(content.world)
         self._driven = _driven_with_reactions(content)
         self.seen: set[str] = set()  # kinds of marks, for the legend
+        places = np.array([place for plan in plans for _, _, place in self._ended(plan)]).reshape(-1, 2)
+        busy = np.concatenate([places + np.array([0.0, up]) for up in (0.0, 3.0, -3.0, -12.0, -15.0)] * 2)
+        self._view = PlanView(content.world, content.paths.values(), busy)
 
     def figure(self, plan: _Shown) -> str:
         """The map of one plan, with its title above and its robots below."""
         ended = self._content.counts.ended.get(plan.key, ())
         reacts = plan.key[2] != "none"
-        legs, marks = [], [] if reacts else self._ended_marks(plan, ended)
+        legs, marks = [], self._ended_marks(plan)
         for robot, route in plan.routes.items():
             for number, ends in enumerate(itertools.pairwise(route)):
                 if ends[0] != ends[1]:
@@ -149,10 +149,10 @@ class _Maps:
             legs += self._replanned(plan)
         else:
             marks = self._met_marks(plan) + marks  # where robots ended lies on top
-        colour = hex_of(plan_color(plan.name, plan.number))
+        colours = ";--other:".join(hex_of(plan_color(name, number)) for name, number in plan.colours[:2])
         picture = self._view.picture(f"Routes of the {plan.title} plan in {plan.key[0]}", "".join(legs), "".join(marks))
         robots = "".join(self._robot(robot, route, ended) for robot, route in plan.routes.items())
-        return (f'<figure class=map><figcaption style="--plan:{colour}"><b>{text(plan.title)}</b> '
+        return (f'<figure class=map><figcaption style="--plan:{colours}"><b>{text(plan.title)}</b> '
                 f"{sentence(f'executed {with_interval(plan.worth)}')}</figcaption>{picture}<ul>{robots}</ul></figure>")
 
     def legend(self) -> str:
@@ -176,7 +176,7 @@ class _Maps:
         if path is None:
             self._straight = True
             path = np.array([self._places[end] for end in ends])
-        return beside(self._view.frame.at(path), _LANE * (self._numbers[robot] + 0.5))
+        return beside(self._frame.at(path), _LANE * (self._numbers[robot] + 0.5))
 
     def _leg(self, robot: str, number: int, ends: tuple[str, str], share: float | None) -> str:
         path = self._path(robot, ends)
@@ -197,17 +197,20 @@ class _Maps:
                         f'<path d="{line(self._path(robot, (origin, destination)))}"/></g>')
         return legs
 
-    def _ended_marks(self, plan: _Shown, ended: Sequence[Ended]) -> list[str]:
-        """A mark on each leg on which robots ended for good."""
-        marks: list[str] = []
+    def _ended(self, plan: _Shown) -> Iterator[tuple[Ended, tuple[str, str], FloatArray]]:
+        """Missions that ended for good on a leg of a plan that is kept: its ends, and the place of their mark."""
         on: dict[tuple[str, int], int] = {}  # marks on each leg: they lie one behind the other
-        for found in ended:
+        for found in self._content.counts.ended.get(plan.key, ()) if plan.key[2] == "none" else ():
             route = plan.routes.get(found.robot, ())
-            if found.end not in _ENDED or not found.left or found.stops + 1 >= len(route):
-                continue
-            ends = route[found.stops], route[found.stops + 1]
-            before = on[found.robot, found.stops] = on.get((found.robot, found.stops), -1) + 1
-            x, y = _along(self._path(found.robot, ends), min(0.62 + 0.16 * before, 1.0))[0]
+            if found.end in _ENDED and found.left and found.stops + 1 < len(route):
+                before = on[found.robot, found.stops] = on.get((found.robot, found.stops), -1) + 1
+                ends = route[found.stops], route[found.stops + 1]
+                yield found, ends, _along(self._path(found.robot, ends), min(0.62 + 0.16 * before, 1.0))[0]
+
+    def _ended_marks(self, plan: _Shown) -> list[str]:
+        """A mark on each leg on which robots ended for good."""
+        marks = []
+        for found, ends, (x, y) in self._ended(plan):
             self.seen.add("ended")
             marks.append(
                 f"<g class=ended><title>{text(found.robot)} {_ENDED[found.end]} on leg {found.stops + 1}, "
@@ -224,7 +227,7 @@ class _Maps:
         marks = []
         for mark in sorted(found, key=lambda each: -each.count)[:_MOST_MARKS]:
             self.seen.add(mark.kind)
-            (x, y), = self._view.frame.at(np.array([[mark.x_m, mark.y_m]])).tolist()
+            (x, y), = self._frame.at(np.array([[mark.x_m, mark.y_m]])).tolist()
             size = 3.5 + min(2.0, 0.5 * np.log2(mark.count))
             stuck = ", and one never got away" if mark.stuck else ""
             marks.append(f'<g class="met {mark.kind}"><title>{_TOUCHED[mark.kind]} here, {counted(mark.count, "time")}'

@@ -134,7 +134,7 @@ def _reduced(summary: AnySummary) -> list[str]:
 def _robots_lost(summary: AnySummary, counts: TrialCounts) -> list[str]:
     """How many robots a mission were lost under each plan; nothing where none was, or nobody counted."""
     told = []
-    for scenario in summary.scenarios:
+    for scenario in summary.scenarios if isinstance(summary, Summary) else ():  # a ranking has it behind each plan
         lost = {shown_name(scenario, name): _lost(counts, scenario.name, name) for name in scenario.plans}
         if any(amount not in ("0.00", "–") for amount in lost.values()):
             told.append(f"{scenario.name}: {', '.join(f'{name} {amount}' for name, amount in lost.items())}")

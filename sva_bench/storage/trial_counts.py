@@ -32,7 +32,7 @@ class Ended:
         robot: The robot.
         end: How they ended.
         stops: How many stops of its orders it had reached.
-        left: Whether it was available, and so left the base.
+        left: Whether it set out.
         share: Share of all missions.
     """
 
@@ -72,10 +72,12 @@ class Counting:
 
     def add(self, piece: pa.Table) -> None:
         """Count some rows, which go on where the last ones ended."""
-        found = piece.group_by([*_KEY, "robot", "end", "stops_reached", "available"]).aggregate([("weight", "sum")])
+        # A robot that fails by draw along its route is not available, and lost; one that never sets out isn't lost.
+        left = piece.append_column("left", pc.or_(piece.column("available"), piece.column("lost")))
+        found = left.group_by([*_KEY, "robot", "end", "stops_reached", "left"]).aggregate([("weight", "sum")])
         for row in found.to_pylist():
             mine = self._ended.setdefault((row["scenario"], row["planner"], row["policy"], row["news"]), Counter())
-            mine[row["robot"], row["end"], row["stops_reached"], row["available"]] += row["weight_sum"]
+            mine[row["robot"], row["end"], row["stops_reached"], row["left"]] += row["weight_sum"]
         kept = _spelt(piece.filter(pc.equal(pc.cast(piece.column("policy"), pa.string()), "none")))
         kept = kept if self._begun is None else pa.concat_tables([self._begun, kept])
         whole = kept.num_rows - kept.num_rows % self._robots
