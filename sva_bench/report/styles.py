@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from sva_bench.choices import Judgement, MarkKind, SiteKind, StandKind
-from sva_bench.palette import ALARM, GREEN, SITES, hex_of, robot_color
+from sva_bench.palette import ALARM, BLUE, GREEN, ORANGE, SITES, SKY_BLUE, hex_of, robot_color
 from sva_bench.palette import ROBOTS as COLORS
 from sva_bench.recording.meetings import Floor
 
@@ -26,7 +26,7 @@ ROBOTS: tuple[tuple[str, Any, float], ...] = tuple(  # colour, style, width [pt]
         ("-", 2.6), ((0, (5, 2)), 2.0), ((0, (1.2, 1.5)), 2.0), ((0, (6, 1.5, 1.2, 1.5)), 1.8), ((0, (3, 4)), 1.4)),
         strict=True))
 """How the robots of a world are drawn, in their order there."""
-ROADMAP, PATH = "#56B4E9", "#0072B2"
+ROADMAP, PATH = hex_of(SKY_BLUE), hex_of(BLUE)
 PASSAGE, PASSAGE_PT = "#0B6E4F", 5.0  # colour; width that names keep off it [pt]
 MARKS: dict[MarkKind, tuple[str, str, str]] = {  # shape, colour, what it is
     "contact": ("X", hex_of(ALARM), "contact with an obstacle"),
@@ -37,7 +37,7 @@ MARKS_OF_MANY: dict[MarkKind, str] = {
 STANDS: dict[StandKind, tuple[str, str]] = {  # colour, what it is
     "berth": ("#000000", "berth of a robot"), "slot": (hex_of(GREEN), "slot of a station")}
 JUDGED: dict[Judgement, tuple[str, Any, float]] = {  # colour, style, width [pt]
-    "safe": ("#009E73", "-", 1.6), "close": ("#E69F00", (0, (5, 1.5)), 2.2), "edge": (hex_of(ALARM), "-", 3.4)}
+    "safe": (hex_of(GREEN), "-", 1.6), "close": (hex_of(ORANGE), (0, (5, 1.5)), 2.2), "edge": (hex_of(ALARM), "-", 3.4)}
 JUDGED_TOLD: dict[Judgement, str] = {"safe": "leg with margin to spare", "close": "leg with little margin",
                                      "edge": "leg on a knife's edge"}
 
