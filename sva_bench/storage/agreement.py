@@ -181,7 +181,7 @@ def _grouped(piece: pa.Table) -> list[_Group]:
     for column in ("incentive", "value", "lost"):
         piece = piece.append_column(f"weighted_{column}", pc.multiply(
             weight, pc.cast(piece.column(column), pa.float64())))
-    found = piece.group_by(["scenario", "planner", "policy", "news", "robot", "end"]).aggregate([
+    found = piece.group_by(["scenario", "planner", "policy", "news", "robot", "end"], use_threads=False).aggregate([
         ("weighted_incentive", "sum"), ("weighted_lost", "sum"), ("weighted_value", "sum"), ("trial", "count"),
         ("trial", "min"), ("weight", "sum"), ("weight", "min"), ("weight", "max"), ("history", "min"),
         ("history", "max"), ("stops_reached", "min"), ("stops_reached", "max")]).to_pylist()
@@ -191,7 +191,7 @@ def _grouped(piece: pa.Table) -> list[_Group]:
 def _numbered(piece: pa.Table) -> Iterator[tuple[Key, int, str, IntArray]]:
     """Numbers of the histories of each plan, noise draw and robot, of the rows that have one."""
     found = piece.filter(pc.greater_equal(piece.column("history"), 0)).group_by(
-        ["scenario", "planner", "policy", "news", "rollout", "robot"]).aggregate([("history", "list")])
+        ["scenario", "planner", "policy", "news", "rollout", "robot"], use_threads=False).aggregate([("history", "list")])
     histories = found.column("history_list")
     for number, row in enumerate(found.drop_columns("history_list").to_pylist()):
         key = row["scenario"], row["planner"], row["policy"], row["news"]

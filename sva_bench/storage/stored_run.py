@@ -248,6 +248,7 @@ def _content(folder: Path) -> Content:
     counting = Counting(len(world.robots))
     driven = check_outcomes(folder / "outcomes.parquet", claims,
                             {robot.name: robot.loss_cost for robot in world.robots}, words, counting.add)
+    pa.default_memory_pool().release_unused()  # else what the rows took stays with the process, beside the page
     foreign = isinstance(summary, ComparisonSummary)
     stems = {(scenario, name): stem_of(scenario, name, foreign=foreign)
              for scenario, name, policy, _ in claims if policy == "none"}
