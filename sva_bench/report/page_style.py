@@ -100,6 +100,6 @@ svg.rows .steps{{fill:none;stroke-width:1.8}}
 @media print{{html,body{{font-size:10pt}}body{{max-width:none;padding:0}}.wide{{overflow:visible;background:none}}
 h2{{break-after:avoid}}nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows{{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
-details>*{{display:block!important}}summary{{list-style:none}}
-th,td,td.text{{white-space:normal;padding:.15rem .35rem}}td.long{{min-width:0}}a{{color:inherit}}}}
+summary{{list-style:none}}
+table{{font-size:8pt}}th,td,td.text{{white-space:normal;padding:.15rem .25rem}}td.long{{min-width:0}}a{{color:inherit}}}}
 """
