@@ -33,7 +33,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     world.write_text(SMALL, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "_charts", lambda *_, **__: [])  # drawing is tried once, below; it takes a second
-        patch.setattr(report, "_world", lambda *_: [])
+        patch.setattr(report, "_world", lambda *_, **__: [])
         assert run_command_line(["run", str(world), *QUICK, "--informed", "--assumptions", "--policy",
                                  "resolve", "--news", "instant", "--anticipate", "--out", str(folder / "runs")]) == 0
         (run,) = (folder / "runs").iterdir()
@@ -121,8 +121,8 @@ def some(changes: list[Any], count: int, seed: int) -> list[Any]:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Charts take most of the time of a report; that they hold is tried with every kind of figure below."""
     monkeypatch.setattr(report, "_charts", lambda *_, **__: [])
-    monkeypatch.setattr(report, "_world", lambda *_: [])
-    monkeypatch.setattr("sva_bench.report.charts.distributions", lambda *_: "")
+    monkeypatch.setattr(report, "_world", lambda *_, **__: [])
+    monkeypatch.setattr("sva_bench.report.run_page.distributions", lambda *_: "")
     monkeypatch.setattr("sva_bench.report.charts.legs_driven", lambda *_: "")
 
 
@@ -245,7 +245,7 @@ def test_outcomes_of_runs_and_batches_have_the_same_columns_types_and_units(fold
     assert run.field("fuel_used_s").metadata[b"unit"] == b"s of driving"
 
 
-@pytest.mark.parametrize("table", ["outcomes", "legs"])
+@pytest.mark.parametrize("table", ["outcomes", "legs", "paths"])
 @pytest.mark.parametrize("count", [40, pytest.param(10_000, marks=pytest.mark.long)])
 @pytest.mark.usefixtures("undrawn")
 def test_a_run_folder_with_any_column_spoilt_gives_its_report_or_one_error(
@@ -383,7 +383,8 @@ def files_of(folder: Path) -> list[str]:
 def test_a_run_folder_without_any_of_its_files_is_called_incomplete(
     kind: str, folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    names = [name for name in files_of(folders[kind]) if not name.startswith("instance-")]  # no page shows instances
+    # No page shows instances, and older folders have no paths: routes are straight lines there.
+    names = [name for name in files_of(folders[kind]) if not name.startswith(("instance-", "paths."))]
     assert {"manifest.json", "summary.json", "legs.parquet", "outcomes.parquet", "travel_times.parquet"} < set(names)
     assert any(name.startswith("plans/") for name in names)
     for name in names:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import logging
 import os
@@ -21,8 +22,8 @@ from sva_bench.errors import BadFile
 from sva_bench.files.printable import is_text, printable
 from sva_bench.mission.instance_file import read_instance
 from sva_bench.mission.plan_file import read_plan
-from sva_bench.report.charts import boxes_of
 from sva_bench.report.page import text as text_of_a_page
+from sva_bench.report.results_charts import over_maps
 from tests.test_bounds import TINY
 from tests.worlds_for_tests import SMALL
 
@@ -135,4 +136,4 @@ def test_a_run_in_folders_whose_names_are_no_utf8_is_made_and_reported(tmp_path:
 
 @pytest.mark.parametrize("name", ["$\\frac$", "a$b$", "$x_{$", "[red]", "漢字"])
 def test_a_chart_takes_names_as_they_are(name: str) -> None:
-    assert "<svg" in boxes_of({name: [1.0, 2.0]}, "title", "unit")
+    assert html.escape(name) in over_maps({name: {name: [1.0, 2.0]}}, "unit")

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sva_bench.analysis.over_maps import BatchSummary, OverMaps, labelled
+from sva_bench.analysis.over_maps import BatchSummary, OverMaps
 from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
-from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.calibration_over_maps import calibrated_over_maps
 from sva_bench.report.calibration_page import bad_pct
-from sva_bench.report.page import figure, heading, note, sentence, table, write_page
+from sva_bench.report.page import CONTENTS, figure, heading, note, sentence, table, write_page
 from sva_bench.report.reaction_wording import knows_what_when
 from sva_bench.report.reactions_over_maps import answers_over_maps, reaction_table
+from sva_bench.report.results_charts import over_maps
 from sva_bench.report.wording import (
     VSS_PCT,
     listed,
@@ -39,6 +39,7 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
         table([*(["variant"] if varied else []), "scenario", "maps", "VSS", "VSS [%]"], over,
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
+        CONTENTS,
         *_reactions(summary),
         *(note(remark) for remark in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing])),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, fidelity {summary.fidelity}; 95 "
@@ -85,17 +86,15 @@ def _reactions(summary: BatchSummary) -> list[str]:
 
 
 def _pictures(summary: BatchSummary) -> list[str]:
-    with holding_back_ctrl_c():
-        from sva_bench.report import charts
-
     # A map is a point, as it is in the interval: seeds of one map are no sample of maps.
-    by_scenario: dict[str, list[float]] = {}
+    groups: dict[str, dict[str, list[float]]] = {}
     for row in summary.maps:
         if row.vss_pct is not None:
-            by_scenario.setdefault(labelled(row.scenario, row.variant), []).append(row.vss_pct)
+            groups.setdefault(row.scenario, {}).setdefault(row.variant, []).append(row.vss_pct)
     seeds = ", the mean over its seeds" if len(summary.seeds) > 1 else ""
-    return [figure(charts.boxes_of(by_scenario, "VSS over maps", "VSS [% of the stochastic plan]"),
-                   f"Each point is a map{seeds}.")] if by_scenario else []
+    return [heading("VSS over maps"), figure(over_maps(groups, "VSS [% of the stochastic plan]"),
+            f"Each dot is a map{seeds}; the tick is the mean over maps. Right of zero, planning for failures pays.")
+            ] if groups else []
 
 
 def _answer(summary: BatchSummary) -> str:

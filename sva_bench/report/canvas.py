@@ -20,6 +20,10 @@ SETTINGS: dict[Any, Any] = {
 """Of matplotlib, for each picture; whatever a user has set up there is left aside."""
 
 
+_OF_PAGE = {"#000000": "ink", "#444444": "soft", "#dddddd": "line", "#bbbbbb": "line", "#ffffff": "paper"}
+"""Colours of charts that are others in the dark, by variables of the page."""
+
+
 def chart(name: str, title: str, size_in: tuple[float, float], draw: Callable[[Axes], None]) -> str:
     """A chart as SVG that can stand in a page.
 
@@ -33,8 +37,8 @@ def chart(name: str, title: str, size_in: tuple[float, float], draw: Callable[[A
         mpl.rcdefaults()
         # Words stay words: smaller, to be found and read aloud.
         mpl.rcParams.update(SETTINGS | {"svg.fonttype": "none", "font.size": 10.0, "axes.spines.top": False,
-                                         "axes.spines.right": False, "axes.axisbelow": True})
-        figure = Figure(figsize=size_in, facecolor="white", layout="constrained")
+                                         "axes.spines.right": False, "axes.axisbelow": True, "axes.facecolor": "none"})
+        figure = Figure(figsize=size_in, facecolor="none", layout="constrained")
         FigureCanvasAgg(figure)
         draw(figure.add_subplot())
         stream = io.StringIO()
@@ -43,10 +47,12 @@ def chart(name: str, title: str, size_in: tuple[float, float], draw: Callable[[A
 
 
 def for_page(svg: str, name: str, title: str) -> str:
-    """An SVG file's picture, its ids its own and its title said."""
+    """An SVG file's picture, its ids its own, its title said, its blacks and greys those of the page in its mode."""
     picture = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg"):], flags=re.DOTALL)
     picture = re.sub(r'\bid="', f'id="{name}-', picture)
     picture = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", picture)
+    for colour, variable in _OF_PAGE.items():
+        picture = re.sub(rf"(?<=[:;] ){colour}\b", f"var(--{variable})", picture)
     escaped_title = html.escape(title)
     return picture.replace("<svg ", f'<svg role="img" aria-label="{escaped_title}" ', 1).replace(
         ">", f"><title>{escaped_title}</title>", 1).strip()

@@ -9,18 +9,17 @@ from typing import Any
 import numpy as np
 
 from sva_bench.analysis.calibration import Calibration
-from sva_bench.analysis.plan_names import shown_over
-from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
+from sva_bench.palette import PLANS, hex_of
 from sva_bench.report.canvas import Axes, chart
 from sva_bench.report.styles import robot_colour
 
 AnyScenario = ScenarioSummary | ComparedScenario
 
-_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#999999")
 _HATCHES = ("", "///", "...", "xxx", "\\\\\\", "ooo", "+++", "---")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
 
 def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence[str] = ()) -> str:
     """Bars: the value of each robot, scenario by scenario (Figures 4 and 7 of the paper).
@@ -36,7 +35,7 @@ def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence
     least, most = min(0.0, *shown), max(0.0, *shown)  # below 0: a robot's loss cost more than it collected
 
     def draw(axes: Axes) -> None:
-        _bars(axes, [s.name for s in scenarios], heights, {}, robot_colour)
+        _bars(axes, [s.name for s in scenarios], heights, robot_colour)
         axes.set_ylabel("mean value [world file's units]")
         axes.set_title(f"Value by robot, {plan} plan")
         if most > least:
@@ -44,38 +43,6 @@ def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence
 
     return chart(_name("robots", plan), f"Mean value of each robot in each scenario, {plan} plan",
                  (_width(len(scenarios), len(robots)), 3.6), draw)
-
-
-def plans_compared(scenarios: Sequence[AnyScenario]) -> str:
-    """Bars with intervals: the value of each plan, scenario by scenario (Figure 8)."""
-    plans = {name: shown_over(scenarios, name) for name in scenarios[0].plans}
-    heights = {shown: [s.plans[name].executed.mean for s in scenarios] for name, shown in plans.items()}
-    ends = {shown: [s.plans[name].executed.ci95 for s in scenarios] for name, shown in plans.items()}
-
-    def draw(axes: Axes) -> None:
-        _bars(axes, [s.name for s in scenarios], heights, ends)
-        axes.set_ylabel("mean value [world file's units]")
-        axes.set_title("Executed value, 95 % intervals")
-
-    return chart("plans", "Mean executed value of each plan in each scenario with 95 % intervals",
-                 (_width(len(scenarios), len(plans)), 3.6), draw)
-
-
-def differences(rows: Sequence[tuple[str, Estimate]], title: str, unit: str) -> str:
-    """Points with intervals on a line of zero: one row each."""
-    def draw(axes: Axes) -> None:
-        axes.axvline(0, color="#444", linewidth=1)
-        for row, (_, found) in enumerate(rows):
-            if found.ci95 is not None:
-                axes.plot(found.ci95, [row, row], color=_COLOURS[0], linewidth=3, solid_capstyle="butt")
-            axes.plot(found.mean, row, marker="o", color="black", markersize=6, linestyle="none")
-        axes.set_yticks(range(len(rows)), [label for label, _ in rows])
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.set_xlabel(unit)
-        axes.set_title(title)
-        axes.grid(axis="x", color="#ddd")
-
-    return chart(_name("differences", title), f"{title}: means and 95 % intervals", (6.0, 1.3 + 0.34 * len(rows)), draw)
 
 
 def calibration_curve(scenario: str, found: Calibration) -> str:
@@ -91,7 +58,7 @@ def calibration_curve(scenario: str, found: Calibration) -> str:
 
     def draw(axes: Axes) -> None:
         for number, (name, values) in enumerate(lines.items()):
-            colour, shape = mark(number)
+            colour, shape = ("#000000", hex_of(PLANS["calibrated"]))[number], marker(number)
             # Where both coincide the first must still be seen: thin and dashed over wide, small on large.
             over = {"linewidth": 1.4, "linestyle": "--", "markersize": 4} if number else {
                 "linewidth": 4.0, "markersize": 9}
@@ -108,62 +75,6 @@ def calibration_curve(scenario: str, found: Calibration) -> str:
 
     return chart(_name("calibration", scenario), f"{scenario}: promised and executed value of plans for higher and "
                  "higher costs, by the share of missions that go wrong", (4.8, 3.6), draw)
-
-
-def distributions(scenarios: Sequence[AnyScenario]) -> str:
-    """Boxes: how a plan's value varies over trials."""
-    plans = list(scenarios[0].plans)
-
-    def draw(axes: Axes) -> None:
-        for number, name in enumerate(plans):
-            found = [s.plans[name].distribution for s in scenarios]
-            boxes = [{"med": d.q50, "q1": d.q25, "q3": d.q75, "whislo": d.q05, "whishi": d.q95}
-                     for d in found]
-            at = [k + _offset(number, len(plans)) for k in range(len(scenarios))]
-            drawn = axes.bxp(boxes, positions=at, widths=0.8 / len(plans) * 0.85, showfliers=False, patch_artist=True,
-                             medianprops={"color": "black", "linewidth": 1.6}, manage_ticks=False)
-            for box in drawn["boxes"]:
-                box.set(facecolor=_colour(number), hatch=_hatch(number))
-            axes.plot(at, [d.cvar10 for d in found], linestyle="none", marker="v", color="black", markersize=5,
-                      label="mean of the worst tenth" if number == 0 else None)
-            axes.bar(0, 0, facecolor=_colour(number), hatch=_hatch(number), edgecolor="black",
-                     label=shown_over(scenarios, name))
-        _names(axes, [s.name for s in scenarios])
-        axes.set_ylabel("value of a trial [world file's units]")
-        axes.set_title("Over trials: 5, 25, 50, 75, 95 %")
-        _legend(axes)
-
-    return chart("distributions", "Box plots of the value of single trials, by scenario and plan",
-                 (max(6.0, _width(len(scenarios), len(plans))), 3.8), draw)
-
-
-def boxes_of(groups: Mapping[str, Sequence[float]], title: str, unit: str) -> str:
-    """A box and its points for each group, one below the other: their names may be long."""
-    labels = [textwrap.fill(name, _LABEL) for name in groups]
-    lines = sum(label.count("\n") + 1 for label in labels)
-
-    def draw(axes: Axes) -> None:
-        figures = [np.asarray(group, dtype=np.float64) for group in groups.values()]
-        axes.axvline(0, color="#444", linewidth=1)
-        drawn = axes.boxplot(figures, positions=range(len(groups)), widths=0.5, patch_artist=True, manage_ticks=False,
-                             showfliers=False, orientation="horizontal",
-                             medianprops={"color": "black", "linewidth": 1.6})
-        for box in drawn["boxes"]:
-            box.set(facecolor="#cfe3f1")
-        for k, group in enumerate(figures):
-            spread = np.linspace(-0.12, 0.12, len(group)) if len(group) > 1 else np.zeros(1)
-            axes.plot(group, k + spread, linestyle="none", marker="o", color=_COLOURS[0], markersize=4,
-                      markeredgecolor="black", markeredgewidth=0.4)
-        axes.set_yticks(range(len(groups)), labels)
-        axes.set_ylim(len(groups) - 0.5, -0.5)
-        axes.set_xlabel(unit)
-        axes.set_title(title)
-        axes.grid(axis="x", color="#ddd")
-
-    return chart(_name("boxes", title), title, (7.0, 1.3 + max(0.4 * len(groups), 0.22 * lines)), draw)
-
-
-_LABEL = 32  # letters of a label from which on it goes on in the next line
 
 
 def legs_driven(planned_s: FloatArray, driven_s: FloatArray, robots: Sequence[str], order: Sequence[str]) -> str:
@@ -198,14 +109,11 @@ _MANY = 2000  # points from which on an SVG holds them as an image
 
 
 def _bars(axes: Axes, groups: Sequence[str], heights: Mapping[str, Sequence[float]],
-          ends: Mapping[str, Sequence[Sequence[float] | None]], colour: Callable[[int], str] | None = None) -> None:
+          colour: Callable[[int], str]) -> None:
     for number, (name, tall) in enumerate(heights.items()):
         at = [k + _offset(number, len(heights)) for k in range(len(groups))]
-        axes.bar(at, tall, width=0.8 / len(heights), facecolor=(colour or _colour)(number), hatch=_hatch(number),
+        axes.bar(at, tall, width=0.8 / len(heights), facecolor=colour(number), hatch=_hatch(number),
                  edgecolor="black", linewidth=0.6, label=name)
-        for x, interval in zip(at, ends.get(name, ()), strict=False):
-            if interval is not None:
-                axes.plot([x, x], interval, color="black", linewidth=1.6, marker="_", markersize=7)
     _names(axes, groups)
     _legend(axes)
 
@@ -250,13 +158,9 @@ def _offset(number: int, of: int) -> float:
     return 0.8 * ((number + 0.5) / of - 0.5)
 
 
-def mark(number: int) -> tuple[str, str]:
-    """Colour and shape of the points of a series."""
-    return _colour(number), _MARKERS[number % len(_MARKERS)]
-
-
-def _colour(number: int) -> str:
-    return _COLOURS[number % len(_COLOURS)]
+def marker(number: int) -> str:
+    """Shape of the points of a series."""
+    return _MARKERS[number % len(_MARKERS)]
 
 
 def _hatch(number: int) -> str:

@@ -8,28 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sva_bench.files.printable import printable
-
-_STYLE = """
-:root{color-scheme:light}*{box-sizing:border-box}
-body{font:16px/1.5 system-ui,sans-serif;max-width:76rem;margin:0 auto;padding:1rem;color:#1b1b1b;background:#fff}
-h1,h2,p,li,figcaption{overflow-wrap:anywhere}
-h1{font-size:1.5rem;line-height:1.25;margin:.4rem 0}h2{font-size:1.2rem;margin:2.2rem 0 .4rem}
-p{margin:.5rem 0}.answer{border-left:.4rem solid #0072B2;background:#eef5fa;padding:.6rem 1rem;margin:.8rem 0}
-.answer p:first-child{font-size:1.15rem;font-weight:600;margin-top:0}.answer ul{margin:.3rem 0;padding-left:1.2rem}
-.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem}
-th,td{padding:.3rem .7rem;text-align:right;border-bottom:1px solid #ddd;vertical-align:top}
-th{background:#f5f5f5}.text{text-align:left}td.text{white-space:nowrap}
-.section{overflow-wrap:anywhere}td.long{white-space:normal;min-width:16rem;overflow-wrap:anywhere}
-figure.rows>figcaption{padding-bottom:.3rem}
-figure{margin:1rem 0;break-inside:avoid}figure svg{max-width:100%;height:auto;display:block}
-figcaption{color:#444;font-size:.92rem}.pair{display:flex;flex-wrap:wrap;gap:1rem}.pair>*{flex:1 1 22rem;min-width:0}
-.note{color:#444;font-size:.92rem}code{background:#f3f3f3;padding:.1rem .3rem;overflow-wrap:anywhere}
-pre{background:#f3f3f3;padding:.6rem;white-space:pre-wrap}pre code{padding:0}
-@media(max-width:40rem){body{font-size:15px}th,td{padding:.25rem .45rem}}
-@media print{html,body{font-size:10pt}body{max-width:none;padding:0}.wide{overflow:visible}h2{break-after:avoid}
-tr{break-inside:avoid}figure.rows{break-inside:auto}
-th,td,td.text{white-space:normal;padding:.15rem .35rem}td.long{min-width:0}a{color:inherit}}
-"""
+from sva_bench.report.page_style import STYLE
 
 
 def write_page(path: Path, title: str, parts: Sequence[str]) -> None:
@@ -38,15 +17,18 @@ def write_page(path: Path, title: str, parts: Sequence[str]) -> None:
     Args:
         path: Where to.
         title: Of the window.
-        parts: What stands in it.
+        parts: What stands in it; where one is ``CONTENTS``, links to its headings.
     """
     body = "\n".join(parts)
+    headings = re.findall(r'<h2 id="([^"]+)">(.*?)</h2>', body)
+    links = "".join(f'<a href="#{name}">{words}</a>' for name, words in headings)
+    body = body.replace(CONTENTS, f'<nav aria-label="Contents">{links}</nav>' if len(headings) > 1 else "", 1)
     path.write_text(
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
         # An icon of its own, or browsers ask for one.
         '<link rel="icon" href="data:,">'
-        f"<title>{text(title)} · sva-bench</title><style>{_STYLE}</style></head>\n"
+        f"<title>{text(title)} · sva-bench</title><style>{STYLE}</style></head>\n"
         f"<body>\n{body}\n</body></html>\n", encoding="utf-8")
 
 
@@ -85,6 +67,8 @@ def table(
     return f"<figure class=rows><figcaption>{text(caption)}</figcaption>{whole}</figure>" if caption else whole
 
 
+CONTENTS = "<!--contents-->"
+"""Where a page has its contents."""
 _LONG = 40  # letters from which on a name or a route may go on in a second line
 
 
@@ -99,8 +83,28 @@ def figure(picture: str, caption: str) -> str:
 
 
 def heading(words: str) -> str:
-    """A heading."""
-    return f"<h2>{text(words)}</h2>"
+    """A heading, which the contents lead to."""
+    return f'<h2 id="{_slug(words)}">{text(words)}</h2>'
+
+
+def _slug(words: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
+
+
+def details(summary: str, inner: str, *, opened: bool = False) -> str:
+    """Something folded away below a line that says what it is; open in print.
+
+    Args:
+        summary: The line, as HTML.
+        inner: What is folded away, as HTML.
+        opened: Whether it is open at first.
+    """
+    return f"<details{' open' if opened else ''}><summary>{summary}</summary>{inner}</details>"
+
+
+def folded(parts: Sequence[str]) -> list[str]:
+    """A section folded away below its heading; nothing stays nothing."""
+    return [details(parts[0], "\n".join(parts[1:]))] if parts else []
 
 
 def note(words: str) -> str:

@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 from sva_bench.analysis.results import Estimate
 from sva_bench.choices import NEWS
+from sva_bench.palette import hex_of, plan_color
 from sva_bench.report.canvas import Axes, chart
-from sva_bench.report.charts import columns_of, legend_of, mark
+from sva_bench.report.charts import columns_of, legend_of, marker
 from sva_bench.report.reaction_shares import recourse_pct, tell, vss_pct, without_pct
 from sva_bench.report.reaction_wording import AnyReacting, Reacting
 
 MOST_SCENARIOS = 8
 """Scenarios that a chart shows: as many as there are shapes of points."""
+_GREYS = ("#000000", "#7a7a7a")
 _WIDTH_IN = 4.8  # narrow, so that its letters stay legible on a phone
 
 
@@ -37,7 +39,9 @@ def vss_against_news(rows: Sequence[Reacting]) -> str:
             known = {at: value for at, value in found.items() if value is not None}
             beside = 0.5 * ((number + 0.5) / len(scenarios) - 0.5)
             at = [position + beside for position in sorted(known)]
-            _points(axes, at, [known[position] for position in sorted(known)], number, name, joined=True)
+            # Colours are those of plans, so scenarios are black or grey, and differ in shape.
+            _points(axes, at, [known[position] for position in sorted(known)], number, _GREYS[number % 2], name,
+                    joined=True)
         axes.set_xticks(range(len(heard) + 1), ["no reaction", *heard])
         axes.set_xlim(-0.5, len(heard) + 0.5)
         axes.set_ylabel("VSS [% of the stochastic plan]" if pct else "VSS [incentive]")
@@ -67,7 +71,8 @@ def recourse_by_plan(rows: Sequence[AnyReacting]) -> str:
                      if plan in row.reaction.plans and (value := (recourse_pct(
                          row.reaction, plan) if pct else row.reaction.value_of_recourse[plan])) is not None]
             beside = 0.64 * ((number + 0.5) / len(plans) - 0.5)
-            _points(axes, [k + beside for k, _ in known], [value for _, value in known], number, plan, across=True)
+            _points(axes, [k + beside for k, _ in known], [value for _, value in known], number,
+                    hex_of(plan_color(plan, number)), plan, across=True)
         for k in range(1, len(kept)):
             if kept[k].scenario is not kept[k - 1].scenario:
                 axes.axhline(k - 0.5, color="#bbb", linewidth=0.8)
@@ -88,10 +93,10 @@ def _first(rows: Sequence[AnyReacting]) -> list[str]:
     return list(dict.fromkeys(row.scenario.name for row in rows))[:MOST_SCENARIOS]
 
 
-def _points(axes: Axes, at: Sequence[float], found: Sequence[Estimate], number: int, label: str, *,
+def _points(axes: Axes, at: Sequence[float], found: Sequence[Estimate], number: int, colour: str, label: str, *,
             joined: bool = False, across: bool = False) -> None:
     """Points with intervals, upright or across."""
-    colour, shape = mark(number)
+    shape = marker(number)
     for place, value in zip(at, found, strict=True):
         if value.ci95 is not None:
             ends = (value.ci95, (place, place)) if across else ((place, place), value.ci95)

@@ -22,11 +22,12 @@ from sva_bench.report.doubts import CONTRADICTED, contradictions, costless_ends,
 from sva_bench.report.interaction_section import interaction_section
 from sva_bench.report.legs_section import legs_section
 from sva_bench.report.meetings_section import meetings_section
-from sva_bench.report.overlays import Overlays
-from sva_bench.report.page import figure, heading, note, sentence, table, text, write_page
+from sva_bench.report.page import CONTENTS, figure, folded, heading, note, sentence, table, text, write_page
+from sva_bench.report.plan_view import PlanView
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
+from sva_bench.report.results_charts import differences, distributions, plans_compared
+from sva_bench.report.route_maps import route_maps
 from sva_bench.report.source_table import source_section
-from sva_bench.report.stands import stands_of
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     adjusted,
@@ -35,8 +36,8 @@ from sva_bench.report.wording import (
     assumption_rows,
     cell,
     finding,
+    listed,
     optional,
-    per_cent,
     ranked,
     reliability_told,
     remarks,
@@ -45,7 +46,10 @@ from sva_bench.report.wording import (
 )
 from sva_bench.storage.manifest import Manifest
 from sva_bench.storage.stored_run import Content
+from sva_bench.storage.trial_counts import TrialCounts
 from sva_bench.world.model import World
+
+_MOST_TOLD = 6  # scenarios of whose lost robots the answer tells
 
 Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
@@ -55,39 +59,43 @@ def write_report(path: Path, content: Content) -> None:
     summary = content.summary
     scenarios = summary.scenarios
     names = ShownNames(scenarios)
+    maps = route_maps(content)
     question = "Is the stochastic plan worth it" if isinstance(summary, Summary) else "What are the plans worth"
     parts = [
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
-        *_answer(summary, content.world),
+        *_answer(summary, content.world, content.counts),
         *reactions_answered(summary),
-        *(_comparison(summary) if isinstance(summary, Summary) else _ranking(summary)),
+        *(_comparison(summary, content.counts) if isinstance(summary, Summary) else _ranking(summary)),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
              f"{assumed(summary)}. "
              "Values in the units of the world file's incentives; 95 % intervals in brackets, over trials and noise "
              "draws."),
+        CONTENTS,
+        *maps,
         *_charts(summary),
         *(calibration_section(summary) if isinstance(summary, Summary) else ()),
         *reaction_section(summary),
-        *_world(content.world),
-        *_over_trials(scenarios),
+        *_over_trials(scenarios, content.counts),
         *_from_promise(scenarios),
         *source_section(scenarios),
         *reaction_ledgers(summary),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
         *_ends(scenarios, content.routes),
-        *_measured(scenarios),
+        *folded(_by_robot(summary)),
+        *folded(_measured(scenarios)),
         *interaction_section(scenarios, content.world),
-        *meetings_section(content),
-        *legs_section(content, names),
-        *_routes(content.routes, names),
+        *folded(meetings_section(content)),
+        *folded(legs_section(content, names)),
+        *folded(_world(content.world, drawn=bool(maps))),
+        *folded(_routes(content.routes, names)),
         *_recordings(content, names),
         *_again(summary, content.manifest),
     ]
     write_page(path, summary.world, parts)
 
 
-def _answer(summary: AnySummary, world: World) -> list[str]:
+def _answer(summary: AnySummary, world: World, counts: TrialCounts) -> list[str]:
     lines = []
     if not summary.reach.nothing:
         lines = [f"<li><b>{text(name)}</b>{line}</li>" for name, line in (
@@ -95,15 +103,44 @@ def _answer(summary: AnySummary, world: World) -> list[str]:
     unproved = "" if summary.reproducible else note(
         "A solve met its limit: these plans may differ on another machine.")
     return [f"<div class=answer><p>{sentence(answer(summary))}</p>", f"<ul>{''.join(lines)}</ul>" if lines else "",
-            *(f"<p><b>{sentence(said)}</b></p>" for said in failed_physics(summary)),
-            *(f"<p><b>{CONTRADICTED}</b> {sentence(said)}</p>" for said in contradictions(summary)),
-            *(note(remark) for remark in (*upset_by_noise(summary), *remarks(summary))), unproved, "</div>"]
+            *(f"<p class=doubt><b>{sentence(said)}</b></p>" for said in failed_physics(summary)),
+            *(f"<p class=doubt><b>{CONTRADICTED}</b> {sentence(said)}</p>" for said in contradictions(summary)),
+            *(note(remark) for remark in (*_robots_lost(summary, counts), *upset_by_noise(summary), *remarks(summary),
+                                          *_reduced(summary))), unproved, "</div>"]
 
 
 def _findings(summary: Summary, world: World) -> Iterator[tuple[str, str]]:
     for scenario in summary.scenarios:
         known, told = reliability_told(world, scenario.name, summary), against_nominal(scenario)
-        yield scenario.name, f" ({sentence(known)}): {sentence(finding(scenario.vss))}{sentence(told and f'. {told}')}"
+        reduced = f"; variance-reduced {with_interval(scenario.vss.executed_controlled)}" if _is_reduced(scenario) \
+            else ""
+        yield scenario.name, (f" ({sentence(known)}): {sentence(finding(scenario.vss))}{sentence(reduced)}"
+                              f"{sentence(told and f'. {told}')}")
+
+
+def _is_reduced(scenario: ScenarioSummary) -> bool:
+    """Whether the variance-reduced VSS is another figure than the plain one."""
+    return not scenario.vss.same_plan and with_interval(scenario.vss.executed_controlled) != with_interval(
+        scenario.vss.executed)
+
+
+def _reduced(summary: AnySummary) -> list[str]:
+    """What variance-reduced means, where there is such a figure."""
+    return ["Variance-reduced: the luck of the failures drawn is replaced by its expectation, known in closed form; "
+            "what noise did stays as measured."] if isinstance(summary, Summary) and any(
+                map(_is_reduced, summary.scenarios)) else []
+
+
+def _robots_lost(summary: AnySummary, counts: TrialCounts) -> list[str]:
+    """How many robots a mission were lost under each plan; nothing where none was, or nobody counted."""
+    told = []
+    for scenario in summary.scenarios if isinstance(summary, Summary) else ():  # a ranking has it behind each plan
+        lost = {shown_name(scenario, name): _lost(counts, scenario.name, name) for name in scenario.plans}
+        if any(amount not in ("0.00", "–") for amount in lost.values()):
+            told.append(f"{scenario.name}: {', '.join(f'{name} {amount}' for name, amount in lost.items())}")
+    more = [f"{len(told) - _MOST_TOLD} more scenarios"] if len(told) > _MOST_TOLD else []
+    return ["Robots lost a mission, on average (they left the base and never came back): "
+            f"{'; '.join([*told[:_MOST_TOLD], *more])}."] if told else []
 
 
 def _rankings(summary: ComparisonSummary, world: World) -> Iterator[tuple[str, str]]:
@@ -113,13 +150,27 @@ def _rankings(summary: ComparisonSummary, world: World) -> Iterator[tuple[str, s
             yield scenario.name, f" ({sentence(known)}): {text(ranked(scenario))}"
 
 
-def _comparison(summary: Summary) -> list[str]:
-    head = ["scenario", "stochastic, executed", "deterministic, executed", "VSS, executed", "VSS [%]", "VSS, modelled",
-            "EVPI"]
+def _comparison(summary: Summary, counts: TrialCounts) -> list[str]:
+    head = ["scenario", "stochastic", "deterministic", "VSS", "VSS, variance-reduced", "VSS, modelled", "EVPI",
+            "robots lost"]
     rows = [[s.name, *(with_interval(plan.executed) for plan in (s.stochastic, s.deterministic)), vss_verdict(s.vss),
-             per_cent(s.vss.executed_pct), f"{s.vss.modelled:.1f}", optional(s.evpi)] for s in summary.scenarios]
-    return [table(head, rows, caption="Value of the stochastic solution (VSS): how much more the stochastic plan "
-                                      "is worth than the deterministic one, in the same trials")]
+             "" if s.vss.same_plan else with_interval(s.vss.executed_controlled),
+             f"{s.vss.modelled:.1f}", optional(s.evpi),
+             "\u00a0|\u00a0".join(_lost(counts, s.name, name) for name in ("stochastic", "deterministic"))]
+            for s in summary.scenarios]
+    return [table(head, rows, caption="Executed values of both plans, and the value of the stochastic solution "
+                                      "(VSS): how much more the stochastic plan is worth, in the same trials"),
+            note("Robots lost: how many a mission left the base and never came back, on average, stochastic | "
+                 "deterministic.")]
+
+
+def _lost(counts: TrialCounts, scenario: str, planner: str) -> str:
+    """How many robots a mission left the base and never came back."""
+    ended = counts.ended.get((scenario, planner, "none", "never"))
+    if ended is None:
+        return "–"
+    lost = sum(found.share for found in ended if found.left and found.end in ("failed", "out_of_fuel", "stuck"))
+    return f"{lost:.2f}" if lost == 0 or lost >= 0.005 else "< 0.01"
 
 
 def _ranking(summary: ComparisonSummary) -> list[str]:
@@ -137,33 +188,37 @@ def _ranking(summary: ComparisonSummary) -> list[str]:
 
 
 def _charts(summary: AnySummary) -> list[str]:
+    scenarios = summary.scenarios
+    parts = [heading("What the plans are worth"), "<div class=pair>",
+             figure(plans_compared(scenarios), "Executed: mean over all trials, with its 95 % interval.")]
+    if isinstance(summary, Summary):
+        parts.append(figure(differences(summary.scenarios), "VSS: stochastic less deterministic in the same trials; "
+                            "right of zero, planning for failures pays. Full dot and wide bar: plain mean and 95 % "
+                            "interval; hollow dot and thin bar: variance-reduced; tick: modelled."))
+    return [*parts, "</div>"]
+
+
+def _by_robot(summary: AnySummary) -> list[str]:
+    """Which robot earns what, scenario by scenario."""
     with holding_back_ctrl_c():
         from sva_bench.report import charts  # matplotlib takes its time to load, and only a page needs it
 
     scenarios, plans = summary.scenarios, list(summary.scenarios[0].plans)
-    parts = [heading("The plans side by side"), "<div class=pair>",
-             figure(charts.plans_compared(scenarios), "Mean over all trials, with its 95 % interval.")]
-    if isinstance(summary, Summary):
-        rows = [(s.name, s.vss.executed) for s in summary.scenarios]
-        parts.append(figure(charts.differences(rows, "VSS, executed", "value"), "Stochastic less deterministic in "
-                            "the same trials: right of zero, planning for failures pays."))
     shown = ["stochastic", "deterministic"] if isinstance(summary, Summary) else plans[:4]
     robots = [figure(charts.value_by_robot(scenarios, plan, shown), f"The value of each robot under the {plan} plan.")
               for plan in shown]
-    parts += ["</div>", heading("Value by robot and scenario"), "<div class=pair>", *robots, "</div>"]
     names = list(scenarios[0].availability)
-    return [*parts, table(["scenario", "plan", *names], [
-        [s.name, shown_name(s, name), *(f"{plan.by_robot[r]:.1f}" for r in names)] for s in scenarios
-        for name, plan in s.plans.items()], words=(0, 1))]
+    return [heading("Value by robot and scenario"), "<div class=pair>", *robots, "</div>", table(
+        ["scenario", "plan", *names], [
+            [s.name, shown_name(s, name), *(f"{plan.by_robot[r]:.1f}" for r in names)] for s in scenarios
+            for name, plan in s.plans.items()], words=(0, 1))]
 
 
-def _over_trials(scenarios: Scenarios) -> list[str]:
-    with holding_back_ctrl_c():
-        from sva_bench.report import charts
-
+def _over_trials(scenarios: Scenarios, counts: TrialCounts) -> list[str]:
     return [heading("Over trials"),
-            figure(charts.distributions(scenarios), "Box: the middle half of the trials; whiskers: 5 to 95 %; "
-                   "triangle: mean of the worst tenth (CVaR)."),
+            figure(distributions(scenarios, counts), "Each dot is a value that trials had, the larger the more often; "
+                   "of plans whose trials had many values, the line is the share of trials that are worth at most so "
+                   "much. Tick: mean; triangle: mean of the worst tenth (CVaR)."),
             _statistics(scenarios, "over trials")]
 
 
@@ -221,22 +276,18 @@ def _in_per_cent(found: Share) -> str:
         100 * found.ci95[0], 100 * found.ci95[1])))
 
 
-def _world(world: World) -> list[str]:
-    with holding_back_ctrl_c():
-        from sva_bench.report.canvas import for_page
-        from sva_bench.report.drawing import draw_world
-
-    drawn = draw_world(world, "svg", Overlays(stands=stands_of(world))).decode()
-    picture = for_page(drawn, "world", f"The world {world.name} from above")
+def _world(world: World, *, drawn: bool) -> list[str]:
+    picture = PlanView(world, incentives=True, drawn=drawn).picture(f"The world {world.name} from above")
+    robots = listed([robot.name for robot in world.robots])
     return [heading("The world"), figure(picture, f"{world.name}: {counted(len(world.stations), 'station')}, "
                                          f"{counted(len(world.pois), 'point of interest', 'points of interest')} with "
-                                         "what each robot earns there.")]
+                                         f"what each robot earns there ({robots}).")]
 
 
 def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]], shown: ShownNames) -> list[str]:
     rows = [[scenario, shown.of(scenario, planner), robot, "stays home" if stays_home(route) else " → ".join(route)]
             for (scenario, planner), robots in routes.items() for robot, route in robots.items()]
-    return [heading("Routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
+    return [heading("List of routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
 
 
 def _recordings(content: Content, shown: ShownNames) -> list[str]:

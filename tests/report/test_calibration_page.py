@@ -13,6 +13,7 @@ from sva_bench.analysis.plan_names import shown_over
 from sva_bench.analysis.results import Share
 from sva_bench.analysis.summaries import Summary
 from sva_bench.cli.tables import print_summary
+from sva_bench.palette import PLANS, hex_of
 from sva_bench.report import charts
 from sva_bench.report.calibration_page import against_nominal, calibration_lines, curve_rows
 from sva_bench.study.options import Options
@@ -22,6 +23,7 @@ from tests.results_for_tests import plan_result, summary
 from tests.worlds_for_tests import SMALL, world_of
 
 MARKED = "calibrated (share not reached)"
+OF_PLAN = hex_of(PLANS["calibrated"])
 NAMED_PLAINLY = re.compile(r"(?<!not )(?<!half-)(?<!safe-)\bcalibrated\b(?! \(share not reached)")
 """Not of plans: that one is not calibrated, and the files of recordings."""
 
@@ -119,9 +121,9 @@ def test_a_curve_shows_what_is_promised_where_the_same_is_executed() -> None:
     found = run_of((100.0, 0.0), (80.0, 0.0), chosen=1, reached=True).scenarios[0].calibration
     assert found is not None
     lines = [style for style in re.findall(r'style="([^"]*)"', charts.calibration_curve("S", found))
-             if "fill: none" in style and ("stroke: #0072b2" in style or "stroke: #e69f00" in style)]
-    below, above = lines[0], next(style for style in lines if "#e69f00" in style)
-    assert "#0072b2" in below
+             if "fill: none" in style and ("stroke: var(--ink)" in style or f"stroke: {OF_PLAN}" in style)]
+    above = next(style for style in lines if OF_PLAN in style)
+    below = max((style for style in lines if OF_PLAN not in style), key=width_of)
     assert width_of(below) > 2 * width_of(above)
     assert "stroke-dasharray" in above
     assert "stroke-dasharray" not in below

@@ -23,9 +23,10 @@ from sva_bench.analysis.scenarios import ScenarioSummary, UnitScenario
 from sva_bench.analysis.summaries import Failures, Summary
 from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
-from sva_bench.report import charts
+from sva_bench.report import batch_page
 from sva_bench.report.batch_page import _over_maps as over_maps_said
 from sva_bench.report.batch_page import write_batch_report
+from sva_bench.report.results_charts import over_maps as over_maps_drawn
 from sva_bench.report.wording import (
     answer,
     assumed,
@@ -131,6 +132,7 @@ def test_page_terminal_and_summary_have_the_same_figures(finished: Run) -> None:
 
 
 _PROBE = """<script>window.onerror=m=>{document.title='error '+m};window.onload=()=>{
+document.querySelectorAll('details').forEach(d=>d.open=true);
 const r=[...document.querySelectorAll('svg')].map(s=>s.getBoundingClientRect());
 document.title=JSON.stringify({wide:document.documentElement.scrollWidth,
 window:innerWidth,pictures:r.length,empty:r.filter(b=>b.width<100||b.height<60).length,
@@ -263,13 +265,13 @@ def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> N
 
 def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
         finished: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: dict[str, Sequence[float]] = {}
+    drawn: dict[str, Mapping[str, Sequence[float]]] = {}
 
-    def watched(groups: Mapping[str, Sequence[float]], title: str, unit: str, draw: Any = charts.boxes_of) -> str:
+    def watched(groups: Mapping[str, Mapping[str, Sequence[float]]], unit: str, draw: Any = over_maps_drawn) -> str:
         drawn.update(groups)
-        return str(draw(groups, title, unit))
+        return str(draw(groups, unit))
 
-    monkeypatch.setattr(charts, "boxes_of", watched)
+    monkeypatch.setattr(batch_page, "over_maps", watched)
     write_batch_report(tmp_path / "report.html", batch_of([
         units_of(finished, name, seed, variant) for variant in ("x=1", "x=2") for name in ("a", "b")
         for seed in (0, 1, 2)]))
@@ -277,8 +279,9 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
     assert ">variant<" in text
     assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
     assert "all maps agree there is no interval" in text
-    assert {label: len(points) for label, points in drawn.items()} == {
-        f"{name} (x={x})": 2 for name in ("half", "safe") for x in (1, 2)}
+    # Scenarios are groups, and variants are rows in them.
+    assert {name: {variant: len(points) for variant, points in rows.items()} for name, rows in drawn.items()} == {
+        name: {f"x={x}": 2 for x in (1, 2)} for name in ("half", "safe")}
 
 
 def test_two_equal_plans_are_called_the_same_not_indistinguishable(finished: Run) -> None:

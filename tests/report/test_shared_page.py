@@ -8,21 +8,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from sva_bench.analysis.plan_names import ShownNames
-from sva_bench.report import charts, drawing
+from sva_bench.report import charts
 from sva_bench.report.legs_section import legs_section
-from sva_bench.report.meetings_section import collisions, meetings_section, met_in
-from sva_bench.report.overlays import Overlays
+from sva_bench.report.marks import collisions, marks_of, met_in
+from sva_bench.report.route_maps import route_maps
 from sva_bench.report.run_page import _ends
 from sva_bench.report.styles import robot_colour
 from sva_bench.storage.stored_run import Content, read_content
 from sva_bench.study.options import Options
 from sva_bench.study.run import run
-from sva_bench.world.model import World
 from tests.worlds_for_tests import SMALL, world_of
 
 WORLDS = {
@@ -132,43 +130,22 @@ def test_a_robot_that_runs_into_one_that_stands_tells_of_it_alone() -> None:
                      ("uv1 and uv2", 1, False)]
 
 
-def drawn_by(content: Content, monkeypatch: pytest.MonkeyPatch) -> list[Overlays]:
-    """What the maps of what was met show beside map and sites."""
-    shown, draw = [], drawing.draw_world
-
-    def watched(world: World, kind: Any, overlays: Overlays) -> bytes:
-        shown.append(overlays)
-        return draw(world, kind, overlays)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(drawing, "draw_world", watched)
-        meetings_section(content)
-    return shown
-
-
-def test_the_map_of_what_was_met_has_the_berths_and_as_many_marks_as_there_were_collisions(
-        collided: Finished, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_map_of_a_plan_has_the_berths_and_as_many_marks_as_there_were_collisions(collided: Finished) -> None:
     content = collided.content
-    for shown in drawn_by(content, monkeypatch):
-        assert [stand.name for stand in shown.stands] == ["uv1", "uv2"]
+    page = "".join(route_maps(content))
     (half, *_) = content.summary.scenarios
+    assert re.findall(r"<title>berth of (uv\d)</title>", page) == ["uv1", "uv2"]  # once: all maps share the ground
     mine = [row for row in met_in(content)["collision"] if (row["scenario"], row["planner"]) == (
         half.name, "stochastic")]
-    assert sum(mark.count for mark in drawn_by(content, monkeypatch)[0].marks if mark.kind == "collision") == len(mine)
+    (drawn,) = (found for found in re.findall(r"<figure class=map>.*?</figure>", page)
+                if f"stochastic plan in {half.name}" in found)
+    marks = re.findall(r'<g class="met collision">.*?>(\d+)</text></g>', drawn)
+    assert sum(map(int, marks)) == len(mine) > 0
 
 
-def test_plans_of_the_same_routes_share_a_map_only_if_they_met_the_same(
-        collided: Finished, monkeypatch: pytest.MonkeyPatch) -> None:
-    content = collided.content
-    (key, *_) = content.stems
-    same = replace(content, routes=dict.fromkeys(content.stems, content.routes[key]))
-    rows = [row for row in content.contacts.to_pylist() if (row["scenario"], row["planner"]) == key]
-    assert rows
-    twice = pa.Table.from_pylist([{**row, "scenario": scenario, "planner": planner} for row in rows
-                                  for scenario, planner in content.stems], schema=content.contacts.schema)
-    assert len(drawn_by(replace(same, contacts=twice), monkeypatch)) == 1
-    one_less = pa.Table.from_pylist([*twice.to_pylist()][2:], schema=content.contacts.schema)
-    assert len(drawn_by(replace(same, contacts=one_less), monkeypatch)) == 2
+def test_what_was_met_close_together_is_one_mark_with_its_number() -> None:
+    rows = [{"x_m": x, "y_m": 1.0, "stuck": stuck} for x, stuck in ((1.0, False), (1.2, True), (2.0, False))]
+    assert [(mark.count, mark.stuck) for mark in marks_of(rows, "contact")] == [(2, True), (1, False)]
 
 
 # Ends

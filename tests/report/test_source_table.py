@@ -11,6 +11,7 @@ from sva_bench.analysis.results import SourceEffect
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.choices import SourceName
 from sva_bench.cli.tables import print_summary
+from sva_bench.report.page import heading
 from sva_bench.report.source_table import costliest, source_rows, source_section, source_title
 from tests.results_for_tests import summary
 
@@ -58,6 +59,6 @@ def test_terminal_and_page_call_the_table_by_one_name(
     found = summary((10.0, 20.0), 100.0)
     scenarios = (scenario_of({source: -1.0}, {source: -1.0}),)
     assert title == source_title(source_rows(scenarios))
-    assert f"<h2>{title}</h2>" in source_section(scenarios)
+    assert heading(title) in source_section(scenarios)
     print_summary(replace(found, scenarios=scenarios), wide=True)
     assert title in capsys.readouterr().out
