@@ -31,6 +31,7 @@ from sva_bench.cli.options import (
     TimeLimit,
     Trials,
     Verbose,
+    Wide,
     WorkerCount,
     WorldArgument,
 )
@@ -84,6 +85,7 @@ def run(
     workers: WorkerCount = None,
     csv: AsCsv = False,
     as_json: AsJson = False,
+    wide: Wide = False,
     verbose: Verbose = False,
 ) -> None:
     """Plan, execute, record and measure a mission: the main job.
@@ -118,7 +120,7 @@ def run(
                       calibrate=target, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
 
 
 def execute(
@@ -147,6 +149,7 @@ def execute(
     workers: WorkerCount = None,
     csv: AsCsv = False,
     as_json: AsJson = False,
+    wide: Wide = False,
     verbose: Verbose = False,
 ) -> None:
     """Execute plans from anywhere in a world and compare them, pair by pair.
@@ -182,10 +185,11 @@ def execute(
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
 
 
-def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv: bool, wide: bool) -> None:
+def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv: bool, wide: bool,
+          sources: bool) -> None:
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
@@ -197,7 +201,7 @@ def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_summary(summary, wide=wide, world=world)
+        print_summary(summary, wide=wide, sources=sources, world=world)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
     if failed := failed_physics(summary):
         if as_json:

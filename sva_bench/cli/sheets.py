@@ -52,13 +52,26 @@ class Sheet:
     ends: frozenset[int] = frozenset()
 
 
-def print_sheet(sheet: Sheet, console: Console, *, wide: bool = False) -> None:
-    """Print a table within the console's width, and the columns that had to be left out; ``wide``: as wide as it is."""
+_NAME = 20
+"""Letters of a name that may stand beside figures even where others are left out for it."""
+
+
+def print_sheet(sheet: Sheet, console: Console, *, wide: bool = False, apart: bool = False) -> None:
+    """Print a table within the console's width, and the columns that had to be left out.
+
+    Args:
+        sheet: The table.
+        console: Where to.
+        wide: As wide as it comes, whatever the console's width.
+        apart: Whether a line is left free above it, for it follows text; below it there always is one.
+    """
     plain = replace(sheet, rows=[[printable(cell) for cell in row] for row in sheet.rows],
                     columns=[replace(column, heading=printable(column.heading)) for column in sheet.columns])
     laid_out, left_out = fitted(plain, 10**6 if wide else console.width)
     if not sheet.rows:
         return
+    if apart:
+        console.print()
     if sheet.title:
         console.print(Text(sheet.title, style="italic"), highlight=False, soft_wrap=wide)
     for line, is_head in laid_out:
@@ -66,6 +79,7 @@ def print_sheet(sheet: Sheet, console: Console, *, wide: bool = False) -> None:
     if left_out:
         console.print(Text(f"Left out for want of room: {', '.join(left_out)}; --wide shows all.", style="italic"),
                       highlight=False)
+    console.print()
 
 
 def fitted(sheet: Sheet, width: int) -> tuple[list[tuple[str, bool]], list[str]]:
@@ -75,15 +89,18 @@ def fitted(sheet: Sheet, width: int) -> tuple[list[tuple[str, bool]], list[str]]
     then with names above their rows; then without the columns that can best be spared; then without names beside rows.
     """
     levels = [k + 1 for k, column in enumerate(sheet.columns) if column.above]
+    long = [level for level in levels[1:] if max((cell_len(row[level - 1]) for row in sheet.rows), default=0) > _NAME]
+    empty = {k for k, column in enumerate(sheet.columns) if column.last and not any(row[k] for row in sheet.rows)}
     spare = sorted({column.last for column in sheet.columns if column.last}, reverse=True)
     kept, left_out = sheet, list[str]()
     tried = [(0, _as_is, _as_is), (0, _broken, _as_is), (0, _broken, _stacked)]
-    for above in levels[:1]:
+    for above in (*levels[:1], *long):
         tried += [(above, _broken, _as_is), (above, _broken, _stacked)]
-    for without in (0, *spare):
+    for without in (0, *([10**6] if empty else []), *spare):  # what holds nothing is spared first
         if without:
-            left_out = [column.heading for column in sheet.columns if column.last >= without]
-            shown = [k for k, column in enumerate(sheet.columns) if column.last < without]
+            left_out = [column.heading.replace("\n", " ") for k, column in enumerate(sheet.columns)
+                        if column.last >= without and k not in empty]
+            shown = [k for k, column in enumerate(sheet.columns) if column.last < without and k not in empty]
             kept = replace(sheet, columns=[sheet.columns[k] for k in shown],
                            rows=[[row[k] for k in shown] for row in sheet.rows])
         for above, heads, cells in tried:
