@@ -76,12 +76,12 @@ def over(
     trials: Annotated[int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials of each plan in each scenario.",
                                                show_default="1000")] = None,
     rollouts: Annotated[int | None, typer.Option(min=1, max=MOST_ROLLOUTS, help="Noise draws; trial t has number t mod "
-                                                 "ROLLOUTS.", show_default="8")] = None,
+                                                 "ROLLOUTS.", show_default="32")] = None,
     fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per leg and "
                                                       "noise draw; or every trial in physics.",
                                                       show_default="rollout")] = None,
     planner: Annotated[list[str] | None, typer.Option(
-        metavar="|".join(get_args(PathPlanner)), help="OMPL planner, as for run; may be repeated.",
+        metavar="NAME", help=f"OMPL planner, as for run: {', '.join(get_args(PathPlanner))}; may be repeated.",
         show_default="prmstar")] = None,
     scenario: ScenarioNames = None,
     vary: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=V1,V2,...", help="Vary a key of the world "
@@ -105,7 +105,8 @@ def over(
                                               "optimal.", show_default="1e-06")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="The batch folder.",
                                              show_default="runs/batch-<hash>")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume: do what is left of the batch "
+                                                "in the folder.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="List the grid, with an estimate of time and disk, and do "
                                           "nothing.")] = False,
     workers: WorkerCount = None,

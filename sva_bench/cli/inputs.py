@@ -30,7 +30,7 @@ from sva_bench.cli.terminal import (
     results,
     set_up_logging,
 )
-from sva_bench.cli.usage import PlainCommand
+from sva_bench.cli.usage import PlainCommand, PlainGroup
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_beside, write_result
 from sva_bench.files.printable import counted
@@ -46,8 +46,10 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-world_app = typer.Typer(no_args_is_help=True, help="Check, make, copy and draw worlds.", rich_markup_mode="rich")
-instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
+world_app = typer.Typer(cls=PlainGroup, no_args_is_help=True, help="Check, make, copy and draw worlds.",
+                        rich_markup_mode="rich")
+instance_app = typer.Typer(cls=PlainGroup, no_args_is_help=True, help="Make instances.",
+                           rich_markup_mode="rich")
 
 
 @world_app.command("check", cls=PlainCommand)

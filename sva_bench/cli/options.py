@@ -100,7 +100,7 @@ def few_enough(count: int | None) -> int | None:
     return count
 
 
-WorkerCount = Annotated[int | None, typer.Option(min=1, callback=few_enough, help="Processes that drive.",
+WorkerCount = Annotated[int | None, typer.Option(min=1, callback=few_enough, help="Worker processes.",
                                                  show_default="all cores")]
 Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]
 Force = Annotated[bool, typer.Option("--force", help="Write over a world that was edited by hand, too.")]
