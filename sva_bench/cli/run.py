@@ -78,6 +78,8 @@ def run(
     precision: Annotated[str | None, typer.Option(
         metavar="PCT%", help="Go on with more trials and noise draws until the interval of the executed VSS is within "
         "so many per cent of the stochastic plan's mean.", show_default="none")] = None,
+    anytime: Annotated[bool, typer.Option("--anytime", help="With --precision: stop by intervals that hold whenever a "
+                                          "run stops, wider ones.")] = False,
     max_trials: Annotated[int | None, typer.Option(
         min=1, max=MOST_TRIALS, help="With --precision: trials at which to stop all the same.",
         show_default="100000")] = None,
@@ -100,7 +102,11 @@ def run(
     set_up_logging(verbose)
     if precision is None and max_trials is not None:
         raise BadInput("--max-trials belongs to --precision; --trials says how many there are without it")
-    asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts)
+    if precision is None and anytime:
+        raise BadInput("--anytime belongs to --precision: without it the number of trials is fixed, and every interval "
+                       "holds as it is")
+    asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts,
+                                                        anytime=anytime)
     target = None if calibrate is None else target_of(calibrate)
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
