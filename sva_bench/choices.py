@@ -115,3 +115,5 @@ MET_NAMES: tuple[MetName, ...] = get_args(MetName)
 SourceName = Literal[NoiseName, MetName, "interplay"]
 """What the ledger of sources is divided into: the noise, other robots, and what is due to no source by itself."""
 NoisePreset = Literal["realistic"]
+SampleOf = Literal["maps", "trials"]
+"""What the intervals of a comparison are over: trials where there is one map only."""

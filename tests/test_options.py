@@ -20,7 +20,7 @@ OTHER: dict[str, Any] = {
     "seed": 3, "trials": 7, "rollouts": 5, "fidelity": "kinematic", "planner": "fmt", "evpi": True, "informed": True,
     "limits": SolveLimits(time_limit_s=2.5, gap=0.01), "assumptions": True, "policies": ("none", "resolve"),
     "news": ("report", "instant"), "anticipate": True, "calibrate": 0.015,
-    "precision": Precision(pct=1.5, max_trials=70)}
+    "precision": Precision(pct=1.5, max_trials=70, anytime=True)}
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(Options)])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from sva_bench.analysis.compared_values import KeyComparison
 from sva_bench.analysis.results import Estimate, Words
 from sva_bench.analysis.scenarios import UnitScenario
 from sva_bench.analysis.summaries import Head, Reach
@@ -152,6 +153,7 @@ class BatchSummary(Record):
     aggregate: tuple[OverMaps, ...]
     failed: tuple[GivenUp, ...]
     reactions: tuple[ReactionOverMaps, ...] = field(default_factory=tuple, metadata=stands_after("aggregate"))
+    compared: tuple[KeyComparison, ...] = field(default_factory=tuple, metadata=stands_after("aggregate"))
 
 
 def labelled(name: str, variant: str) -> str:

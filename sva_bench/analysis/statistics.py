@@ -164,12 +164,16 @@ def _upper(count: int, mean: float, squares: float, tail: float) -> float:
     return float(beta.ppf(1 - tail, middle * size, (1 - middle) * size))
 
 
-def sample_mean(values: Sequence[float]) -> Estimate:
+def sample_mean(values: Sequence[float], *, comparisons: int = 1) -> Estimate:
     """Mean of a sample, such as of maps, with its confidence interval; none from fewer than two, or if all are equal.
 
     Student's t interval is too narrow where most maps have values near 0 and a few large ones, so it is widened to
     ``bounded_mean`` with bounds beyond the observations by their range over the square root of their number. It is not
     cut off anywhere: nothing is certain of the maps that were not observed.
+
+    Args:
+        values: The sample.
+        comparisons: Number of intervals that hold simultaneously.
 
     Raises:
         ValueError: If the sample is empty.
@@ -182,8 +186,10 @@ def sample_mean(values: Sequence[float]) -> Estimate:
     if count < 2 or beyond <= _SPREADLESS * abs(mean):
         return _estimate(mean, None)
     squares = float(np.sum((sample - mean) ** 2))
-    half = float(student_t.ppf(0.5 + CONFIDENCE / 2, count - 1)) * math.sqrt(squares / (count - 1) / count)
-    low, high = bounded_mean(count, mean, squares, (float(sample.min()) - beyond, float(sample.max()) + beyond))
+    quantile = float(student_t.isf((1 - CONFIDENCE) / (2 * comparisons), count - 1))
+    half = quantile * math.sqrt(squares / (count - 1) / count)
+    low, high = bounded_mean(count, mean, squares, (float(sample.min()) - beyond, float(sample.max()) + beyond),
+                             comparisons=comparisons)
     return _estimate(mean, (min(low, mean - half), max(high, mean + half)))
 
 

@@ -16,6 +16,7 @@ from sva_bench.analysis.results import (
     SUMMARY,
     SUMMARY_OF_REACTIONS,
     Amount,
+    Interval,
     ScenarioFacts,
     SummaryFormat,
 )
@@ -48,12 +49,20 @@ class Travel(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class ReachedPrecision(Record):
-    """The required precision, and the one reached."""
+    """The required precision, and the one reached.
+
+    Attributes:
+        asked_pct, reached_pct: Half-width of the executed VSS [% of the stochastic plan's mean].
+        met: Whether it is reached.
+        max_trials: Trials at which to stop all the same.
+        anytime: With ``--anytime``, the interval of the executed VSS in each scenario that holds whenever a run stops.
+    """
 
     asked_pct: Amount
     reached_pct: Amount | None
     met: bool
     max_trials: NonNegativeInt
+    anytime: Mapping[Name, Interval | None] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -103,6 +103,13 @@ def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
     return Part(document, ("settings",), document.data["settings"]), settings
 
 
+def is_batch(folder: Path) -> bool:
+    """Whether a folder is that of a batch, by its manifest."""
+    path = folder / "manifest.json"
+    data = read_json(path, MOST_BYTES).data if path.is_file() else None
+    return isinstance(data, dict) and data.get("format") == MANIFEST
+
+
 def refuse_other_settings(folder: Path, settings: BatchSettings) -> None:
     """Refuse to resume a batch with other settings; the message names the differences.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sva_bench import __version__
@@ -65,12 +65,14 @@ class Grid:
         seeds: Seeds of failures and noise.
         options: Options of all runs, without seed and planner.
         unit_trials: Most trials of a unit.
+        own: Of varied keys, the value that the world files have themselves, as JSON, where it is among theirs.
     """
 
     points: Sequence[Point]
     seeds: Sequence[int]
     options: Options
     unit_trials: int
+    own: Mapping[str, str] = field(default_factory=dict)
 
     def settings(self) -> BatchSettings:
         """Everything that the rows and shards of a batch depend on."""
@@ -81,7 +83,8 @@ class Grid:
             policies=stored.policies, news=stored.news, anticipate=stored.anticipate or None,
             calibrate=None if stored.calibrate is None else target_text(stored.calibrate))
         return BatchSettings(version=__version__, seeds=tuple(self.seeds), options=options,
-                             unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points})
+                             unit_trials=self.unit_trials, points={point.name: point.entry() for point in self.points},
+                             own=dict(self.own))
 
     def map_files(self) -> dict[str, bytes]:
         """The files that worlds name, by their names within the batch folder; equal ones once."""
@@ -161,7 +164,8 @@ def grid_of(document: Part, settings: BatchSettings) -> Grid:
         points.append(Point(world=world, planner=entry.planner, variant=entry.variant))
         if points[-1].name != name:
             raise document.error(at, f"its world and variant are those of {points[-1].name!r}")
-    return checked(Grid(points=points, seeds=settings.seeds, options=options, unit_trials=settings.unit_trials))
+    return checked(Grid(points=points, seeds=settings.seeds, options=options, unit_trials=settings.unit_trials,
+                        own=dict(settings.own)))
 
 
 def _map_folder(digests: Mapping[str, str]) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sva_bench.analysis.over_maps import BatchSummary, GivenUp, OverMaps
 from sva_bench.batch.aggregates import aggregate, joined, summary_of, unit_summary
 from sva_bench.batch.cache import Cache
+from sva_bench.batch.compared import Asked, compared
 from sva_bench.batch.conductor import Conductor, Hooks
 from sva_bench.batch.folder import (
     begin,
@@ -63,7 +64,7 @@ class BatchProgress:
 
 def run_batch(
     grid: Grid, folder: Path, engine: Callable[[], AbstractContextManager[Engine]], cache: Cache,
-    report: Callable[[BatchProgress], None], *, resume: bool, retry: bool = False,
+    report: Callable[[BatchProgress], None], *, resume: bool, retry: bool = False, compare: Sequence[Asked] = (),
 ) -> BatchSummary:
     """Execute every remaining unit of a grid, and write the summary.
 
@@ -75,6 +76,7 @@ def run_batch(
         report: Called about twice a second.
         resume: Continue a batch in the folder.
         retry: Retry the units that failed.
+        compare: The varied keys whose values are compared.
 
     Returns:
         The summary.
@@ -92,11 +94,29 @@ def run_batch(
                 Conductor(running, cache, Hooks(
                     shard=state.keep, unit_failed=state.unit_failed, strand_failed=state.strand_failed,
                     tick=lambda: report(state.progress()))).run(state.strands())
-        summary = summary_of(grid, folder, state.done, state.failures)
-        write(folder / "summary.json", pretty_json(as_dict(summary)).encode())
-        with writing(folder / "report.html") as draft:
-            write_batch_report(draft, summary)
-        return summary
+        return _written(grid, folder, state.done, state.failures, compare)
+
+
+def report_again(grid: Grid, folder: Path, compare: Sequence[Asked]) -> BatchSummary:
+    """Write summary and page of a batch again, from the shards of what is done.
+
+    Raises:
+        BadInput: If the batch is at work, or its folder cannot be written to.
+        BadFile: If a shard is invalid.
+    """
+    with locked(folder):
+        done = units_in(folder) & set(grid.units())
+        return _written(grid, folder, done, [unit for unit in failures_in(folder) if unit.unit not in done], compare)
+
+
+def _written(grid: Grid, folder: Path, done: set[str], failures: Sequence[GivenUp], compare: Sequence[Asked]
+             ) -> BatchSummary:
+    summary = summary_of(grid, folder, done, failures)
+    summary = replace(summary, compared=compared(compare, grid, folder, done, summary.units))
+    write(folder / "summary.json", pretty_json(as_dict(summary)).encode())
+    with writing(folder / "report.html") as draft:
+        write_batch_report(draft, summary)
+    return summary
 
 
 class _BatchState:

@@ -55,13 +55,14 @@ class PointEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class BatchSettings(Record):
-    """Everything that the rows and shards of a batch depend on."""
+    """Everything that the rows and shards of a batch depend on; ``own`` is as of ``Grid``."""
 
     version: Words
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1)]
     options: OptionsEntry
     unit_trials: Annotated[int, Field(strict=True, ge=1)]
     points: Annotated[Mapping[Words, PointEntry], Field(min_length=1)]
+    own: Mapping[Words, Words] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,12 +15,13 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from pydantic import Field
 
 from sva_bench.analysis.calibration import Target, target_of
+from sva_bench.analysis.compared_values import own_value
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
 from sva_bench.choices import Departures, FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
 from sva_bench.files.complaints import shown
 from sva_bench.files.digest import digest
-from sva_bench.files.documents import Document, Loc, parse_yaml, read_yaml, validate
+from sva_bench.files.documents import Document, Loc, parse_yaml, places_of, read_yaml, validate, value_at
 from sva_bench.files.fields import Name, Number, Section, Seed
 from sva_bench.files.patterns import has_pattern, matching
 from sva_bench.seeds import MOST_SEED
@@ -272,6 +273,7 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
     count = len(sweep.worlds) * math.prod(map(len, vary.values()))
     refuse_too_many(count * len(planners), len(seeds), options.trials, unit_trials)
     points: list[Point] = []
+    own = _own_values(sweep, vary)
     first_with_effect: dict[tuple[int, str], str] = {}
     from_options: set[str] = set()
     for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
@@ -289,7 +291,15 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
             points.append(Point(world=world, planner=planner, variant="; ".join(parts)))
     for key in sorted(_IN_PHYSICS_ALONE & set(vary)) if options.fidelity == "kinematic" else ():
         _log.warning("%s is varied to no effect: kinematic trials know nothing of it", key)
-    return checked(Grid(points=points, seeds=seeds, options=options, unit_trials=unit_trials))
+    return checked(Grid(points=points, seeds=seeds, options=options, unit_trials=unit_trials, own=own))
+
+
+def _own_values(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> dict[str, str]:
+    """Of varied keys, the value that leaves the world files as they are, where it is among theirs."""
+    documents = [read_yaml(path).data for path in sweep.worlds] if vary else []
+    found = {key: own_value(values, [value_at(data, place) for data in documents for place in places_of(data, key)])
+             for key, values in vary.items()}
+    return {key: own for key, own in found.items() if own is not None}
 
 
 _IN_PHYSICS_ALONE = {"noise.payload_kg", "noise.hull_friction"}

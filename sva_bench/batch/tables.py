@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+import numpy as np
+
 from sva_bench.analysis.calibration_table import CALIBRATION_COLUMNS, calibration_rows
+from sva_bench.analysis.compared_values import settings_in, shown_value
 from sva_bench.analysis.over_maps import BatchSummary
+from sva_bench.analysis.statistics import sample_mean
 from sva_bench.batch.folder import write
 from sva_bench.batch.reactions_over_maps import vss_of
 
@@ -35,15 +39,17 @@ class _Reaction(Protocol[Gain_co]):
 
 def write_tables(folder: Path, summary: BatchSummary) -> None:
     """Write ``maps.csv``, map by map, and ``aggregate.csv``, over maps; the same of reactions, and ``calibration.csv``,
-    where there are any.
+    where there are any, and ``compared.csv`` where values of a key are.
 
     Raises:
         BadInput: If they cannot be written.
     """
-    maps = [[row.world, row.variant, row.scenario, row.seeds, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct]
-            for row in summary.maps]
+    keys, means = _keys_of(summary), _means_of(summary)
+    maps = [[row.world, row.variant, row.scenario, row.seeds, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct,
+             *means[row.variant, row.scenario][row.world], *_values(row.variant, keys)] for row in summary.maps]
     over = [[row.variant, row.scenario, row.maps, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct.mean,
-             *_ends(row.vss_pct.ci95)] for row in summary.aggregate]
+             *_ends(row.vss_pct.ci95), *_over(means[row.variant, row.scenario].values()), *_values(row.variant, keys)]
+            for row in summary.aggregate]
     curves = [[unit.world, unit.variant, unit.seed, *row] for unit in summary.units
               for row in calibration_rows(unit.scenarios)]
     if curves:
@@ -51,10 +57,61 @@ def write_tables(folder: Path, summary: BatchSummary) -> None:
     if summary.reactions:
         _write(folder / "reactions.csv", (*_REACTION, "maps", *_GAIN, "pct_low", "pct_high"), _over_maps(summary))
         _write(folder / "reactions-maps.csv", ("world", "seed", *_REACTION, *_GAIN), _map_by_map(summary))
-    _write(folder / "maps.csv", ("world", "variant", "scenario", "seeds", "vss", "vss_low", "vss_high", "vss_pct"),
-           maps)
-    _write(folder / "aggregate.csv", ("variant", "scenario", "maps", "vss", "vss_low", "vss_high", "vss_pct",
-                                      "vss_pct_low", "vss_pct_high"), over)
+    if summary.compared:
+        _write(folder / "compared.csv", (*_COMPARED, *keys), _compared(summary, keys))
+    _write(folder / "maps.csv", ("world", "variant", "scenario", "seeds", "vss", "vss_low", "vss_high", "vss_pct",
+                                 "stochastic", "deterministic", *keys), maps)
+    _write(folder / "aggregate.csv", (
+        "variant", "scenario", "maps", "vss", "vss_low", "vss_high", "vss_pct", "vss_pct_low", "vss_pct_high",
+        *(f"{plan}{end}" for plan in ("stochastic", "deterministic") for end in ("", "_low", "_high")), *keys), over)
+
+
+def _keys_of(summary: BatchSummary) -> list[str]:
+    """The varied keys, each of which is a column."""
+    return list(dict.fromkeys(key for variant in summary.variants for key in settings_in(variant)))
+
+
+def _values(variant: str, keys: Sequence[str]) -> list[str]:
+    settings = settings_in(variant)
+    return [shown_value(settings[key]) if key in settings else "" for key in keys]
+
+
+def _means_of(summary: BatchSummary) -> dict[tuple[str, str], dict[str, tuple[float, float]]]:
+    """What the two plans collected on each map, on average over its seeds, by variant and scenario."""
+    seeds: dict[tuple[str, str], dict[str, list[tuple[float, float]]]] = {}
+    for unit in summary.units:
+        for scenario in unit.scenarios:
+            seeds.setdefault((unit.variant, scenario.name), {}).setdefault(unit.world, []).append(
+                (scenario.stochastic.executed.mean, scenario.deterministic.executed.mean))
+    return {key: {world: (float(np.mean([s for s, _ in pairs])), float(np.mean([d for _, d in pairs])))
+                  for world, pairs in by_map.items()} for key, by_map in seeds.items()}
+
+
+def _over(means: Iterable[tuple[float, float]]) -> list[float | None]:
+    """The mean over maps of what each plan collected, with its interval."""
+    return [cell for column in zip(*means, strict=True) for found in [sample_mean(column)]
+            for cell in (found.mean, *_ends(found.ci95))]
+
+
+_COMPARED = ("key", "reference", "value", "scenario", "others", "over", "maps",
+             *(f"{figure}{end}" for figure in ("executed", "vss") for end in ("", "_low", "_high")),
+             *(f"{figure}{end}" for figure in ("gain", "vss_gain") for end in (
+                 "", "_low", "_high", "_adjusted_low", "_adjusted_high")))
+
+
+def _compared(summary: BatchSummary, keys: Sequence[str]) -> list[list[object]]:
+    """A row for each scenario and value of each key that is compared."""
+    rows: list[list[object]] = []
+    for found in summary.compared:
+        for row in found.rows:
+            figures = [cell for figure in (row.executed, row.vss) for cell in (figure.mean, *_ends(figure.ci95))]
+            gains = [cell for gain in (row.gain, row.vss_gain) for cell in ([None] * 5 if gain is None else [
+                gain.mean, *_ends(gain.ci95), *_ends(gain.ci95_adjusted)])]
+            settings = {**settings_in(row.others), found.key: row.value}
+            rows.append([found.key, shown_value(found.reference), shown_value(row.value), row.scenario, row.others,
+                         found.sample, row.maps, *figures, *gains,
+                         *(shown_value(settings[key]) if key in settings else "" for key in keys)])
+    return rows
 
 
 _REACTION = ("variant", "scenario", "policy", "news", "figure", "plan")

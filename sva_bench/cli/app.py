@@ -16,12 +16,12 @@ from sva_bench.cli.paper import paper_app
 from sva_bench.cli.plans import certify, plan, times
 from sva_bench.cli.replay import replay
 from sva_bench.cli.run import execute, run
-from sva_bench.cli.usage import OneAtATime, PlainCommand
+from sva_bench.cli.usage import OneAtATime, PlainCommand, PlainGroup
 from sva_bench.cli.verify import verify
 from sva_bench.cli.view import report, view
 
 app = typer.Typer(
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
+    cls=PlainGroup, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode="rich",
     help="What is a multi-robot mission plan worth when robots fail? Plans missions, executes them in physics with "
          "randomised failures, and measures the value of the stochastic solution (VSS).",
     epilog="Exit codes: 0 done (a plan at its limit too), 1 a fault of the program or the installation, 2 bad input or "

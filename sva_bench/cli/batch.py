@@ -16,6 +16,7 @@ from sva_bench.cli.options import (
     Anticipate,
     AsJson,
     Calibrate,
+    CompareKeys,
     DeparturesOption,
     ExecuteFailure,
     InteractionOption,
@@ -26,6 +27,7 @@ from sva_bench.cli.options import (
     ScenarioNames,
     TimeLimit,
     Verbose,
+    Wide,
     WorkerCount,
     finite,
 )
@@ -74,18 +76,19 @@ def over(
     trials: Annotated[int | None, typer.Option(min=1, max=MOST_TRIALS, help="Trials of each plan in each scenario.",
                                                show_default="1000")] = None,
     rollouts: Annotated[int | None, typer.Option(min=1, max=MOST_ROLLOUTS, help="Noise draws; trial t has number t mod "
-                                                 "ROLLOUTS.", show_default="8")] = None,
+                                                 "ROLLOUTS.", show_default="32")] = None,
     fidelity: Annotated[Fidelity | None, typer.Option(help="The kinematic twin alone; physics once per leg and "
                                                       "noise draw; or every trial in physics.",
                                                       show_default="rollout")] = None,
     planner: Annotated[list[str] | None, typer.Option(
-        metavar="|".join(get_args(PathPlanner)), help="OMPL planner, as for run; may be repeated.",
+        metavar="NAME", help=f"OMPL planner, as for run: {', '.join(get_args(PathPlanner))}; may be repeated.",
         show_default="prmstar")] = None,
     scenario: ScenarioNames = None,
     vary: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=V1,V2,...", help="Vary a key of the world "
                                                    "files, e.g. robots.uv2.fuel_capacity_s=200,250; robots.* moves all "
                                                    "together, x1.2 is relative to the file; may be repeated.",
                                                    show_default=False)] = None,
+    compare: CompareKeys = None,
     margin: MarginOption = None,
     plan_failure: PlanFailure = None,
     execute_failure: ExecuteFailure = None,
@@ -102,7 +105,8 @@ def over(
                                               "optimal.", show_default="1e-06")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="The batch folder.",
                                              show_default="runs/batch-<hash>")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume: do what is left of the batch "
+                                                "in the folder.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="List the grid, with an estimate of time and disk, and do "
                                           "nothing.")] = False,
     workers: WorkerCount = None,
@@ -114,6 +118,7 @@ def over(
     cache: CacheOption = None,
     as_json: AsJson = False,
     as_csv: TablesAsCsv = False,
+    wide: Wide = False,
     verbose: Verbose = False,
 ) -> None:
     """Monte Carlo over many worlds, seeds and variants: shards of outcomes, and the VSS over maps.
@@ -125,6 +130,7 @@ def over(
     with loading():
         from sva_bench.analysis.calibration import target_of
         from sva_bench.batch.cache import default_folder
+        from sva_bench.batch.compared import asked_of
         from sva_bench.batch.grid import batch_name
         from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 
@@ -145,16 +151,19 @@ def over(
         vary=varied(vary) if vary else None, unit_trials=unit_trials))
     with progress_bars() as progress:
         grid = grid_of(sweep, progress)
+    asked_of(compare or (), grid)  # what is wrong with it is said before hours of work
     folder = out or Path("runs") / batch_name(grid.settings())
     if dry_run:
-        _list(grid, folder, cache, as_json)
+        _list(grid, folder, cache, as_json, wide=wide)
         return
-    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=resume)
+    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=resume,
+         compare=compare, wide=wide)
 
 
 @batch_app.command(cls=PlainCommand)
 def retry(
     folder: Folder,
+    compare: CompareKeys = None,
     workers: WorkerCount = None,
     dask: DaskOption = None,
     unit_time_limit: UnitTimeLimit = 3600.0,
@@ -162,6 +171,7 @@ def retry(
     cache: CacheOption = None,
     as_json: AsJson = False,
     as_csv: TablesAsCsv = False,
+    wide: Wide = False,
     verbose: Verbose = False,
 ) -> None:
     """Take up again what failed or was not done; worlds and settings are those in the folder."""
@@ -173,16 +183,18 @@ def retry(
 
     _existing(folder)
     grid = grid_of(*settings_in(folder))
-    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True)
+    _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True,
+         compare=compare, wide=wide)
 
 
 @batch_app.command(cls=PlainCommand)
-def status(folder: Folder, as_json: AsJson = False) -> None:
+def status(folder: Folder, as_json: AsJson = False, wide: Wide = False) -> None:
     """How far is a batch, and what does it come to so far? It may be at work."""
     with loading():
         from sva_bench.batch.aggregates import summary_of
         from sva_bench.batch.folder import at_work, failures_in, settings_in, units_in
         from sva_bench.batch.grid import grid_of
+        from sva_bench.cli.sheets import print_sheet
         from sva_bench.cli.watching import over_maps, print_failed, reactions_over_maps
         from sva_bench.files.records import as_dict
         from sva_bench.report.calibration_over_maps import calibrated_over_maps
@@ -207,15 +219,15 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     console.print(f"{len(done)} of {counted(len(units), 'unit')} done, {len(failures)} failed: {state}",
                   highlight=False)
     if done:
-        console.print(over_maps(summary.aggregate, "VSS over maps, so far"))
+        print_sheet(over_maps(summary.aggregate, "VSS over maps, so far"), console, wide=wide)
         if summary.reactions:
-            console.print(reactions_over_maps(summary.reactions))
+            print_sheet(reactions_over_maps(summary.reactions), console, wide=wide)
         for said in calibrated_over_maps(summary.units):
             console.print(said, highlight=False, markup=False)
     print_failed(summary.failed, console)
 
 
-def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool) -> None:
+def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool, *, wide: bool) -> None:
     with loading():
         from sva_bench.batch.cache import Cache, default_folder
         from sva_bench.batch.estimates import estimates
@@ -228,7 +240,7 @@ def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool) -> None:
             {"world": e.point.world.name, "variant": e.point.variant, "seed": e.seed, "units": e.units, "rows": e.rows,
              "disk_mb": round(e.disk_bytes / 1e6, 3), "processor_s": round(e.processor_s, 1)} for e in listed]})
     else:
-        print_grid(listed)
+        print_grid(listed, wide=wide)
 
 
 def _existing(folder: Path) -> None:
@@ -239,9 +251,11 @@ def _existing(folder: Path) -> None:
 def _run(
     grid: Grid, folder: Path, workers: int | None, dask: str | None, unit_time_limit_s: float, memory_mb: int,
     cache: Path | None, as_json: bool, as_csv: bool, *, resume: bool, again: bool = False,
+    compare: list[str] | None = None, wide: bool = False,
 ) -> None:
     with loading():
         from sva_bench.batch.cache import Cache, default_folder
+        from sva_bench.batch.compared import asked_of
         from sva_bench.batch.folder import units_in
         from sva_bench.batch.run import run_batch
         from sva_bench.batch.tables import write_tables
@@ -253,6 +267,7 @@ def _run(
 
     if dask is not None and workers is not None:
         raise BadInput("--dask and --workers don't go together: the cluster has its own workers")
+    asked = asked_of(compare or (), grid)
     caps = Caps(time_s=unit_time_limit_s, memory_mb=memory_mb, preload="sva_bench.batch.jobs")
 
     @contextmanager
@@ -275,7 +290,7 @@ def _run(
     try:
         with watching() as report:
             summary = run_batch(grid, folder, engine, Cache(folder=cache or default_folder()), report, resume=resume,
-                                retry=again)
+                                retry=again, compare=asked)
     except KeyboardInterrupt:
         done = len(units_in(folder) & set(grid.units()))
         units = counted(len(grid.units()), "unit is", "units are")
@@ -286,7 +301,7 @@ def _run(
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_batch(summary)
+        print_batch(summary, wide=wide)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
     if summary.failed:
         if as_json:

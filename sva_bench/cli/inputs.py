@@ -18,6 +18,7 @@ from sva_bench.cli.options import (
     PlannerOption,
     ScenarioNames,
     Verbose,
+    Wide,
     WorldArgument,
     finite,
 )
@@ -29,7 +30,7 @@ from sva_bench.cli.terminal import (
     results,
     set_up_logging,
 )
-from sva_bench.cli.usage import PlainCommand
+from sva_bench.cli.usage import PlainCommand, PlainGroup
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_beside, write_result
 from sva_bench.files.printable import counted
@@ -45,8 +46,10 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-world_app = typer.Typer(no_args_is_help=True, help="Check, make, copy and draw worlds.", rich_markup_mode="rich")
-instance_app = typer.Typer(no_args_is_help=True, help="Make instances.", rich_markup_mode="rich")
+world_app = typer.Typer(cls=PlainGroup, no_args_is_help=True, help="Check, make, copy and draw worlds.",
+                        rich_markup_mode="rich")
+instance_app = typer.Typer(cls=PlainGroup, no_args_is_help=True, help="Make instances.",
+                           rich_markup_mode="rich")
 
 
 @world_app.command("check", cls=PlainCommand)
@@ -66,6 +69,7 @@ def check_world(
                                                 "the legs of the tightest plan, coloured by their margin.",
                                                 show_default="none")] = None,
     as_json: AsJson = False,
+    wide: Wide = False,
     planner: PlannerOption = "prmstar",
     verbose: Verbose = False,
 ) -> None:
@@ -87,7 +91,8 @@ def check_world(
         check_output(output, world)
     loaded = load(world, scenario, interaction=interaction)
     if noise:
-        _check_noise(loaded, world, planner, plan, output, draws or 200, seed or 0, as_json=as_json)
+        _check_noise(loaded, world, planner, plan, output, draws or 200, seed or 0, as_json=as_json,
+                     wide=wide)
         return
     with loading():
         from sva_bench.analysis.reach import beyond_reach, why_nothing
@@ -141,7 +146,7 @@ def _warn_of_doubtful(world: World, costs: Mapping[str, FuelCosts]) -> None:
 
 
 def _check_noise(loaded: World, path: Path, planner: PathPlanner, plan: Path | None, output: Path | None, draws: int,
-                 seed: int, *, as_json: bool) -> None:
+                 seed: int, *, as_json: bool, wide: bool) -> None:
     """The check under noise."""
     with loading():
         from sva_bench.cli.noise_check import check_under_noise
@@ -154,7 +159,7 @@ def _check_noise(loaded: World, path: Path, planner: PathPlanner, plan: Path | N
         with progress_bars() as progress:
             costs = plan_costs(loaded, planner, progress)
         _warn_of_doubtful(loaded, costs)
-        check_under_noise(loaded, costs, plan, output, draws=draws, seed=seed, as_json=as_json)
+        check_under_noise(loaded, costs, plan, output, draws=draws, seed=seed, as_json=as_json, wide=wide)
 
 
 @world_app.command("random", cls=PlainCommand)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
 from sva_bench.cli.loading import loading
+from sva_bench.cli.sheets import Column, Sheet, print_sheet
 from sva_bench.cli.terminal import print_json, progress_bars, results
 from sva_bench.files.outputs import write_result
 from sva_bench.files.printable import counted
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 def check_under_noise(
     world: World, costs: Mapping[str, FuelCosts], plan: Path | None, picture: Path | None, *, draws: int, seed: int,
-    as_json: bool,
+    as_json: bool, wide: bool,
 ) -> None:
     """Drive plans under noise, print what it leaves of their margins, and draw the worst of them."""
     with loading():
@@ -43,7 +42,7 @@ def check_under_noise(
         print_json(as_dict(checked.found))
     else:
         for told in checked.found.plans:
-            _print_plan(told, draws, results())
+            _print_plan(told, draws, results(), wide=wide)
     if picture is not None:
         worst = worst_of(checked)
         write_result(picture, picture_of_margins(world, costs, checked.plans[worst], checked.found.plans[worst],
@@ -53,20 +52,22 @@ def check_under_noise(
                             "noise upsets most often", highlight=False)
 
 
-def _print_plan(told: PlanTightness, draws: int, console: Console) -> None:
-    table = Table(title=f"{told.plan}, {', '.join(told.scenarios)}: legs under {counted(draws, 'noise draw')}",
-                  title_justify="left")
-    for number, heading in enumerate(("robot", "leg", "from", "to", "planned [s]", "driven 5, 50, 95 % [s]",
-                                      "fuel left 1, 5 % [s]", "time left 1, 5 % [s]", "dry", "late", "stuck", "")):
-        table.add_column(heading, justify="left" if number in (0, 2, 3, 11) else "right")
+def _print_plan(told: PlanTightness, draws: int, console: Console, *, wide: bool) -> None:
+    rows = []
     for leg in told.worst_first:
         driven = leg.driven_s
-        table.add_row(leg.robot, str(leg.leg), leg.origin, leg.destination, f"{leg.planned_s:.1f}",
-                      "–" if driven is None else f"{driven.q05:.1f} {driven.q50:.1f} {driven.q95:.1f}",
-                      _left(leg.fuel_margin_s), _left(leg.time_margin_s),
-                      *(f"{100 * share:.1f} %" if share else "" for share in (leg.dry, leg.late, leg.stuck)),
-                      _JUDGED[leg.judged])
-    console.print(table)
+        rows.append([leg.robot, f"{leg.leg}, {leg.origin} to {leg.destination}", f"{leg.planned_s:.1f}",
+                     "–" if driven is None else f"{driven.q05:.1f} {driven.q50:.1f} {driven.q95:.1f}",
+                     _left(leg.fuel_margin_s), _left(leg.time_margin_s),
+                     *(f"{100 * share:.1f} %" if share else "" for share in (leg.dry, leg.late, leg.stuck)),
+                     _JUDGED[leg.judged]])
+    spare = {"driven 5, 50, 95 % [s]": 5, "planned [s]": 4, "stuck": 3, "late": 2, "dry": 1}
+    print_sheet(Sheet(
+        title=f"{told.plan}, {', '.join(told.scenarios)}: legs under {counted(draws, 'noise draw')}", rows=rows,
+        columns=[Column(heading=heading, words=k in (0, 1, 9), above=k < 2, last=spare.get(heading, 0))
+                 for k, heading in enumerate((
+                     "robot", "leg", "planned [s]", "driven 5, 50, 95 % [s]", "fuel left 1, 5 % [s]",
+                     "time left 1, 5 % [s]", "dry", "late", "stuck", ""))]), console, wide=wide)
     edge = [leg for leg in told.legs if leg.judged == "edge"]
     console.print(f"{told.plan}, {', '.join(told.scenarios)}: some robot runs dry, is late or gets stuck in "
                   f"{100 * told.bad:.1f} % of draws; {_edge_told(edge)}", highlight=False, markup=False)

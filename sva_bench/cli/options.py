@@ -43,6 +43,11 @@ def read_by_somebody(asked: bool) -> bool:
 
 
 WorldArgument = Annotated[Path, typer.Argument(metavar="WORLD", help="World file (YAML).", show_default=False)]
+CompareKeys = Annotated[list[str] | None, typer.Option("--compare", metavar="KEY[=REFERENCE]", help="Compare the "
+                                                       "values of a varied key with one of them, pair by pair; may be "
+                                                       "repeated. Reference: the files' own value if it is among them, "
+                                                       "else the first.", show_default=False)]
+Wide = Annotated[bool, typer.Option("--wide", help="Show all columns of tables, however wide that is.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more, on standard error.")]
 AsJson = Annotated[bool, typer.Option("--json", callback=read_by_somebody, help="Print the result as JSON, and nothing "
                                       "else.")]
@@ -95,7 +100,7 @@ def few_enough(count: int | None) -> int | None:
     return count
 
 
-WorkerCount = Annotated[int | None, typer.Option(min=1, callback=few_enough, help="Processes that drive.",
+WorkerCount = Annotated[int | None, typer.Option(min=1, callback=few_enough, help="Worker processes.",
                                                  show_default="all cores")]
 Gap = Annotated[float, typer.Option(min=0, callback=finite, help="Relative gap at which a plan counts as optimal.")]
 Force = Annotated[bool, typer.Option("--force", help="Write over a world that was edited by hand, too.")]

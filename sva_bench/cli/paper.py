@@ -11,12 +11,12 @@ import typer
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import FidelityOption, Rollouts, Seed, Trials, Verbose, WorkerCount, finite
 from sva_bench.cli.terminal import messages, progress_bars, set_up_logging
-from sva_bench.cli.usage import PlainCommand
+from sva_bench.cli.usage import PlainCommand, PlainGroup
 from sva_bench.files.outputs import check_folder, check_output, write_result
 from sva_bench.study.libraries import PRELOAD
 from sva_bench.workers.pool import local_workers
 
-paper_app = typer.Typer(no_args_is_help=True, subcommand_metavar="PART [ARGS]...",
+paper_app = typer.Typer(cls=PlainGroup, no_args_is_help=True, subcommand_metavar="PART [ARGS]...",
                         help="The paper's experiments again, ours beside its figures.")
 
 _SHIPPED = ("four-rooms", "open-field", "warehouse", "maze")

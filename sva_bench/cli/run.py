@@ -31,6 +31,7 @@ from sva_bench.cli.options import (
     TimeLimit,
     Trials,
     Verbose,
+    Wide,
     WorkerCount,
     WorldArgument,
 )
@@ -77,6 +78,8 @@ def run(
     precision: Annotated[str | None, typer.Option(
         metavar="PCT%", help="Go on with more trials and noise draws until the interval of the executed VSS is within "
         "so many per cent of the stochastic plan's mean.", show_default="none")] = None,
+    anytime: Annotated[bool, typer.Option("--anytime", help="With --precision: stop by intervals that hold whenever a "
+                                          "run stops, wider ones.")] = False,
     max_trials: Annotated[int | None, typer.Option(
         min=1, max=MOST_TRIALS, help="With --precision: trials at which to stop all the same.",
         show_default="100000")] = None,
@@ -84,6 +87,7 @@ def run(
     workers: WorkerCount = None,
     csv: AsCsv = False,
     as_json: AsJson = False,
+    wide: Wide = False,
     verbose: Verbose = False,
 ) -> None:
     """Plan, execute, record and measure a mission: the main job.
@@ -98,7 +102,11 @@ def run(
     set_up_logging(verbose)
     if precision is None and max_trials is not None:
         raise BadInput("--max-trials belongs to --precision; --trials says how many there are without it")
-    asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts)
+    if precision is None and anytime:
+        raise BadInput("--anytime belongs to --precision: without it the number of trials is fixed, and every interval "
+                       "holds as it is")
+    asked = None if precision is None else precision_of(precision, max_trials or 100_000, trials, rollouts,
+                                                        anytime=anytime)
     target = None if calibrate is None else target_of(calibrate)
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
@@ -118,7 +126,7 @@ def run(
                       calibrate=target, precision=asked)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
-    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
 
 
 def execute(
@@ -147,6 +155,7 @@ def execute(
     workers: WorkerCount = None,
     csv: AsCsv = False,
     as_json: AsJson = False,
+    wide: Wide = False,
     verbose: Verbose = False,
 ) -> None:
     """Execute plans from anywhere in a world and compare them, pair by pair.
@@ -182,10 +191,11 @@ def execute(
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=verbose)
+    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
 
 
-def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv: bool, wide: bool) -> None:
+def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv: bool, wide: bool,
+          sources: bool) -> None:
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
@@ -197,7 +207,7 @@ def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_summary(summary, wide=wide, world=world)
+        print_summary(summary, wide=wide, sources=sources, world=world)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
     if failed := failed_physics(summary):
         if as_json:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from sva_bench.analysis.catalogue import statistics
 from sva_bench.analysis.plan_names import shown_name, shown_over
@@ -15,6 +14,7 @@ from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
 from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
+from sva_bench.cli.sheets import Column, Sheet, fitted, print_sheet
 from sva_bench.cli.terminal import results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_page import calibration_lines
@@ -34,19 +34,24 @@ from sva_bench.report.wording import (
 )
 from sva_bench.world.model import World
 
-_ALWAYS_SHOWN = 3
-"""Robots that have a column however narrow the terminal is."""
+_MOST_ROBOTS = 6
+"""Robots that have a row in each scenario where there is no room for a column each."""
 
 
-def print_summary(summary: AnySummary, *, wide: bool = False, world: World | None = None) -> None:
-    """Print a summary as a table, and what it comes to; ``wide``: what noise and robots did to each plan, too."""
+def print_summary(
+    summary: AnySummary, *, sources: bool = False, wide: bool = False, world: World | None = None
+) -> None:
+    """Print a summary as a table, and what it comes to.
+
+    Args:
+        summary: The summary.
+        sources: Whether to say what noise and robots did to each plan, too.
+        wide: Whether to show all columns, however wide that is.
+        world: Its world, if at hand.
+    """
     console, travel = results(), summary.travel
     robots = list(summary.scenarios[0].availability)
-    shown = _robots_that_fit(summary, console, robots)
-    console.print(_plans_table(summary, shown))
-    if len(shown) < len(robots):
-        console.print(f"{counted(len(robots) - len(shown), 'robot')} of {len(robots)} left out of the table for want "
-                      "of room; summary.json and report.html have all.", highlight=False)
+    _print_plans(summary, robots, console, wide=wide)
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
                   f"{travel.max_excess_pct:.1f} %; {assumed(summary)}.", highlight=False)
     for said in dependent_robots(world, summary) if world else ():
@@ -64,40 +69,36 @@ def print_summary(summary: AnySummary, *, wide: bool = False, world: World | Non
     for said in (*failed_physics(summary), *upset_by_noise(summary), *remarks(summary)):
         console.print(said, highlight=False)
     if isinstance(summary, ComparisonSummary):
-        print_given_reactions(summary, console)
+        print_given_reactions(summary, console, wide=wide)
     else:
         for said in calibration_lines(summary):
             console.print(said, highlight=False, markup=False)
-        print_reactions(summary, console)
-        _print_assumptions(summary, console)
-    if wide:
-        _print_sources(summary, console)
-        _print_interaction(summary, console)
+        print_reactions(summary, console, wide=wide)
+        _print_assumptions(summary, console, wide=wide)
+    if sources:
+        _print_sources(summary, console, wide=wide)
+        _print_interaction(summary, console, wide=wide)
     if not summary.reproducible:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
 
 
-def _robots_that_fit(summary: AnySummary, console: Console, robots: list[str]) -> list[str]:
-    """The first robots that have room for a column each; a table that is too wide would lose the figures of all."""
-    def fits(count: int) -> bool:
-        wanted = _plans_table(summary, robots[:count]).columns
-        widths = [max(Text(str(cell)).cell_len for cell in (column.header, *column.cells)) for column in wanted]
-        return sum(widths) + 3 * len(widths) + 1 <= console.width
+def _print_plans(summary: AnySummary, robots: Sequence[str], console: Console, *, wide: bool) -> None:
+    """Print the table of plans; robots that find no room in it have a table of their own."""
+    beside = _plans_sheet(summary, robots)
+    if wide or not fitted(beside, console.width)[1]:
+        print_sheet(beside, console, wide=wide)
+        return
+    print_sheet(_plans_sheet(summary, []), console)
+    print_sheet(_robots_sheet(summary, robots[:_MOST_ROBOTS]), console)
+    if len(robots) > _MOST_ROBOTS:
+        console.print(f"{counted(len(robots) - _MOST_ROBOTS, 'robot')} of {len(robots)} left out of the table for want "
+                      "of room; --wide, summary.json and report.html have all.", highlight=False)
 
-    # Few robots are shown as ever: their headings and intervals wrap where it is narrow.
-    least = min(len(robots), _ALWAYS_SHOWN)
-    return robots[:max(least, next((count for count in range(len(robots), 0, -1) if fits(count)), 0))]
 
-
-def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
+def _plans_sheet(summary: AnySummary, robots: Sequence[str]) -> Sheet:
     scenarios, shown = summary.scenarios, statistics("terminal")
     compared, given = isinstance(summary, Summary), not isinstance(summary, Summary)  # given plans may lose robots
-    table = Table(title=f"{summary.world}, seed {summary.seed}: {counted(summary.trials, 'trial')}, "
-                        f"{counted(summary.rollouts, 'rollout')}, {summary.fidelity}", title_justify="left")
-    for heading in ("scenario", "plan", *(("robots lost",) if given else ()),
-                    *(f"{entry.heading} [95 %]" if entry.interval else entry.heading for entry in shown),
-                    *robots, *(("VSS executed [95 %]", "VSS modelled", "EVPI") if compared else ())):
-        table.add_column(heading, justify="left" if heading in ("scenario", "plan") else "right")
+    rows, ends = list[list[str]](), set[int]()
     for scenario in scenarios:
         for number, (name, plan) in enumerate(scenario.plans.items()):
             proof = "" if plan.status in ("optimal", None) else f" ({plan.status})"
@@ -108,11 +109,32 @@ def _plans_table(summary: AnySummary, robots: list[str]) -> Table:
             if not number and not isinstance(scenario, ComparedScenario):
                 worth = [vss_verdict(scenario.vss), f"{scenario.vss.modelled:.1f}",
                          "" if scenario.evpi is None else f"{scenario.evpi:.1f}"]
-            table.add_row(
-                "" if number else scenario.name, shown_name(scenario, name) + proof, *((lost,) if given else ()),
-                *(cell(entry, plan) for entry in shown), *(f"{plan.by_robot[robot]:.1f}" for robot in robots),
-                *(worth if compared else ()), end_section=number == len(scenario.plans) - 1)
-    return table
+            rows.append(["" if number else scenario.name, shown_name(scenario, name) + proof,
+                         *([lost] if given else []), *(cell(entry, plan) for entry in shown),
+                         *(f"{plan.by_robot[robot]:.1f}" for robot in robots), *(worth if compared else [])])
+        ends.add(len(rows) - 1)
+    spare = {"promised": 1, "expected": 2}
+    return Sheet(rows=rows, ends=frozenset(ends), title=f"{summary.world}, seed {summary.seed}: "
+                 f"{counted(summary.trials, 'trial')}, {counted(summary.rollouts, 'rollout')}, {summary.fidelity}",
+                 columns=[Column(heading="scenario", words=True, above=True),
+                          Column(heading="plan", words=True, above=True),
+                          *([Column(heading="robots lost")] if given else []),
+                          *(Column(heading=f"{entry.heading} [95 %]" if entry.interval else entry.heading,
+                                   last=spare.get(entry.key, 0)) for entry in shown),
+                          *(Column(heading=robot, last=5) for robot in robots),
+                          *([Column(heading="VSS executed [95 %]"), Column(heading="VSS modelled", last=3),
+                             Column(heading="EVPI", last=4)] if compared else [])])
+
+
+def _robots_sheet(summary: AnySummary, robots: Sequence[str]) -> Sheet:
+    """What each robot collects in each plan, a row a robot: names may be long."""
+    plans = list(summary.scenarios[0].plans)
+    rows = [["" if number else scenario.name, robot,
+             *(f"{scenario.plans[name].by_robot[robot]:.1f}" if name in scenario.plans else "" for name in plans)]
+            for scenario in summary.scenarios for number, robot in enumerate(robots)]
+    return Sheet(title="Value by robot", rows=rows, columns=[
+        Column(heading="scenario", words=True, above=True), Column(heading="robot", words=True, above=True),
+        *(Column(heading=shown_over(summary.scenarios, name)) for name in plans)])
 
 
 def _print_unhappy(summary: AnySummary, console: Console) -> None:
@@ -135,31 +157,26 @@ def _print_unhappy(summary: AnySummary, console: Console) -> None:
         console.print(said, highlight=False, markup=False)
 
 
-def _print_sources(summary: AnySummary, console: Console) -> None:
+def _print_sources(summary: AnySummary, console: Console, *, wide: bool) -> None:
     if rows := source_rows(summary.scenarios):
-        table = Table(title=source_title(rows), title_justify="left")
-        for number, heading in enumerate(SOURCES_HEAD):
-            table.add_column(heading, justify="left" if number < 3 else "right")
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
+        print_sheet(_named(source_title(rows), SOURCES_HEAD, rows, 3), console, wide=wide, apart=True)
 
 
-def _print_interaction(summary: AnySummary, console: Console) -> None:
+def _print_interaction(summary: AnySummary, console: Console, *, wide: bool) -> None:
     if rows := interaction_table(summary.scenarios):
-        table = Table(title="What robots did to each other, a mission", title_justify="left")
-        for number, heading in enumerate(INTERACTION_HEAD):
-            table.add_column(heading, justify="left" if number < 2 else "right")
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
+        print_sheet(_named("What robots did to each other, a mission", INTERACTION_HEAD, rows, 2), console, wide=wide,
+                    apart=True)
 
 
-def _print_assumptions(summary: Summary, console: Console) -> None:
+def _print_assumptions(summary: Summary, console: Console, *, wide: bool) -> None:
     if rows := assumption_rows(summary.scenarios):
-        crossed = Table(title="Plans under the failures they were made for and under the others", title_justify="left")
-        for number, heading in enumerate(ASSUMPTION_HEAD):
-            crossed.add_column(heading, justify="left" if number < 4 else "right")
-        for row in rows:
-            crossed.add_row(*row)
-        console.print(crossed)
+        print_sheet(_named("Plans under the failures they were made for and under the others", ASSUMPTION_HEAD, rows,
+                           4), console, wide=wide, apart=True)
+
+
+def _named(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], words: int) -> Sheet:
+    """A table whose first columns are of words; scenario and plan are said once."""
+    said = [["" if k and column < 2 and row[:column + 1] == rows[k - 1][:column + 1] else text
+             for column, text in enumerate(row)] for k, row in enumerate(rows)]
+    return Sheet(title=title, rows=said, columns=[
+        Column(heading=heading, words=k < words, above=k < 2) for k, heading in enumerate(head)])

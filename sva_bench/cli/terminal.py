@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -36,11 +37,15 @@ class _SafeFormatter(logging.Formatter):
 
 
 messages = SafeConsole(stderr=True)
+_PIPED = 80
+"""Columns of a terminal since there are any: what a pipe ends in is seldom wider."""
 
 
 def results() -> Console:
-    """Standard output; tables keep their shape in a pipe."""
-    return SafeConsole(width=None if sys.stdout.isatty() else 140, markup=False)  # names may hold brackets
+    """Standard output; in a pipe as wide as COLUMNS says, else 80 columns."""
+    told = os.environ.get("COLUMNS", "")
+    width = None if sys.stdout.isatty() else int(told) if told.isdecimal() and 20 <= int(told) <= 1000 else _PIPED
+    return SafeConsole(width=width, markup=False)  # names may hold brackets
 
 
 def refuse_closed_output() -> None:

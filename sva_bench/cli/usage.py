@@ -7,7 +7,16 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from sva_bench.cli.help_pages import arranged
 from sva_bench.errors import BadInput
+
+
+def words_of(context: Any) -> str:
+    """What calls a command, behind the name of the program; a group's unnamed command is called by the group's."""
+    named = isinstance(context, _NameOfTheGroup)
+    if context.parent is None:
+        return ""
+    return words_of(context.parent) if named else f"{words_of(context.parent)} {context.info_name}".strip()
 
 
 class PlainCommand(TyperCommand):
@@ -27,6 +36,11 @@ class PlainCommand(TyperCommand):
                 raise BadInput(f"{name}: its value is empty, as of a variable that isn't set; give one"
                                + (", or leave the option out" if option and not parameter.required else ""))
         return super().parse_args(ctx, args)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The command's page, in groups and with an example."""
+        arranged(self, words_of(ctx))
+        super().format_help(ctx, formatter)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """The words of the usage line after the command's name."""
@@ -64,7 +78,16 @@ class UnnamedCommand(PlainCommand):
     context_class = _NameOfTheGroup
 
 
-class WorldsFirst(TyperGroup):
+class PlainGroup(TyperGroup):
+    """A group of commands whose page has an example."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The group's page."""
+        arranged(self, words_of(ctx))
+        super().format_help(ctx, formatter)
+
+
+class WorldsFirst(PlainGroup):
     """``batch WORLD...`` is ``batch over WORLD...``: what is no command is a world."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

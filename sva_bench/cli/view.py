@@ -9,8 +9,8 @@ import typer
 from rich.markup import escape
 
 from sva_bench.cli.loading import loading
-from sva_bench.cli.options import AsCsv, Verbose
-from sva_bench.cli.terminal import messages, set_up_logging
+from sva_bench.cli.options import AsCsv, CompareKeys, Verbose, Wide
+from sva_bench.cli.terminal import messages, results, set_up_logging
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output
 
@@ -49,19 +49,49 @@ def view(
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or of a batch.", show_default=False)],
+    compare: CompareKeys = None,
     csv: AsCsv = False,
+    wide: Wide = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write the report of a finished run again, from its tables."""
+    """Write the report of a finished run or batch again, from its tables.
+
+    Of a batch, --compare says which value of a varied key is worth more, without running anything again.
+    """
     with loading():
+        from sva_bench.batch.folder import is_batch
         from sva_bench.storage.stored_run import write_csv
         from sva_bench.study.publish import report_again
 
     set_up_logging(verbose)
     if folder.is_dir():  # else it is said what is missing
         check_output(folder / "report.html", way_out="make the folder writable")
+        if is_batch(folder):
+            _report_of_batch(folder, compare, csv=csv, wide=wide)
+            return
+        if compare:
+            raise BadInput(f"--compare {compare[0]}: {folder} is no folder of a batch, which alone has values of a key "
+                           "to compare")
     page = report_again(folder)
     if csv:
         write_csv(folder)
     messages.print(f"written to [bold]{escape(str(page))}[/bold]", highlight=False)
+
+
+def _report_of_batch(folder: Path, compare: list[str] | None, *, csv: bool, wide: bool) -> None:
+    """Write the report of a batch again; what is compared is printed too."""
+    with loading():
+        from sva_bench.batch.compared import asked_of
+        from sva_bench.batch.folder import settings_in
+        from sva_bench.batch.grid import grid_of
+        from sva_bench.batch.run import report_again
+        from sva_bench.batch.tables import write_tables
+        from sva_bench.cli.watching import print_compared
+
+    grid = grid_of(*settings_in(folder))
+    summary = report_again(grid, folder, asked_of(compare or (), grid))
+    if csv:
+        write_tables(folder, summary)
+    print_compared(summary.compared, results(), wide=wide)
+    messages.print(f"written to [bold]{escape(str(folder / 'report.html'))}[/bold]", highlight=False)

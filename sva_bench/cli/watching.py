@@ -7,18 +7,21 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 
-from rich.console import Console, Group
+from rich.cells import cell_len
+from rich.console import Console
 from rich.live import Live
-from rich.table import Table
 from rich.text import Text
 
+from sva_bench.analysis.compared_values import KeyComparison
 from sva_bench.analysis.over_maps import BatchSummary, GivenUp, OverMaps, ReactionOverMaps, UnitSummary
 from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.batch.estimates import StrandCost
 from sva_bench.batch.run import BatchProgress
+from sva_bench.cli.sheets import Column, Sheet, fitted, print_sheet
 from sva_bench.cli.terminal import messages, results
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_over_maps import calibrated_over_maps
+from sva_bench.report.compared_values import compared_answers, compared_notes, compared_table, compared_title
 from sva_bench.report.reactions_over_maps import reaction_table
 from sva_bench.report.wording import over_few_maps, percentage, verdict, with_interval
 
@@ -49,7 +52,7 @@ def watching() -> Iterator[Callable[[BatchProgress], None]]:
         def say(progress: BatchProgress) -> None:
             greet(progress)
             if due(_LINE_S):
-                messages.print(line(progress), highlight=False, markup=False, soft_wrap=True)
+                messages.print(line(progress, messages.width), highlight=False, markup=False, soft_wrap=True)
 
         yield say
         return
@@ -58,8 +61,7 @@ def watching() -> Iterator[Callable[[BatchProgress], None]]:
             greet(progress)
             if due(_TABLE_S):
                 rows = progress.vss()
-                tables = [over_maps(rows, "VSS over maps, so far")] if rows else []
-                live.update(Group(Text(how_far(progress)), *tables), refresh=True)
+                live.update(Text("\n".join([how_far(progress), *so_far(rows, messages.width)])), refresh=True)
 
         yield show
 
@@ -72,43 +74,74 @@ def how_far(progress: BatchProgress) -> str:
     return text
 
 
-def line(progress: BatchProgress) -> str:
-    """All of it in one line."""
-    rows = [f"{row.label} {with_interval(row.vss)}" for row in progress.vss()]
-    return how_far(progress) + (f"; VSS over maps so far: {', '.join(rows)}" if rows else "")
+def line(progress: BatchProgress, width: int) -> str:
+    """All of it in one line, with as much of the VSS as there is room for."""
+    said = how_far(progress)
+    for number, row in enumerate(progress.vss()):
+        more = f"{', ' if number else '; VSS '}{row.label} {with_interval(row.vss)}"
+        if cell_len(said + more) > width - len(_MORE):
+            return said + _MORE
+        said += more
+    return said
 
 
-def over_maps(rows: Sequence[OverMaps], title: str) -> Table:
+_MORE = ", ..."
+_MOST_SHOWN = 12
+
+
+def so_far(rows: Sequence[OverMaps], width: int) -> list[str]:
+    """The VSS over maps so far, in lines that fit a terminal; what came first, where there are many."""
+    shown = [line for line, _ in fitted(over_maps(rows[:_MOST_SHOWN], ""), width)[0]] if rows else []
+    return [*shown, f"and {len(rows) - _MOST_SHOWN} more"] if len(rows) > _MOST_SHOWN else shown
+
+
+def over_maps(rows: Sequence[OverMaps], title: str) -> Sheet:
     """The VSS over maps as a table."""
     varied = any(row.variant for row in rows)
-    table = Table(title=title, title_justify="left")
-    for heading in (*(("variant",) if varied else ()), "scenario", "maps", "VSS [95 %]", "VSS % [95 %]"):
-        table.add_column(heading, justify="left" if heading in ("scenario", "variant") else "right")
+    before: list[str] = [""]
+    cells = []
     for row in rows:
-        table.add_row(*((Text(row.variant),) if varied else ()), row.scenario, str(row.maps),
-                      with_interval(row.vss), percentage(row.vss_pct))
-    return table
+        cells.append([*(["" if row.variant == before[-1] else row.variant] if varied else []), row.scenario,
+                      str(row.maps), with_interval(row.vss), percentage(row.vss_pct)])
+        before.append(row.variant)
+    return Sheet(title=title, rows=cells, columns=[
+        *([Column(heading="variant", words=True, above=True)] if varied else []),
+        Column(heading="scenario", words=True, above=True), Column(heading="maps"), Column(heading="VSS [95 %]"),
+        Column(heading="VSS % [95 %]", last=1)])
 
 
-def reactions_over_maps(rows: Sequence[ReactionOverMaps]) -> Table:
+def reactions_over_maps(rows: Sequence[ReactionOverMaps]) -> Sheet:
     """What reacting is worth over maps, as a table."""
-    varied = any(row.variant for row in rows)
     head, words, cells = reaction_table(rows, narrow=True)
-    table = Table(title="Reactions over maps", title_justify="left")
-    for number, heading in enumerate(head):
-        table.add_column(heading, justify="left" if number in words else "right", overflow="fold")
-    for row in cells:
-        table.add_row(*(Text(cell) if varied and not k else cell for k, cell in enumerate(row)))
-    return table
+    return Sheet(title="Reactions over maps", rows=cells, columns=[
+        Column(heading=heading, words=k in words, above=k in words) for k, heading in enumerate(head)],
+        ends=frozenset(range(len(cells))) if len(words) > 2 else frozenset())
 
 
-def print_batch(summary: BatchSummary, console: Console | None = None) -> None:
-    """Print a batch: the VSS map by map, over maps, and what failed."""
+def print_compared(comparisons: Sequence[KeyComparison], console: Console, *, wide: bool = False) -> None:
+    """Print what the values of varied keys are worth."""
+    for found in comparisons:
+        head, words, cells = compared_table(found)
+        spare = {"VSS [95 %]": 2, "maps": 3}
+        rows = [["" if k and column in words and row[:column + 1] == cells[k - 1][:column + 1] else cell
+                 for column, cell in enumerate(row)] for k, row in enumerate(cells)]  # names are said once
+        print_sheet(Sheet(title=compared_title(found), rows=rows, columns=[
+            Column(heading=heading, words=k in words, above=k in words, last=spare.get(heading, 0))
+            for k, heading in enumerate(head)]), console, wide=wide)
+        for said in compared_answers(found):
+            console.print(said, highlight=False)
+    for said in compared_notes(comparisons):
+        console.print(said, highlight=False)
+
+
+def print_batch(summary: BatchSummary, console: Console | None = None, *, wide: bool = False) -> None:
+    """Print a batch: the VSS map by map, over maps, and what failed; ``wide``: all columns, however wide that is."""
     console = console or results()
-    console.print(_map_by_map(summary))
-    console.print(over_maps(summary.aggregate, "VSS over maps"))
+    print_sheet(_map_by_map(summary), console, wide=wide)
+    print_sheet(over_maps(summary.aggregate, "VSS over maps"), console, wide=wide)
+    print_compared(summary.compared, console, wide=wide)
     if summary.reactions:
-        console.print(reactions_over_maps(summary.reactions))
+        print_sheet(reactions_over_maps(summary.reactions), console, wide=wide)
     if said := over_few_maps(summary.aggregate):
         console.print(said, highlight=False)
     for said in calibrated_over_maps(summary.units):
@@ -118,30 +151,28 @@ def print_batch(summary: BatchSummary, console: Console | None = None) -> None:
     print_failed(summary.failed, console)
 
 
-def _map_by_map(summary: BatchSummary) -> Table:
+def _map_by_map(summary: BatchSummary) -> Sheet:
     worlds, seeds = len(summary.worlds), len(summary.seeds)
     varied = any(row.variant for row in summary.maps)
-    table = Table(title=f"{counted(worlds, 'world')}, {counted(seeds, 'seed')}, "
-                        f"{counted(summary.trials, 'trial')}, {summary.fidelity}", title_justify="left")
-    for heading in ("world", *(("variant",) if varied else ()), "scenario", "stochastic", "deterministic",
-                    "VSS [95 %]", "VSS %"):
-        # Names of worlds tell them apart by their ends.
-        table.add_column(heading, justify="left" if heading in ("world", "variant", "scenario") else "right",
-                         overflow="fold")
     means = _means(summary.units)
-    before = None
+    before, rows, ends = None, list[list[str]](), set[int]()
     for row in summary.maps:
         this = (row.world, row.variant)
         if before is not None and this != before:
-            table.add_section()
-        name: list[str | Text] = [row.world, *([Text(row.variant)] if varied else [])]
+            ends.add(len(rows) - 1)
+        name = [row.world, *([row.variant] if varied else [])]
         plans = means[row.variant, row.world, row.scenario]
-        table.add_row(*(name if this != before else [""] * len(name)), row.scenario,
-                      *(f"{mean:.1f}" for mean in plans),
-                      verdict(row.vss, distinguishable=row.vss.excludes_zero, same=row.vss.same_plan),
-                      "" if row.vss_pct is None else f"{row.vss_pct:.1f}")
+        rows.append([*(name if this != before else [""] * len(name)), row.scenario, *(f"{mean:.1f}" for mean in plans),
+                     verdict(row.vss, distinguishable=row.vss.excludes_zero, same=row.vss.same_plan),
+                     "" if row.vss_pct is None else f"{row.vss_pct:.1f}"])
         before = this
-    return table
+    return Sheet(title=f"{counted(worlds, 'world')}, {counted(seeds, 'seed')}, {counted(summary.trials, 'trial')}, "
+                       f"{summary.fidelity}", rows=rows, ends=frozenset(ends), columns=[
+        Column(heading="world", words=True, above=not varied),
+        *([Column(heading="variant", words=True, above=True)] if varied else []),
+        Column(heading="scenario", words=True, above=True),
+        Column(heading="stochastic"), Column(heading="deterministic"), Column(heading="VSS [95 %]"),
+        Column(heading="VSS %", last=1)])
 
 
 def print_failed(failed: Sequence[GivenUp], console: Console, most: int = 20) -> None:
@@ -158,23 +189,26 @@ def print_failed(failed: Sequence[GivenUp], console: Console, most: int = 20) ->
         console.print(f"  and {len(failed) - most} more: see failures.json", highlight=False)
 
 
-def print_grid(listed: Sequence[StrandCost]) -> None:
+def print_grid(listed: Sequence[StrandCost], *, wide: bool = False) -> None:
     """Print what a batch would do, and take."""
     console = results()
-    table = Table(title="the grid", title_justify="left")
-    for heading in ("world", "variant", "seed", "units", "rows", "disk [MB]", "processor time [s]"):
-        table.add_column(heading, justify="left" if heading in ("world", "variant") else "right")
-    for e in listed[:_MOST_LISTED]:
-        table.add_row(e.point.world.name, Text(e.point.variant), str(e.seed), str(e.units), str(e.rows),
-                      f"{e.disk_bytes / 1e6:.1f}", f"{e.processor_s:.0f}")
-    console.print(table)
+    names = [(e.point.world.name, e.point.variant) for e in listed]
+    varied = any(variant for _, variant in names)
+    print_sheet(Sheet(title="the grid", columns=[
+        Column(heading="world", words=True, above=not varied),
+        *([Column(heading="variant", words=True, above=True)] if varied else []), Column(heading="seed"),
+        Column(heading="units"), Column(heading="rows"), Column(heading="disk [MB]", last=1),
+        Column(heading="processor time [s]")], rows=[
+        [*([""] * (1 + varied) if number and names[number] == names[number - 1] else names[number][:1 + varied]),
+         str(e.seed), str(e.units), str(e.rows), f"{e.disk_bytes / 1e6:.1f}", f"{e.processor_s:.1f}"]
+        for number, e in enumerate(listed[:_MOST_LISTED])]), console, wide=wide)
     if len(listed) > _MOST_LISTED:
         console.print(f"and {len(listed) - _MOST_LISTED} more", highlight=False)
     seconds = sum(e.processor_s for e in listed)
     console.print(f"{counted(sum(e.units for e in listed), 'unit')}, {counted(sum(e.rows for e in listed), 'row')}; "
                   f"about {sum(e.disk_bytes for e in listed) / 1e6:.1f} MB and {timedelta(seconds=round(seconds))} of "
                   "processor time, to be divided by the number of workers. Time is rough until travel times and plans "
-                  "are in the cache.", highlight=False, soft_wrap=True)
+                  "are in the cache.", highlight=False)
 
 
 _MOST_LISTED = 200

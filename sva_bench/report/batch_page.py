@@ -10,6 +10,7 @@ from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
 from sva_bench.report.calibration_over_maps import calibrated_over_maps
 from sva_bench.report.calibration_page import bad_pct
+from sva_bench.report.compared_values import compared_answers, compared_notes, compared_table, compared_title
 from sva_bench.report.page import CONTENTS, figure, heading, note, sentence, table, write_page
 from sva_bench.report.reaction_wording import knows_what_when
 from sva_bench.report.reactions_over_maps import answers_over_maps, reaction_table
@@ -40,6 +41,7 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
               words=(0, 1) if varied else (0,)),
         *([note(caution)] if caution else []),
         CONTENTS,
+        *_compared(summary),
         *_reactions(summary),
         *(note(remark) for remark in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing])),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, fidelity {summary.fidelity}; 95 "
@@ -72,6 +74,27 @@ def _calibrated(summary: BatchSummary) -> list[str]:
                    "go wrong, nominal", "go wrong, calibrated", "executed, nominal", "executed, calibrated"],
                   rows, words=(0, 2), sections=[
                       unit.label for unit in summary.units for s in unit.scenarios if s.calibration is not None])]
+
+
+_MEANS = "Executed value of the stochastic plan: means, each with its own 95 % interval."
+_DIFFERENCES = "Paired differences: intervals that hold together with 95 %. They may be sure where means are not."
+
+
+def _compared(summary: BatchSummary) -> list[str]:
+    """What the values of varied keys are worth."""
+    if not summary.compared:
+        return []
+    with holding_back_ctrl_c():
+        from sva_bench.report.response_chart import response
+
+    parts = [heading("Which value is worth more?")]
+    for found in summary.compared:
+        head, words, cells = compared_table(found)
+        parts += [f"<ul>{''.join(f'<li>{sentence(said)}</li>' for said in compared_answers(found))}</ul>",
+                  f'<div class=pair>{figure(response(found), _MEANS)}'
+                  f'{figure(response(found, more=True), _DIFFERENCES)}</div>',
+                  table(head, cells, words=words, caption=compared_title(found))]
+    return [*parts, *map(note, compared_notes(summary.compared))]
 
 
 def _reactions(summary: BatchSummary) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from sva_bench.analysis.catalogue import Statistic
@@ -199,7 +199,13 @@ def _precision(summary: Summary) -> list[str]:
     reached = "no interval" if asked.reached_pct is None else f"{asked.reached_pct:.2g} %"
     return [f"Precision asked for: VSS within {asked.asked_pct:g} % of the stochastic plan's value; reached: "
             f"{reached} after {counted(summary.trials, 'trial')} under {counted(summary.rollouts, 'noise draw')}"
-            f"{'' if asked.met else ', the most that were allowed'}."]
+            f"{'' if asked.met else ', the most that were allowed'}."
+            f"{'' if asked.anytime is None else _anytime(asked.anytime)}"]
+
+
+def _anytime(found: Mapping[str, tuple[float, float] | None]) -> str:
+    told = [f"{name} [{ends[0]:.1f}, {ends[1]:.1f}]" for name, ends in found.items() if ends is not None]
+    return f" Intervals of the VSS that hold with 95 % whenever a run stops: {', '.join(told)}." if told else ""
 
 
 def _known_beforehand(summary: Summary) -> list[str]:

@@ -55,7 +55,8 @@ class Options:
     def as_dict(self) -> dict[str, Any]:
         """Everything that changes results, as asked for; what isn't asked for is left out."""
         asked: dict[str, Any] = {} if self.precision is None else {
-            "precision_pct": self.precision.pct, "max_trials": self.precision.max_trials}
+            "precision_pct": self.precision.pct, "max_trials": self.precision.max_trials,
+            **({"anytime": True} if self.precision.anytime else {})}
         asked |= {key: list(words) for key, words in (("policies", self.policies), ("news", self.news)) if words}
         asked |= {"anticipate": True} if self.anticipate else {}
         asked |= {} if self.calibrate is None else {"calibrate": target_text(self.calibrate)}
@@ -68,7 +69,8 @@ class Options:
         """The options that ``as_dict`` has told, as they stand in ``manifest.json``, with the seed beside them."""
         precision = None
         if "precision_pct" in told:
-            precision = Precision(pct=told["precision_pct"], max_trials=told["max_trials"])
+            precision = Precision(pct=told["precision_pct"], max_trials=told["max_trials"],
+                                  anytime=told.get("anytime", False))
         return cls(
             seed=seed, trials=told["trials"], rollouts=told["rollouts"], fidelity=told["fidelity"],
             planner=told["planner"], limits=SolveLimits(time_limit_s=told["time_limit_s"], gap=told["gap"]),

@@ -97,7 +97,8 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
         larger = options.precision.next_size(summary) if options.precision else None
         if larger is None:
             break
-        options = replace(options, trials=larger[0], rollouts=larger[1])
+        assert options.precision is not None
+        options = replace(options, trials=larger[0], rollouts=larger[1], precision=options.precision.after_look())
     with clock.phase("sources"):
         summary = with_sources(Grounds(world=world, costs=costs, settings=settings, executor=executor, drives=drives),
                                summary, executed)

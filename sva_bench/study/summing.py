@@ -8,8 +8,10 @@ from dataclasses import replace
 from typing import TypeVar
 
 from sva_bench.analysis.driving import DrivesMade, driving_told
+from sva_bench.analysis.figures import difference_figure
 from sva_bench.analysis.over_trials import Judged, ScenarioTrials, promise_of, scenario_summary
-from sva_bench.analysis.results import Promise, ScenarioFacts
+from sva_bench.analysis.results import Estimate, Promise, ScenarioFacts
+from sva_bench.analysis.statistics import estimate
 from sva_bench.analysis.summaries import ComparisonSummary, Failures, Head, Reach, Summary, Travel
 from sva_bench.choices import Fault, Role
 from sva_bench.execution.case import Settings
@@ -34,7 +36,8 @@ def summarise(
 ) -> Summary:
     """The summary of a run."""
     runs: dict[tuple[str, Role], Executed] = {(run.case.scenario.name, run.case.role): run for run in executed}
-    scenarios = []
+    scenarios, precision = [], options.precision
+    anytime: dict[str, Estimate] = {}
     for scenario in world.scenarios:
         plans = planned[scenario.name]
         trials = ScenarioTrials(
@@ -44,9 +47,12 @@ def summarise(
                 expected=plans.informed.expected,
                 executed=plans.informed.promised(runs[scenario.name, "informed"])))
         summed = scenario_summary(facts_of(world, scenario, plans), trials, noisy=world.noisy)
+        if precision is not None and precision.anytime:
+            anytime[scenario.name] = estimate(difference_figure(
+                trials.stochastic, trials.deterministic, noisy=world.noisy), comparisons=precision.comparisons)
         scenarios.append(replace(summed, calibration=None if plans.calibrated is None else plans.calibrated.result))
     return Summary(**vars(head), scenarios=tuple(scenarios), reach=reach,
-                   precision=None if options.precision is None else options.precision.reached(scenarios))
+                   precision=None if precision is None else precision.reached(scenarios, anytime or None))
 
 
 def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:

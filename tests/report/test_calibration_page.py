@@ -64,7 +64,7 @@ def test_a_plan_that_missed_its_share_is_marked_wherever_it_is_named(
     page = (folder / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     assert page.count(MARKED) > 20  # legends, answer, and a row or more in each table of plans
     assert NAMED_PLAINLY.findall(page) == []
-    print_summary(found, wide=True)
+    print_summary(found, sources=True)
     assert MARKED in (said := capsys.readouterr().out)
     # A narrow table breaks the name before its mark, so what counts here are the sentences.
     assert NAMED_PLAINLY.findall(" ".join(line.strip() for line in said.splitlines() if "│" not in line)) == []

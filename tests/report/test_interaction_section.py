@@ -59,11 +59,11 @@ def test_the_page_says_what_robots_are_to_each_other(interaction: Interaction, t
 def test_the_terminal_says_it_where_robots_meet(capsys: pytest.CaptureFixture[str]) -> None:
     found = summary((10.0, 20.0), 100.0)
     for wide in (False, True):
-        print_summary(replace(found, scenarios=(BOTH,)), wide=wide)
+        print_summary(replace(found, scenarios=(BOTH,)), sources=wide)
         said = " ".join(capsys.readouterr().out.split())
         assert "Robots meet, a mission: stochastic 12.3 s of waiting for others" in said
         assert ("What robots did to each other, a mission" in said) == wide
-        print_summary(replace(found, scenarios=(APART,)), wide=wide)
+        print_summary(replace(found, scenarios=(APART,)), sources=wide)
         said = capsys.readouterr().out
         assert "meet" not in said
         assert "What robots did" not in said

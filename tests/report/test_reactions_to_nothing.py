@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import html
-import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
 import sva_bench as sb
 from sva_bench.analysis.reaction_results import ReactionFigures
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.choices import NEWS, News
-from sva_bench.cli.reaction_table import print_reactions
+from sva_bench.cli.reaction_table import reaction_table
 from sva_bench.execution import plays
 from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.reaction_page import reaction_section, reactions_answered
 from sva_bench.report.reaction_shares import DOUBTED
-from sva_bench.report.reaction_wording import reaction_answers
+from sva_bench.report.reaction_wording import reacting, reaction_answers
 from tests.worlds_for_tests import SMALL, world_of
 
 QUICK: dict[str, Any] = {"trials": 12, "rollouts": 3, "fidelity": "kinematic", "workers": 1}
@@ -37,10 +35,8 @@ def reactions_of(summary: Summary | ComparisonSummary) -> Iterator[ReactionFigur
 
 def row_of(summary: Summary, news: News) -> list[str]:
     """The cells of the terminal's table in the row of some news."""
-    stream = io.StringIO()
-    print_reactions(summary, Console(file=stream, width=100, markup=False))
-    (line,) = (line for line in stream.getvalue().splitlines() if re.match(rf"│ +│ {news} ", line))
-    return [cell.strip() for cell in line.strip("│").split("│")]
+    (row,) = (row for row in reaction_table(reacting(summary)).rows if row[1] == news)
+    return list(row)
 
 
 def page_of(summary: Summary | ComparisonSummary) -> str:

@@ -60,5 +60,5 @@ def test_terminal_and_page_call_the_table_by_one_name(
     scenarios = (scenario_of({source: -1.0}, {source: -1.0}),)
     assert title == source_title(source_rows(scenarios))
     assert heading(title) in source_section(scenarios)
-    print_summary(replace(found, scenarios=scenarios), wide=True)
+    print_summary(replace(found, scenarios=scenarios), sources=True)
     assert title in capsys.readouterr().out

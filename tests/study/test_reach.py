@@ -140,7 +140,7 @@ def test_an_infeasible_plan_is_marked_before_its_figure(
         assert "dry (infeasible, 20 of 40 robot missions lost) " in text
         assert "dry is infeasible: fuel or mission limit would be broken." in text
         assert "good (" not in text.split("dry is infeasible")[0].split("nominal")[0]
-    assert "dry (infeasible) │ 20 of 40" in terminal
+    assert "dry (infeasible) 20 of 40" in terminal
     assert "no: fuel or limit" in page
 
 

@@ -62,9 +62,9 @@ def run(
     execute_failure: FailureProcess | None = None, policy: PolicyName | Sequence[PolicyName] | None = None,
     news: News | Sequence[News] | None = None, anticipate: bool = False, time_limit: float | None = None,
     gap: float = 1e-6, evpi: bool = False, informed: bool = False, assumptions: bool = False,
-    calibrate: float | str | None = None, precision: float | str | None = None, max_trials: int | None = None,
-    interaction: Interaction | None = None, departures: Departures | None = None, out: PathLike | None = None,
-    workers: int | None = None, progress: OnProgress | None = None,
+    calibrate: float | str | None = None, precision: float | str | None = None, anytime: bool = False,
+    max_trials: int | None = None, interaction: Interaction | None = None, departures: Departures | None = None,
+    out: PathLike | None = None, workers: int | None = None, progress: OnProgress | None = None,
 ) -> Result[Summary]:
     """Plan, execute and measure a mission, as ``sva-bench run`` does; nothing is written unless ``out`` says where.
 
@@ -92,6 +92,7 @@ def run(
         informed: Execute as well what somebody would plan who knew beforehand who is available.
         assumptions: Execute the plans made for each failure process under all of them.
         precision: Go on until the executed VSS is known to so many per cent of the stochastic mean: 1 or ``"1%"``.
+        anytime: With ``precision``: stop by intervals that hold whenever a run stops, wider ones.
         max_trials: With ``precision``: trials at which to stop all the same, 100 000 by default.
         interaction, departures: As in world files: ``shared`` and its like, ``together`` or ``staggered``.
         out: Folder that receives the run folder.
@@ -117,7 +118,7 @@ def run(
         evpi=flag("evpi", evpi), informed=flag("informed", informed), assumptions=flag("assumptions", assumptions),
         policies=policies_of(names_of("policy", policy) or ()), news=news_of(names_of("news", news) or ()),
         anticipate=flag("anticipate", anticipate), calibrate=_target(calibrate),
-        precision=_precision(precision, max_trials, trials, rollouts)))
+        precision=_precision(precision, max_trials, trials, rollouts, anytime=flag("anytime", anytime))))
     read, path = world_given(world, scenario, margin, _process("plan_failure", plan_failure),
                              _process("execute_failure", execute_failure), interaction, departures)
     check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
@@ -268,14 +269,18 @@ def _target(calibrate: float | str | None) -> Target | None:
     return target_of(text, "calibrate: ")
 
 
-def _precision(precision: float | str | None, max_trials: int | None, trials: int, rollouts: int) -> Precision | None:
+def _precision(
+    precision: float | str | None, max_trials: int | None, trials: int, rollouts: int, *, anytime: bool
+) -> Precision | None:
     most = None if max_trials is None else integer("max_trials", max_trials, 1, MOST_TRIALS)
     if precision is None:
+        if anytime:
+            raise BadInput("anytime belongs to precision: without it the number of trials is fixed")
         if most is not None:
             raise BadInput("max_trials belongs to precision; trials says how many there are without it")
         return None
     text = precision if isinstance(precision, str) else f"{number('precision', precision, 0):.17g}%"
-    return precision_of(text, most or 100_000, trials, rollouts)
+    return precision_of(text, most or 100_000, trials, rollouts, anytime=anytime)
 
 
 def _process(name: str, value: FailureProcess | None) -> FailureProcess | None:

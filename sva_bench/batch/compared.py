@@ -1,0 +1,294 @@
+"""The values of a varied key compared: what is each worth more than a reference, map by map or trial by trial?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from sva_bench.analysis.compared_values import (
+    KeyComparison,
+    ValueGain,
+    ValueRow,
+    settings_in,
+    shown_value,
+    variant_without,
+)
+from sva_bench.analysis.moments import Clusters, Figure, Moments, joined, pooled
+from sva_bench.analysis.over_maps import UnitSummary
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import UnitScenario
+from sva_bench.analysis.statistics import estimate, sample_mean
+from sva_bench.arrays import FloatArray
+from sva_bench.batch.folder import shard_path
+from sva_bench.batch.grid import Grid, Point
+from sva_bench.batch.map_samples import over
+from sva_bench.batch.shards import Note, read_note, unit_of
+from sva_bench.errors import BadInput, nearest
+from sva_bench.storage.tables import SHARDS, pieces_of
+
+Read = Callable[[UnitScenario], float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """A comparison that is asked for: a varied key, and the value that others are compared with, as JSON."""
+
+    key: str
+    reference: str
+
+
+def asked_of(words: Sequence[str], grid: Grid) -> tuple[Asked, ...]:
+    """The comparisons of options such as ``robots.uv2.fuel_capacity_s=300``.
+
+    Without a reference it is the value that the world files have, if it is among those of the key, else the first.
+
+    Raises:
+        BadInput: If a key is not varied in the grid or is asked for twice, or has no such value.
+    """
+    varied = values_of(grid)
+    found: list[Asked] = []
+    for word in words:
+        key = next((name for name in varied if word == name or word.startswith(f"{name}=")), None)
+        if key is None:
+            name = word.partition("=")[0]
+            raise BadInput(f"--compare {word}: " + (
+                f"{name} is not varied in this batch; {nearest(name, list(varied))}" if varied else
+                "nothing is varied in this batch; give values by --set KEY=V1,V2"))
+        values = varied[key]
+        if len(values) < 2:
+            raise BadInput(f"--compare {word}: {key} has one value only, {shown_value(values[0])}; give others by "
+                           f"--set {key}=V1,V2")
+        if any(other.key == key for other in found):
+            raise BadInput(f"--compare {key}: asked for twice; give it once")
+        told = word[len(key) + 1:] if len(word) > len(key) else None
+        usual = grid.own.get(key, '"x1"' if '"x1"' in values else values[0])
+        reference = usual if told is None else _among(values, told)
+        if reference is None:
+            raise BadInput(f"--compare {word}: {key} has no such value in this batch; take one of "
+                           f"{', '.join(map(shown_value, values))}")
+        found.append(Asked(key=key, reference=reference))
+    return tuple(found)
+
+
+def _among(values: Sequence[str], told: str) -> str | None:
+    """The value that is meant, written as in ``--set`` or as a number of equal size."""
+    for value in values:
+        if told.strip() in (value, shown_value(value)):
+            return value
+    for value in values:
+        try:
+            if float(told) == float(value):
+                return value
+        except ValueError:
+            continue
+    return None
+
+
+def values_of(grid: Grid) -> dict[str, tuple[str, ...]]:
+    """The varied keys of a grid, each with its values."""
+    found: dict[str, dict[str, None]] = {}
+    for point in grid.points:
+        for key, value in settings_in(point.variant).items():
+            found.setdefault(key, {})[value] = None
+    return {key: tuple(values) for key, values in found.items()}
+
+
+def compared(
+    asked: Sequence[Asked], grid: Grid, folder: Path, done: frozenset[str] | set[str], units: Sequence[UnitSummary],
+) -> tuple[KeyComparison, ...]:
+    """The comparisons that are asked for.
+
+    Args:
+        asked: What is asked for.
+        grid, folder, done: The batch, its folder, and the names of its completed units.
+        units: Their summaries.
+    """
+    return tuple(_compared(each, grid, folder, done, units) for each in asked)
+
+
+def _compared(
+    asked: Asked, grid: Grid, folder: Path, done: frozenset[str] | set[str], units: Sequence[UnitSummary]
+) -> KeyComparison:
+    values = values_of(grid)[asked.key]
+    maps = {point.world.name for point in grid.points}
+    over_maps = len(maps) > 1
+    found: dict[tuple[str, str], dict[str, _Place]] = {}
+    for unit in units:
+        for scenario in unit.scenarios:
+            value, others = settings_in(unit.variant)[asked.key], variant_without(unit.variant, asked.key)
+            place = found.setdefault((scenario.name, others), {}).setdefault(value, _Place(unit.variant, {}))
+            place.results[unit.world, unit.seed] = scenario
+    of_scenario: dict[str, int] = {}
+    for (name, _), places in found.items():
+        if asked.reference in places:
+            of_scenario[name] = of_scenario.get(name, 0) + len(places) - 1
+    rows = []
+    trials = _Trials(grid, folder, done)
+    for (name, others), places in found.items():
+        reference = places.get(asked.reference)
+        for value in (value for value in values if value in places):
+            place, pairs = places[value], max(of_scenario.get(name, 1), 1)
+            other = None if value == asked.reference else reference
+            if over_maps:
+                executed, vss = place.over_maps(_value), place.over_maps(_vss)
+                gains = [None, None] if other is None else [
+                    place.gain_over_maps(other, read, pairs) for read in (_value, _vss)]
+            else:
+                executed, vss = trials.at(name, place.variant)
+                gains = [None, None] if other is None else trials.gains(name, place.variant, other.variant, pairs)
+            rows.append(ValueRow(scenario=name, others=others, value=value, executed=executed, vss=vss, gain=gains[0],
+                                 vss_gain=gains[1], maps=len({world for world, _ in place.results})))
+    return KeyComparison(key=asked.key, reference=asked.reference, values=values, rows=tuple(rows),
+                         sample="maps" if over_maps else "trials")
+
+
+def _value(scenario: UnitScenario) -> float:
+    return scenario.stochastic.executed.mean
+
+
+def _vss(scenario: UnitScenario) -> float:
+    return scenario.vss.executed.mean
+
+
+@dataclass(frozen=True)
+class _Place:
+    """One variant under one scenario: its results by map and seed."""
+
+    variant: str
+    results: dict[tuple[str, int], UnitScenario]
+
+    def over_maps(self, read: Read) -> Estimate:
+        """The mean over maps, of each map's mean over its seeds."""
+        return over(_by_map({key: read(found) for key, found in self.results.items()}),
+                    sure=all(p >= 1 for found in self.results.values() for p in found.availability.values()))
+
+    def gain_over_maps(self, other: _Place, read: Read, pairs: int) -> ValueGain | None:
+        """The same of the difference against another variant, over the maps and seeds that both have."""
+        means = _by_map({key: read(found) - read(other.results[key]) for key, found in self.results.items()
+                         if key in other.results})
+        return _gain(sample_mean(means), sample_mean(means, comparisons=pairs)) if means else None
+
+
+def _by_map(figures: Mapping[tuple[str, int], float]) -> list[float]:
+    seeds: dict[str, list[float]] = {}
+    for (world, _), figure in figures.items():
+        seeds.setdefault(world, []).append(figure)
+    return [float(np.mean(figures)) for figures in seeds.values()]
+
+
+def _gain(single: Estimate, adjusted: Estimate) -> ValueGain:
+    return ValueGain(mean=single.mean, ci95=single.ci95, ci95_adjusted=adjusted.ci95,
+                     distinguishable=adjusted.excludes_zero)
+
+
+class _Trials:
+    """Figures of the variants of one map, from the shards of its trials."""
+
+    def __init__(self, grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> None:
+        self._grid, self._folder, self._done = grid, folder, done
+        self._points = {point.variant: point for point in grid.points}
+
+    def at(self, scenario: str, variant: str) -> tuple[Estimate, Estimate]:
+        """The executed value of the stochastic plan and the executed VSS of a variant."""
+        value, vss = self._over_ranges(variant, lambda note, *_: (
+            note.tallies[scenario].plans["stochastic"].total, note.tallies[scenario].difference))
+        return estimate(value), estimate(vss)
+
+    def gains(self, scenario: str, variant: str, other: str, pairs: int) -> list[ValueGain | None]:
+        """How much more the two are in one variant than in another, trial by trial."""
+        point = self._points[other]
+
+        def differences(note: Note, seed: int, first: int) -> tuple[Figure, Figure] | None:
+            if self._grid.unit_name(point, seed, first) not in self._done:
+                return None
+            before = self._note(point, seed, first)
+            here, there = (self._totals(which, seed, first, scenario) for which in (self._points[variant], point))
+            mine, its = note.tallies[scenario], before.tallies[scenario]
+            return (less(mine.plans["stochastic"].total, its.plans["stochastic"].total,
+                         here["stochastic"] - there["stochastic"]),
+                    less(mine.difference, its.difference, here["stochastic"] - here["deterministic"]
+                         - there["stochastic"] + there["deterministic"]))
+
+        found = self._over_ranges(variant, differences)
+        return [_gain(estimate(figure), estimate(figure, comparisons=pairs)) for figure in found] or [None, None]
+
+    def _over_ranges(self, variant: str, read: Callable[[Note, int, int], tuple[Figure, ...] | None]
+                     ) -> tuple[Figure, ...]:
+        """Figures of each range of trials, joined over ranges and pooled over seeds."""
+        point, seeds = self._points[variant], []
+        for seed in self._grid.seeds:
+            ranges = [found for first in self._ranges(point, seed)
+                      if (found := read(self._note(point, seed, first), seed, first)) is not None]
+            if ranges:
+                seeds.append(_folded(joined, ranges))
+        return _folded(pooled, seeds) if seeds else ()
+
+    def _ranges(self, point: Point, seed: int) -> Iterator[int]:
+        for first, _ in self._grid.ranges():
+            if self._grid.unit_name(point, seed, first) in self._done:
+                yield first
+
+    def _note(self, point: Point, seed: int, first: int) -> Note:
+        unit = unit_of(self._grid, point, seed, first)
+        return read_note(shard_path(self._folder, self._grid.unit_name(point, seed, first)), unit)
+
+    def _totals(self, point: Point, seed: int, first: int, scenario: str) -> dict[str, FloatArray]:
+        """Value of the team in each trial of a range, by plan.
+
+        Raises:
+            BadFile: If a shard is no table of ours, or cut off.
+        """
+        trials = dict(self._grid.ranges())[first]
+        found = {plan: np.zeros(trials) for plan in ("stochastic", "deterministic")}
+        path = shard_path(self._folder, self._grid.unit_name(point, seed, first))
+        columns = pa.schema([SHARDS.field(name) for name in ("scenario", "planner", "trial", "value")])
+        for piece in pieces_of(path, columns):
+            words = {name: piece[name].combine_chunks() for name in ("scenario", "planner")}
+            at, value = piece["trial"].to_numpy() - first, piece["value"].to_numpy()
+            of_scenario = _equal(words["scenario"], scenario)
+            for plan, total in found.items():
+                rows = of_scenario & _equal(words["planner"], plan) & (at >= 0) & (at < trials)
+                total += np.bincount(at[rows], weights=value[rows], minlength=trials)
+        return found
+
+
+def _equal(column: Any, word: str) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    codes, known = column.indices.to_numpy(), column.dictionary.to_pylist()
+    return np.asarray(codes == known.index(word)) if word in known else np.zeros(len(codes), dtype=bool)
+
+
+def _folded(join: Callable[[Figure, Figure], Figure], parts: Sequence[tuple[Figure, ...]]) -> tuple[Figure, ...]:
+    found = parts[0]
+    for part in parts[1:]:
+        found = tuple(join(a, b) for a, b in zip(found, part, strict=True))
+    return found
+
+
+def less(a: Figure, b: Figure, differences: FloatArray) -> Figure:
+    """The difference of two figures of the same trials under the same noise draws.
+
+    How failures make it vary is taken from the differences as executed, since rows don't tell what each trial lost to
+    noise; that noise makes them vary too counts twice, which only makes the interval wider.
+
+    Args:
+        a, b: The figures.
+        differences: The first less the second in each trial, shape (trials,).
+    """
+    draws = max(len(a.taken.counts), len(b.taken.counts))
+    sums = [np.pad(part.taken.sums, (0, draws - len(part.taken.sums))) for part in (a, b)]
+    counts = a.taken.counts if len(a.taken.counts) == draws else b.taken.counts
+    return Figure(
+        drawn=Moments(count=a.drawn.count, mean=a.drawn.mean - b.drawn.mean,
+                      squares=float(np.sum((differences - differences.mean()) ** 2))),
+        drawn_bounds=_between(a.drawn_bounds, b.drawn_bounds), taken_bounds=_between(a.taken_bounds, b.taken_bounds),
+        taken=Clusters(counts=counts, sums=sums[0] - sums[1]),
+        certain=None if a.certain is None or b.certain is None else _between(a.certain, b.certain))
+
+
+def _between(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    return a[0] - b[1], a[1] - b[0]
