@@ -16,8 +16,8 @@ MODULES = [path.relative_to(PACKAGE).as_posix() for path in FILES]
 
 # Low to high: each may know those before it, whoever asks, and when.
 ROOMS = (
-    "environment", "arrays", "errors", "seeds", "interrupts", "choices", "files", "workers", "geometry", "robot",
-    "mission", "world", "solver", "travel", "execution", "analysis", "recording", "storage", "report", "study",
+    "environment", "arrays", "errors", "seeds", "interrupts", "choices", "palette", "files", "workers", "geometry",
+    "robot", "mission", "world", "solver", "travel", "execution", "analysis", "recording", "storage", "report", "study",
     "generate", "batch", "paper", "cli", "__init__", "__main__",
 )
 # The same within the solver, whose rooms are many.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -137,7 +137,7 @@ class _Sums:
 
 
 def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[str, float],
-                   words: Mapping[str, frozenset[str]]) -> Found:
+                   words: Mapping[str, frozenset[str]], seen: Callable[[pa.Table], None] = lambda _: None) -> Found:
     """Check that outcomes have a row for each trial or history and robot, and the means of the summary.
 
     Args:
@@ -145,6 +145,7 @@ def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[st
         plans: What the summary says, by scenario, planner, policy and news.
         loss_cost: Cost of each robot if it doesn't come home.
         words: What columns of words may hold.
+        seen: Gets each piece of the table that is read.
 
     Raises:
         BadFile: If they don't.
@@ -168,6 +169,7 @@ def check_outcomes(path: Path, plans: Mapping[Key, Claim], loss_cost: Mapping[st
                     group.stops_reached_min, group.stops_reached_max, home=group.end == "home")
         for key, rollout, robot, histories in _numbered(piece):
             sums[key].number(rollout, robot, histories)
+        seen(piece)
     for key, claim in plans.items():
         _check_sums(path, key, claim, sums[key], robots)
     return Found(reached=reached, whole=frozenset(key for key, claim in plans.items() if claim.begins_whole) - lost)

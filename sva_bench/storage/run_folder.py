@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -185,7 +185,13 @@ def write_legs(path: Path, legs: Legs) -> None:
     write_table(path, LEGS, [pa.table(vars(legs), schema=LEGS)])
 
 
-def write_outcomes(path: Path, executed: Sequence[Executed | Reacted], robots: Sequence[str], settings: Settings
-                   ) -> None:
-    """Write ``outcomes.parquet``: a row per scenario, plan, reaction, trial and robot."""
-    write_table(path, OUTCOMES, (outcome_table(run, robots, settings) for run in executed))
+def write_outcomes(path: Path, executed: Sequence[Executed | Reacted], robots: Sequence[str], settings: Settings,
+                   seen: Callable[[pa.Table], None] = lambda _: None) -> None:
+    """Write ``outcomes.parquet``: a row per scenario, plan, reaction, trial and robot; ``seen`` gets each piece."""
+    def pieces() -> Iterator[pa.Table]:
+        for run in executed:
+            piece = outcome_table(run, robots, settings)
+            seen(piece)
+            yield piece
+
+    write_table(path, OUTCOMES, pieces())

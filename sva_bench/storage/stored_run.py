@@ -30,12 +30,14 @@ from sva_bench.files.read_back import MOST_BYTES, Part, read_ours
 from sva_bench.mission.plan import Route
 from sva_bench.mission.plan_file import read_routes
 from sva_bench.storage.agreement import Claim, Key, check_outcomes, check_routes
+from sva_bench.storage.leg_paths import LegPaths, read_paths
 from sva_bench.storage.manifest import MANIFEST, Manifest
 from sva_bench.storage.met_tables import FILES as MET_FILES
 from sva_bench.storage.met_tables import read_met
 from sva_bench.storage.run_folder import MAP, Legs, made_for, recording_stem, stem_of
 from sva_bench.storage.tables import CONTACTS, LEGS, OUTCOMES, TRAVEL_TIMES, WAITS, pieces_of
 from sva_bench.storage.tables import write_csv as write_table_as_csv
+from sva_bench.storage.trial_counts import Counting, TrialCounts
 from sva_bench.world.load import world_of
 from sva_bench.world.model import World
 
@@ -58,6 +60,8 @@ class Content:
         manifest: What was run.
         lacking: Files of the run folder that are missing, and that the report can do without.
         contacts, waits: What robots met on the legs: the rows of these tables, none where there are none.
+        paths: Planned paths of legs; none of older run folders.
+        counts: How trials came out, counted.
     """
 
     summary: AnySummary
@@ -70,6 +74,8 @@ class Content:
     reaction_stems: Mapping[Key, str] = field(default_factory=dict)
     contacts: pa.Table = field(default_factory=CONTACTS.empty_table)
     waits: pa.Table = field(default_factory=WAITS.empty_table)
+    paths: LegPaths = field(default_factory=dict)
+    counts: TrialCounts = field(default_factory=TrialCounts)
 
 
 def run_folder_at(path: Path) -> Path:
@@ -239,8 +245,9 @@ def _content(folder: Path) -> Content:
     words = {"scenario": frozenset(s.name for s in summary.scenarios), "planner": frozenset(key[1] for key in claims),
              "robot": frozenset(first.availability), "end": frozenset(ENDS), "policy": frozenset(POLICY_NAMES),
              "news": frozenset(NEWS), "fidelity": frozenset((summary.fidelity,))}
+    counting = Counting(len(world.robots))
     driven = check_outcomes(folder / "outcomes.parquet", claims,
-                            {robot.name: robot.loss_cost for robot in world.robots}, words)
+                            {robot.name: robot.loss_cost for robot in world.robots}, words, counting.add)
     foreign = isinstance(summary, ComparisonSummary)
     stems = {(scenario, name): stem_of(scenario, name, foreign=foreign)
              for scenario, name, policy, _ in claims if policy == "none"}
@@ -255,7 +262,8 @@ def _content(folder: Path) -> Content:
         for s in summary.scenarios for r in s.reactions or () for name, plan in r.plans.items() if plan.reacted > 0}
     contacts, waits = read_met(folder, world, legs, words)
     return Content(summary=summary, routes=routes, stems=stems, manifest=manifest, world=world, legs=legs,
-                   reaction_stems=told, contacts=contacts, waits=waits, lacking=_lacking(
+                   reaction_stems=told, contacts=contacts, waits=waits, paths=read_paths(folder, world),
+                   counts=counting.result(), lacking=_lacking(
                        folder, [scenario.name for scenario in world.scenarios], [*stems.values(), *told.values()]))
 
 

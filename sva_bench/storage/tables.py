@@ -71,6 +71,11 @@ any."""
 WAITS = _schema({**_MET, "cause": (_WORD, "")})
 """A row for each wait on a leg of ``LEGS``, for a passage, people or another robot; written where there is any."""
 
+PATHS = _schema({"model": (_WORD, ""), "origin": (_WORD, ""), "destination": (_WORD, ""), "point": (_COUNT, "1"),
+                 "x_m": (_FIGURE, "m"), "y_m": (_FIGURE, "m")})
+"""The planned paths of legs of ``LEGS`` and of plans, point by point, to a centimetre; ``model`` as in
+``TRAVEL_TIMES``."""
+
 TRAVEL_TIMES = _schema({
     "origin": (_WORD, ""), "destination": (_WORD, ""), "model": (_WORD, ""), "raw_s": (_FIGURE, "s"),
     "repaired_s": (_FIGURE, "s"), "via": (_WORD, "")})

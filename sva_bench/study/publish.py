@@ -23,6 +23,7 @@ from sva_bench.mission.plan_file import write_plan
 from sva_bench.recording.rerun import record
 from sva_bench.report.run_page import write_report
 from sva_bench.storage.agreement import Key
+from sva_bench.storage.leg_paths import paths_of, write_paths
 from sva_bench.storage.manifest import manifest_of
 from sva_bench.storage.met_tables import contact_table, wait_table, write_met
 from sva_bench.storage.run_folder import (
@@ -39,6 +40,7 @@ from sva_bench.storage.run_folder import (
     write_travel_times,
 )
 from sva_bench.storage.stored_run import Content, read_content, run_folder_at
+from sva_bench.storage.trial_counts import Counting
 from sva_bench.study.options import Options, identity_of, settings_of
 from sva_bench.study.summing import by_case
 from sva_bench.travel.fuel import FuelCosts
@@ -108,14 +110,17 @@ def publish(
         write_legs(folder / "legs.parquet", legs)
         contacts, waits = contact_table([*executed, *reacted]), wait_table([*executed, *reacted])
         write_met(folder, contacts, waits)
+        counting = Counting(len(world.robots))
         write_outcomes(folder / "outcomes.parquet", [*executed, *reacted], [r.name for r in world.robots],
-                       settings_of(world, options))
+                       settings_of(world, options), counting.add)
+        paths = paths_of(world, costs, routes.values(), legs)
+        write_paths(folder, paths)
         write_record(folder / "summary.json", summary)
         manifest = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds, command)
         write_record(folder / "manifest.json", manifest)
         write_report(folder / "report.html", Content(
             summary=summary, routes=routes, stems=stems, reaction_stems=told, legs=legs, world=world,
-            manifest=manifest, contacts=contacts, waits=waits))
+            manifest=manifest, contacts=contacts, waits=waits, paths=paths, counts=counting.result()))
     return Run(folder=out / name, summary=summary)
 
 
