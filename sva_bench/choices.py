@@ -67,6 +67,19 @@ EXPORT_FORMATS: Mapping[ExportFormat, str] = {
 }
 """What plans are written as for other programs, in a few words each."""
 
+# Recordings
+RecordedKind = Literal["typical", "median", "worst", "trial", "first"]
+"""How a recorded trial was chosen; ``trial`` by its number, ``first`` where no other can be shown."""
+RECORDED_WORDS: Mapping[str, str] = {
+    "typical": "robots end as they most often do",
+    "median": "of median value",
+    "worst": "of least value",
+}
+"""What trials are recorded by name, in a few words each."""
+RobotState = Literal["at the base", "driving", "waiting", "at a POI", "refuelling", "failed", "out of fuel", "stuck",
+                     "home", "home late"]
+"""What a recorded robot is doing."""
+
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]
 EngineName = Literal["ideal", "bullet"]

@@ -20,14 +20,14 @@ from sva_bench.execution.react import react_again
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.team_outcome import Reaction
 from sva_bench.mission.plan_file import read_plan
-from sva_bench.recording.rerun import record
 from sva_bench.solver.rest import plan_rest
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.run_folder import made_for, recording_stem, stem_of
 from sva_bench.storage.stored_run import Content, find_row, last_trial, read_content, run_folder_at
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.given_plans import without_times
-from sva_bench.study.publish import record_team
+from sva_bench.study.recording_files import about_of, record_team, record_trial
+from sva_bench.study.recordings import Recorded
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
 
@@ -156,14 +156,15 @@ def play_again(
         settings = replace(settings, first=trial, trials=1)
         (run,) = execute(world, costs, [case], settings, executor)
         if path is not None:
-            record(path, world, run.traces, title=f"{world.name}, {case.title}, trial {trial}")
+            one = Recorded(case=case, trial=trial, kind="trial", traces=run.traces)
+            record_trial(path, world, case, run.traces, about_of(one, settings))
     else:
         instance = replace(instance_of(world, costs, case.scenario), failure=world.execute_failure)
         policy = POLICIES[case.policy](Means(instance=instance, plans_rest=plan_rest))
         run = react_again(world, costs, case, policy, settings, trial, history, executor)
         assert run.shown is not None, "a mission that is played again is shown"
         if path is not None:
-            record_team(path, world, case, run.shown)
+            record_team(path, world, case, run.shown, settings, "trial")
         reactions = run.played[0].reactions
     table = outcome_table(run, [robot.name for robot in world.robots], settings)
     return Replayed(case=case, rows=table.to_pylist(), recording=path, reactions=reactions)
