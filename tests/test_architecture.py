@@ -31,7 +31,8 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "highspy": ("solver/highs.py",), "rerun": (
         "recording/rerun.py", "recording/pen.py", "recording/drawn.py", "recording/charts.py", "recording/layout.py"),
     "networkx": ("solver/flow/cuts.py",),
-    "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py",), "distributed": ("workers/dask.py",),
+    "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py", "recording/pictures.py"),
+    "distributed": ("workers/dask.py",),
     # Charts, pictures of worlds and their legend, and the paper's own figure.
     "matplotlib": ("report/canvas.py", "report/drawing.py", "report/legend.py", "paper/gaps_picture.py"),
 }

@@ -39,13 +39,14 @@ def view(
         raise missing(run_folder_at(recording), recording / "recordings" / "*.rrd")  # or what it is, if it is none
     if screenshot is not None:
         check_output(screenshot, way_out="choose another place with --screenshot")
-    if scenario is None and planner is None:
+    if scenario is None and planner is None and not (recording / "summary.json").is_file():
         files = recordings_of(recording)
     elif recording.is_file():
         raise BadInput(f"{recording} is one recording: --scenario and --planner choose among those of a run folder")
     else:
         files = recordings_for(run_folder_at(recording), scenario, planner)
-    open_viewer(files, web=web, screenshot=screenshot, at_s=at)
+    open_viewer(files, web=web, screenshot=screenshot, at_s=at,
+                say=lambda text: messages.print(text, highlight=False, markup=False, soft_wrap=True))
 
 
 def report(

@@ -31,7 +31,7 @@ _PATCH_M, _GATE_M, _RING_M = 0.01, 0.1, 0.02  # thickness of floors' plates, hei
 _BAR_M, _GATE_UI = 0.12, 4.0  # length of a gate's dashes and of their gaps, and width
 _FORGONE_M = 0.3  # half the width of crosses over POIs
 _WIDEST = 1.35  # radius of the POI that is worth most, in half widths of a station
-_INSET = 0.1  # share of the floor's width that words keep off its edges
+_INSET = 0.08  # share of the floor's width by which words stand beside what they are about
 _NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
 
 
@@ -177,10 +177,10 @@ def _write_lost(pen: Pen, lost: Lost, solids: Obstacles) -> None:
     pen.column(entity, [lost.time_s], rr.LineStrips3D.columns(
         strips=_deep(cross, _LOST_M), colors=[ALARM] * 2).partition([2]))
     pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_CROSS_UI)))
-    # Off the edges of the floor, so that the words are seen whole in a view that ends there.
-    x0, y0, x1, _ = solids.bounds_m.tolist()
-    inset = _INSET * (x1 - x0)
-    at = np.array([[np.clip(lost.at_m[0], x0 + inset, x1 - inset), max(lost.at_m[1] - r - 0.2, y0)]])
+    # Beside it, where no name of a site or robot stands, and towards the middle of the floor, where the view ends last.
+    x0, _, x1, _ = solids.bounds_m.tolist()
+    aside = (r + _INSET * (x1 - x0)) * (1 if lost.at_m[0] < (x0 + x1) / 2 else -1)
+    at = lost.at_m[None] + [aside, 0.0]
     pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
         positions=_deep(at, _LOST_M), colors=[ALARM], labels=[lost.what]))
     pen.constant(f"{entity}/what", rr.Points3D.from_fields(

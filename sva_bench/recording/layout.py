@@ -31,7 +31,7 @@ def layout_of(story: Story) -> rrb.Blueprint:
         rrb.Tabs(fuel, speed, active_tab=0) if limited else speed,
         rrb.TimeSeriesView(origin="collected", name="Incentive collected", axis_x=axis,
                            axis_y=_from_zero(float(story.total.value[-1])), plot_legend=rrb.Corner2D.LeftTop)]
-    shares = [2.0 + 0.35 * len(story.views), 3, 3]
+    shares = [2.4 + 0.5 * len(story.views), 3, 3]
     if story.lanes:
         right.append(rrb.TimeSeriesView(
             origin="news", name="Who was lost, and who learned of it when", axis_x=axis,
@@ -54,13 +54,12 @@ def layout_of_pair(stories: Mapping[str, Story]) -> rrb.Blueprint:
     maps = rrb.Horizontal(*(_map(path, story) for path, story in stories.items()))
     states = rrb.Horizontal(*(_states([f"{path}states/**"], axis) for path in stories))
     lanes = _lanes_share(max(len(story.views) for story in stories.values()))
-    charts = rrb.Horizontal(
-        rrb.TextDocumentView(origin="about", name="Missions"),
-        rrb.TimeSeriesView(origin="compared", name="Incentive collected by all robots", axis_x=axis,
-                           axis_y=_from_zero(most), plot_legend=rrb.Corner2D.LeftTop),
-        rrb.Tabs(*(_log(f"{path}events", f"Events, {story.title}") for path, story in stories.items()), active_tab=0),
-        column_shares=[4, 5, 4])
-    return _whole(rrb.Vertical(maps, states, charts, row_shares=[10, lanes, 5]), longest)
+    told = [rrb.Tabs(rrb.TextDocumentView(origin=f"{path}about", name="Mission"), _log(f"{path}events", "Events"),
+                     active_tab=0) for path in stories]
+    chart = rrb.TimeSeriesView(origin="compared", name="Incentive collected by all robots", axis_x=axis,
+                               axis_y=_from_zero(most), plot_legend=rrb.Corner2D.LeftTop)
+    charts = rrb.Horizontal(told[0], chart, *told[1:])
+    return _whole(rrb.Vertical(maps, states, charts, row_shares=[10, 1.6 * lanes, 6]), longest)
 
 
 def _whole(views: rrb.Container, story: Story) -> rrb.Blueprint:

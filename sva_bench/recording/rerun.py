@@ -6,6 +6,7 @@ Rerun is imported here and in what writes parts of a recording: ``pen``, ``drawn
 from __future__ import annotations
 
 import hashlib
+import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -99,7 +100,7 @@ def _write(path: Path, title: str, stories: Mapping[str, Story], layout: rrb.Blu
     """Write stories, each below its path, as one recording."""
     # Layouts are kept per application id, so each recording has its own. The recording's id follows from its content:
     # the same trial is the same recording, and two that are opened together stay apart.
-    recording = rr.RecordingStream(f"sva-bench {title}", recording_id=_identity(title, stories), send_properties=False)
+    recording = rr.RecordingStream(_application(title), recording_id=_identity(title, stories), send_properties=False)
     try:
         recording.set_log_time_enabled(False)
         recording.set_log_tick_enabled(False)
@@ -121,6 +122,11 @@ def _write(path: Path, title: str, stories: Mapping[str, Story], layout: rrb.Blu
             unfinished.write_bytes(memory.drain_as_bytes())
     finally:
         recording.disconnect()
+
+
+def _application(title: str) -> str:
+    """The application id of a recording: what it is called, in the characters that such an id may have."""
+    return f"sva-bench {re.sub('[^A-Za-z0-9_ -]+', '-', title.replace(', ', ' '))}".rstrip(" -")
 
 
 def _write_compared(pen: Pen, stories: Mapping[str, Story]) -> None:
@@ -147,6 +153,7 @@ def photograph(port: int, path: Path, picture: Path, at_s: float) -> None:
     client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
     client.open(str(path.resolve()))
     client.set_time(TIMELINE, duration=at_s, play_state="paused")
+    _hide_panels(client)
     # Charts, columns and notices settle over some frames: done when a picture is like the one before.
     before = b""
     for _ in range(_SETTLE_TRIES):
@@ -157,6 +164,25 @@ def photograph(port: int, path: Path, picture: Path, at_s: float) -> None:
             return
         before = now
     raise RuntimeError("its picture did not come to rest")
+
+
+def _hide_panels(client: ViewerClient) -> None:
+    """Take the viewer's own menu, notices and panels away, and leave the views.
+
+    Raises:
+        RuntimeError: If the layout of the recording doesn't arrive.
+    """
+    for _ in range(_SETTLE_TRIES):
+        layout = client.get_blueprint(of="recording").blueprint
+        if "/time_panel" in layout:
+            break
+        time.sleep(_SETTLE_S)
+    else:
+        raise RuntimeError("it did not take the recording's layout")
+    for panel in ("top_panel", "blueprint_panel", "selection_panel", "time_panel"):
+        kind = "TimePanelBlueprint" if panel == "time_panel" else "PanelBlueprint"
+        layout.setdefault(f"/{panel}", {}).setdefault(kind, {})["state"] = "Hidden"
+    client.set_blueprint(layout, of="recording")
 
 
 def _identity(title: str, stories: Mapping[str, Story]) -> str:

@@ -40,7 +40,7 @@ _SLOPE_TOLERANCE = 1e-6  # slopes of a fuel line [s/s] nearer than this are roun
 _WALL_M = 0.12  # shown thickness of the walls about the bounds
 _VIEW_RAD = math.radians(55)  # vertical field of view of the viewer's camera
 _SLANT_RAD = math.radians(62)  # of the line of sight, from the horizontal
-_ASPECT = 1.25  # width to height of the 3D view in the layout
+_ASPECT = 1.55  # width to height of the 3D view in the layout
 _MARGIN = 0.07  # of the view, left free at its edges
 _SMALLEST = 0.45  # radius of a POI that is worth little, in those of the one that is worth most
 

@@ -124,8 +124,8 @@ def run(
     with nullcontext() if path is None else about(path), local_workers(_workers(workers), PRELOAD) as executor:
         done = measure(read, options, executor, told)
         put = None if place is None else publish_run(read, options, done, place, told, _command(), executor)
-    return Result(world=read, summary=done.summary, folder=put and put.folder, settings=settings_of(read, options),
-                  executed=tuple(done.executed), reacted=tuple(done.reacted))
+    return Result(world=read, summary=done.summary, folder=put.folder if put else None,
+                  settings=settings_of(read, options), executed=tuple(done.executed), reacted=tuple(done.reacted))
 
 
 @called_from_python()
