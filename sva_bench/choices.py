@@ -66,6 +66,12 @@ EXPORT_FORMATS: Mapping[ExportFormat, str] = {
     "csv": "columns robot, stop, site",
 }
 """What plans are written as for other programs, in a few words each."""
+TrialFormat = Literal["mcap"]
+TRIAL_FORMATS: Mapping[TrialFormat, str] = {
+    "mcap": "a trial of a run as a ROS 2 bag, with poses, paths, states and events",
+}
+"""What trials are written as for other programs, in a few words each."""
+AnyFormat = Literal[ExportFormat, TrialFormat]
 
 # Recordings
 RecordedKind = Literal["typical", "median", "worst", "trial", "first"]

@@ -33,6 +33,7 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "networkx": ("solver/flow/cuts.py",),
     "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py", "recording/pictures.py"),
     "distributed": ("workers/dask.py",),
+    "mcap_ros2": ("recording/bag.py",),
     # Charts, pictures of worlds and their legend, and the paper's own figure.
     "matplotlib": ("report/canvas.py", "report/drawing.py", "report/legend.py", "paper/gaps_picture.py"),
 }

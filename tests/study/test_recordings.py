@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
 
-from sva_bench.choices import Fidelity, Interaction
+from sva_bench.choices import Fidelity, Interaction, News, PolicyName
 from sva_bench.errors import BadInput
 from sva_bench.execution.executed import Executed
 from sva_bench.recording.pen import TIMELINE
@@ -28,6 +28,8 @@ TRIALS = 24
 SCENARIOS = ("half", "safe")
 INTERACTIONS: tuple[Interaction, ...] = ("independent", "shared", "uncoordinated")
 FIDELITIES: tuple[Fidelity, ...] = ("kinematic", "rollout", "physics")
+REACTIONS: tuple[tuple[PolicyName, News], ...] = (
+    ("none", "never"), ("resolve", "station"), ("resolve", "report"), ("resolve", "instant"))
 
 
 def quiet(*_: object) -> None:
@@ -51,7 +53,7 @@ def test_a_trial_that_is_replayed_gives_its_rows_again(interaction: Interaction,
                       news=("station", "report", "instant"))
     run = publish_run(world, options, measure(world, options, None, quiet), tmp_path / "runs", quiet)
     rows = pq.read_table(run.folder / "outcomes.parquet").select(["policy", "news", "trial"]).to_pylist()
-    for policy, news in (("none", "never"), ("resolve", "station"), ("resolve", "report"), ("resolve", "instant")):
+    for policy, news in REACTIONS:
         known = sorted({row["trial"] for row in rows if (row["policy"], row["news"]) == (policy, news)})
         for trial in rng.choice(known, 2, replace=False).tolist():
             again = replay(run.folder, Wanted(scenario="half", trial=trial, policy=policy, news=news), None, quiet)
