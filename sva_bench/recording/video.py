@@ -15,7 +15,7 @@ from sva_bench.errors import BadInput, ExitCode, SvaBenchError
 from sva_bench.recording.frames import Frames, moments
 from sva_bench.recording.read_back import Shown, read_recording
 
-_RATE = 12  # frames a second
+_RATE = 10  # frames a second; a GIF counts in hundredths of one
 _LAPSE_S = 15.0  # a mission is shown in about this time, a short one in its own
 _HELD_S = 2.0  # the last frame is held
 _COLORS = 64  # of a GIF: what is drawn has few, and their edges
