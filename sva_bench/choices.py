@@ -66,6 +66,25 @@ EXPORT_FORMATS: Mapping[ExportFormat, str] = {
     "csv": "columns robot, stop, site",
 }
 """What plans are written as for other programs, in a few words each."""
+TrialFormat = Literal["mcap"]
+TRIAL_FORMATS: Mapping[TrialFormat, str] = {
+    "mcap": "a trial of a run as a ROS 2 bag, with poses, paths, states and events",
+}
+"""What trials are written as for other programs, in a few words each."""
+AnyFormat = Literal[ExportFormat, TrialFormat]
+
+# Recordings
+RecordedKind = Literal["typical", "median", "worst", "trial", "first"]
+"""How a recorded trial was chosen; ``trial`` by its number, ``first`` where no other can be shown."""
+RECORDED_WORDS: Mapping[str, str] = {
+    "typical": "robots end as they most often do",
+    "median": "of median value",
+    "worst": "of least value",
+}
+"""What trials are recorded by name, in a few words each."""
+RobotState = Literal["at the base", "driving", "waiting", "at a POI", "refuelling", "failed", "out of fuel", "stuck",
+                     "home", "home late"]
+"""What a recorded robot is doing."""
 
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]

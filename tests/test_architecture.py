@@ -28,8 +28,15 @@ SOLVER = (
 ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet": ("execution/engines/bullet.py",), "pybullet_data": ("execution/engines/bullet.py",),
     "pybullet_utils": ("execution/engines/bullet.py",), "ompl": ("travel/roadmap.py",),
-    "highspy": ("solver/highs.py",), "rerun": ("recording/rerun.py",), "networkx": ("solver/flow/cuts.py",),
-    "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py",), "distributed": ("workers/dask.py",),
+    "highspy": ("solver/highs.py",), "rerun": (
+        "recording/rerun.py", "recording/pen.py", "recording/drawn.py", "recording/charts.py", "recording/layout.py",
+        "recording/read_back.py"),
+    "networkx": ("solver/flow/cuts.py",),
+    "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py", "recording/pictures.py", "recording/frames.py",
+                                               "recording/video.py"),
+    "av": ("recording/video.py",),
+    "distributed": ("workers/dask.py",),
+    "mcap_ros2": ("recording/bag.py",),
     # Charts, pictures of worlds and their legend, and the paper's own figure.
     "matplotlib": ("report/canvas.py", "report/drawing.py", "report/legend.py", "paper/gaps_picture.py"),
 }

@@ -13,6 +13,7 @@ from sva_bench.choices import (
     INTERACTIONS,
     NEWS,
     POLICY_NAMES,
+    RECORDED_WORDS,
     USUAL_NEWS,
     Departures,
     FailureProcess,
@@ -61,6 +62,10 @@ TimeLimit = Annotated[float | None, typer.Option(
     show_default="none")]
 Seed = Annotated[int, typer.Option(min=0, max=MOST_SEED, help="Seed of failures and noise; plans don't depend on it.")]
 Trials = Annotated[int, typer.Option(min=1, max=MOST_TRIALS, help="Trials of each plan in each scenario.")]
+RecordWords = Annotated[list[str] | None, typer.Option(
+    "--record", metavar="[SCENARIO:]TRIAL", help="Record more than a typical trial of each plan: a trial's number, "
+    + ", ".join(f"{name} ({said})" for name, said in RECORDED_WORDS.items()) + "; several with commas between them, or "
+    "given again.", show_default=False)]
 Rollouts = Annotated[int, typer.Option(min=1, max=MOST_ROLLOUTS,
                                        help="Noise draws; trial t has number t mod ROLLOUTS.")]
 FidelityOption = Annotated[Fidelity, typer.Option(

@@ -25,6 +25,7 @@ from sva_bench.cli.options import (
     PlanFailure,
     PlannerOption,
     PolicyNames,
+    RecordWords,
     Rollouts,
     ScenarioNames,
     Seed,
@@ -83,6 +84,7 @@ def run(
     max_trials: Annotated[int | None, typer.Option(
         min=1, max=MOST_TRIALS, help="With --precision: trials at which to stop all the same.",
         show_default="100000")] = None,
+    record: RecordWords = None,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -98,6 +100,7 @@ def run(
         from sva_bench.analysis.calibration import target_of
         from sva_bench.analysis.precision import precision_of
         from sva_bench.study.inputs import about, load
+        from sva_bench.study.recordings import asks_of
 
     set_up_logging(verbose)
     if precision is None and max_trials is not None:
@@ -112,6 +115,7 @@ def run(
     check_folder(out, "--out")
     loaded = load(world, scenario, margin, plan_failure, execute_failure, interaction, departures)
     check_reactions(loaded, policies, heard, anticipate=anticipate)
+    recorded = asks_of(record or (), [told.name for told in loaded.scenarios], trials)
     load_libraries()  # after the world is read: an error in the file is said at once
     with loading():
         from sva_bench.solver.two_stage import SolveLimits
@@ -123,7 +127,7 @@ def run(
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
                       limits=SolveLimits(time_limit_s=time_limit, gap=gap), evpi=evpi, informed=informed,
                       assumptions=assumptions, policies=policies, news=heard, anticipate=anticipate,
-                      calibrate=target, precision=asked)
+                      calibrate=target, precision=asked, record=recorded)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress)
     _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
@@ -151,6 +155,7 @@ def execute(
     anticipate: Anticipate = False,
     interaction: InteractionOption = None,
     departures: DeparturesOption = None,
+    record: RecordWords = None,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -165,6 +170,7 @@ def execute(
     with loading():
         from sva_bench.study.given_plans import read_plans
         from sva_bench.study.inputs import about, by_name, load
+        from sva_bench.study.recordings import asks_of
 
     set_up_logging(verbose)
     policies, heard = policies_of(policy or ()), news_of(news or ())
@@ -174,6 +180,7 @@ def execute(
                   departures=departures)
     check_reactions(loaded, policies, heard, anticipate=anticipate)
     refuse_the_name(named, anticipate=anticipate)
+    recorded = asks_of(record or (), [told.name for told in loaded.scenarios], trials)
     read = read_plans(loaded, named)
     load_libraries()
     with loading():
@@ -185,7 +192,7 @@ def execute(
 
     tidy(out)
     options = Options(seed=seed, trials=trials, rollouts=rollouts, fidelity=fidelity, planner=planner,
-                      policies=policies, news=heard, anticipate=anticipate)
+                      policies=policies, news=heard, anticipate=anticipate, record=recorded)
     with about(world), progress_bars() as progress:
         costs = plan_costs(loaded, planner, progress)
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)

@@ -10,9 +10,9 @@ from rich.markup import escape
 
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import AsCsv, CompareKeys, Verbose, Wide
-from sva_bench.cli.terminal import messages, results, set_up_logging
+from sva_bench.cli.terminal import messages, progress_bars, results, set_up_logging
 from sva_bench.errors import BadInput
-from sva_bench.files.outputs import check_output
+from sva_bench.files.outputs import check_output, write_result
 
 
 def view(
@@ -21,6 +21,8 @@ def view(
     web: Annotated[bool, typer.Option("--web", help="Serve it to a browser, on this machine only.")] = False,
     screenshot: Annotated[Path | None, typer.Option(metavar="OUT.png", help="Take a picture without a screen.",
                                                     show_default=False)] = None,
+    video: Annotated[Path | None, typer.Option(metavar="OUT.gif|mp4", help="Draw a video of the whole mission: GIF, or "
+                                               "MP4 with the extra 'video'.", show_default=False)] = None,
     at: Annotated[float | None, typer.Option(metavar="S", min=0, help="Mission time of the picture.",
                                              show_default="the end")] = None,
     scenario: Annotated[str | None, typer.Option(help="Of a run: only recordings of this scenario.",
@@ -28,7 +30,12 @@ def view(
     planner: Annotated[str | None, typer.Option(help="Of a run: only recordings of this planner's plan.",
                                                 show_default="all")] = None,
 ) -> None:
-    """Open recordings in the Rerun viewer."""
+    """Open recordings in the Rerun viewer, or draw one.
+
+    Of a run the most telling is seen first, and drawn: two plans side by side where they differ most.
+    """
+    if video is not None and (web or screenshot is not None or at is not None):
+        raise BadInput("--video draws the whole mission: leave out --web, --screenshot and --at")
     with loading():
         from sva_bench.recording.viewer import recordings_of
         from sva_bench.recording.viewer import view as open_viewer
@@ -37,15 +44,34 @@ def view(
 
     if recording.is_dir() and next((recording / "recordings").glob("*.rrd"), None) is None:
         raise missing(run_folder_at(recording), recording / "recordings" / "*.rrd")  # or what it is, if it is none
-    if screenshot is not None:
-        check_output(screenshot, way_out="choose another place with --screenshot")
-    if scenario is None and planner is None:
+    for output, option in ((screenshot, "--screenshot"), (video, "--video")):
+        if output is not None:
+            check_output(output, recording, way_out=f"choose another place with {option}")
+    if scenario is None and planner is None and not (recording / "summary.json").is_file():
         files = recordings_of(recording)
     elif recording.is_file():
         raise BadInput(f"{recording} is one recording: --scenario and --planner choose among those of a run folder")
     else:
         files = recordings_for(run_folder_at(recording), scenario, planner)
-    open_viewer(files, web=web, screenshot=screenshot, at_s=at)
+    if video is not None:
+        _draw(files[0], video)
+        return
+    open_viewer(files, web=web, screenshot=screenshot, at_s=at,
+                say=lambda text: messages.print(text, highlight=False, markup=False, soft_wrap=True))
+
+
+def _draw(recording: Path, video: Path) -> None:
+    with loading():
+        from sva_bench.recording.video import kind_of, video_of
+        from sva_bench.recording.viewer import verify
+
+    kind = kind_of(video)
+    verify(recording)
+    with progress_bars() as progress:
+        content = video_of(recording, kind, lambda done, of: progress("drawing", done, of))
+    write_result(video, content)
+    messages.print(f"{escape(recording.name)} drawn into [bold]{escape(str(video))}[/bold]", highlight=False,
+                   soft_wrap=True)
 
 
 def report(

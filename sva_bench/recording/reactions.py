@@ -12,6 +12,7 @@ from sva_bench.choices import End
 from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.recording.colors import Color
+from sva_bench.world.model import Site
 
 _FAULTS: Mapping[str, str] = {
     "tipped over": "it fell on its side", "physics failed": "physics failed, which gave no finite pose of it"}
@@ -59,6 +60,44 @@ class Lane:
     height: float
     lost_s: FloatArray
     learned_s: FloatArray
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Forgone:
+    """POIs that a robot was to visit and that nobody collected: from when on that is so [s], and where, (n, 2) [m]."""
+
+    robot: str
+    color: Color
+    time_s: float
+    names: tuple[str, ...]
+    at_m: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at_m", frozen(self.at_m, (len(self.names), 2)))
+
+
+def forgone_of(pois: Sequence[Site], traces: Sequence[Trace], colors: Mapping[str, Color],
+               routes: Mapping[str, Sequence[str]] | None) -> tuple[Forgone, ...]:
+    """What lost and late robots left, robot by robot; what another took over and collected isn't.
+
+    Args:
+        pois: The POIs.
+        traces: What robots did.
+        colors: Their colours.
+        routes: Stops of each robot as planned; ``None`` = those of its orders.
+    """
+    collected = {event.site for trace in traces for event in trace.outcome.events if event.kind == "collected"}
+    found = []
+    for trace in traces:
+        name, outcome = trace.orders.robot, trace.outcome
+        planned = set(trace.orders.route if routes is None else routes.get(name, ()))
+        mine = [site for site in pois if site.name in planned - collected]
+        late = [event.time_s for event in outcome.events if event.kind == "late"]
+        if mine and (outcome.end in LOST or late):
+            found.append(Forgone(robot=name, color=colors[name], time_s=min([*late, outcome.end_time_s]),
+                                 names=tuple(site.name for site in mine),
+                                 at_m=np.array([[site.x_m, site.y_m] for site in mine])))
+    return tuple(found)
 
 
 def lost_of(trace: Trace, radius_m: float) -> Lost:

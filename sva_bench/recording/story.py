@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,9 @@ from sva_bench.choices import SiteKind
 from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.recording.about import About, results_table
 from sva_bench.recording.colors import ROBOT_COLORS, SITE_COLORS, Color, pale
+from sva_bench.recording.hulls import solids_of
 from sva_bench.recording.log import LogEntry, events_of, log_of
 from sva_bench.recording.meetings import (
     Floor,
@@ -26,8 +28,11 @@ from sva_bench.recording.meetings import (
     touched_of,
     waiting_of,
 )
-from sva_bench.recording.reactions import LOST, Change, Lane, Lost, changes_of, lanes_of, lost_of
-from sva_bench.world.model import Site, World
+from sva_bench.recording.reactions import LOST, Change, Forgone, Lane, Lost, changes_of, forgone_of, lanes_of, lost_of
+from sva_bench.recording.states import StateLane, speed_of, state_lanes_of
+from sva_bench.robot.body import Solid
+from sva_bench.robot.model import RobotModel
+from sva_bench.world.model import World
 
 _DASH_M, _GAP_M = 0.25, 0.2  # of planned paths
 _TRAIL_STEP_S = 0.25  # a robot at 0.65 m/s is 0.16 m past the end of its trail then: less than its radius
@@ -35,8 +40,9 @@ _SLOPE_TOLERANCE = 1e-6  # slopes of a fuel line [s/s] nearer than this are roun
 _WALL_M = 0.12  # shown thickness of the walls about the bounds
 _VIEW_RAD = math.radians(55)  # vertical field of view of the viewer's camera
 _SLANT_RAD = math.radians(62)  # of the line of sight, from the horizontal
-_ASPECT = 1.25  # width to height of the 3D view in the layout
+_ASPECT = 1.55  # width to height of the 3D view in the layout
 _MARGIN = 0.07  # of the view, left free at its edges
+_SMALLEST = 0.45  # radius of a POI that is worth little, in those of the one that is worth most
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,6 +55,7 @@ class Marks:
         at_m: Where they are, shape (n, 2).
         time_s: When their colours change, ascending from 0; shape (m,).
         colors: Red, green, blue of each site from each of these times on, shape (m, n, 3).
+        size: Factor on how large each is shown, by what it is worth to the robot that earns most there, shape (n,).
     """
 
     kind: SiteKind
@@ -56,8 +63,10 @@ class Marks:
     at_m: FloatArray
     time_s: FloatArray
     colors: IntArray
+    size: FloatArray
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "size", frozen(self.size, (len(self.names),)))
         object.__setattr__(self, "at_m", frozen(self.at_m, (len(self.names), 2)))
         object.__setattr__(self, "time_s", frozen(self.time_s, (None,)))
         object.__setattr__(self, "colors", frozen_int(self.colors, (len(self.time_s), len(self.names), 3)))
@@ -82,6 +91,7 @@ class RobotView:
     Attributes:
         name: Its name.
         radius_m: Radius of its hull.
+        solids: Its shape.
         color: Its colour.
         time_s: Mission clock of the poses, shape (n,).
         pose: x, y [m], yaw [rad], shape (n, 3).
@@ -91,11 +101,13 @@ class RobotView:
         trail: Pieces of the driven path, each two ends [m], shape (t, 2, 2).
         fuel: Fuel left [s of driving]; ``None`` = it has no limit.
         collected: Incentive collected, a step at each POI.
+        speed: Speed over ground [m/s].
         believed: x, y where it believes to be at each pose [m], shape (n, 2); none if it knows where it is.
     """
 
     name: str
     radius_m: float
+    solids: tuple[Solid, ...]
     color: Color
     time_s: FloatArray
     pose: FloatArray
@@ -105,6 +117,7 @@ class RobotView:
     trail: FloatArray
     fuel: Series | None
     collected: Series
+    speed: Series
     believed: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
@@ -126,6 +139,7 @@ class Story:
         marks: The sites, one entry per kind that occurs.
         views: The robots.
         lost: Those that didn't come home.
+        forgone: POIs that these, and late ones, were to visit and nobody collected.
         changes: Those whose orders changed.
         lanes: What is known when, robot by robot; none if no news came.
         touched: What hulls touched, robot by robot; none of robots that touched nothing.
@@ -134,6 +148,9 @@ class Story:
         floors: Patches of floor that grip less, or more.
         total: Incentive collected by all robots together.
         log: What happened, in order of time.
+        states: What each robot is doing when.
+        properties: What the recording is of; nothing where that isn't said.
+        text: The same for people.
         eye_m: Position of the camera, x, y, z [m].
         target_m: Point that the camera looks at, x, y, z [m].
     """
@@ -145,6 +162,7 @@ class Story:
     marks: tuple[Marks, ...]
     views: tuple[RobotView, ...]
     lost: tuple[Lost, ...]
+    forgone: tuple[Forgone, ...]
     changes: tuple[Change, ...]
     lanes: tuple[Lane, ...]
     touched: tuple[Touched, ...]
@@ -153,11 +171,17 @@ class Story:
     floors: tuple[Floor, ...]
     total: Series
     log: tuple[LogEntry, ...]
+    states: tuple[StateLane, ...]
+    properties: Mapping[str, str | int | float]
+    text: str
     eye_m: tuple[float, float, float]
     target_m: tuple[float, float, float]
 
 
-def story_of(world: World, traces: Sequence[Trace], title: str, news: Sequence[NewsHeard] = ()) -> Story:
+def story_of(
+    world: World, traces: Sequence[Trace], title: str, news: Sequence[NewsHeard] = (), about: About | None = None,
+    routes: Mapping[str, Sequence[str]] | None = None,
+) -> Story:
     """The content of a recording of one trial.
 
     Args:
@@ -165,6 +189,8 @@ def story_of(world: World, traces: Sequence[Trace], title: str, news: Sequence[N
         traces: One per robot at most, of one trial.
         title: What the recording is called.
         news: News of failures that the team heard, in order.
+        about: What it is of; ``None`` = nobody says.
+        routes: Stops of each robot as planned; ``None`` = those of the traces' orders.
 
     Raises:
         ValueError: If there is no trace, one without poses or of a robot that the world doesn't have, or two of
@@ -181,8 +207,7 @@ def story_of(world: World, traces: Sequence[Trace], title: str, news: Sequence[N
     duration_s = max([*(heard.time_s for heard in news), *(max(float(trace.time_s[-1]), trace.outcome.end_time_s)
                                                            for trace in traces)])
     views = tuple(
-        _robot_view(trace, world.robots[known[trace.orders.robot]].model.radius_m, colors[trace.orders.robot],
-                    duration_s)
+        _robot_view(trace, world.robots[known[trace.orders.robot]].model, colors[trace.orders.robot], duration_s)
         for trace in traces)
     gains = [_gains(trace) for trace in traces]
     eye, target = _eye(world.obstacles.bounds_m)
@@ -190,11 +215,14 @@ def story_of(world: World, traces: Sequence[Trace], title: str, news: Sequence[N
                  if view.disabled_s is not None)
     return Story(
         title=title, world=world.name, duration_s=duration_s, solids=world.obstacles.walled(_WALL_M),
-        marks=_marks(world.sites, traces, colors, news), views=views, lost=lost, changes=changes_of(news, colors),
+        marks=_marks(world, traces, colors, news), views=views, lost=lost,
+        forgone=forgone_of(world.pois, traces, colors, routes), changes=changes_of(news, colors),
         lanes=lanes_of(traces, news, colors), touched=touched_of(traces), waiting=waiting_of(traces),
         gates=gates_of(world.passages, traces), floors=floors_of(world.obstacles.floors),
         total=_staircase(np.concatenate(gains), duration_s),
-        log=log_of(traces, colors, news), eye_m=eye, target_m=target)
+        log=log_of(traces, colors, news), states=state_lanes_of(traces),
+        properties={} if about is None else about.properties(world.name, traces),
+        text=results_table(traces) if about is None else about.text(world.name, traces), eye_m=eye, target_m=target)
 
 
 def dashes(path: FloatArray, dash_m: float, gap_m: float) -> FloatArray:
@@ -238,7 +266,7 @@ def corners(time_s: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
     return kept
 
 
-def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Color], news: Sequence[NewsHeard]
+def _marks(world: World, traces: Sequence[Trace], colors: dict[str, Color], news: Sequence[NewsHeard]
            ) -> tuple[Marks, ...]:
     """Sites by kind. A POI has the colour of the robot that collected it, and before a light one of who takes it over
     or, left to nobody again, its own."""
@@ -249,9 +277,12 @@ def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Col
         *((heard.time_s, site, pale(colors[robot.robot]), False) for site in robot.taken))]
     # Of the same moment, what is dropped comes before what is taken over: by whomever, it has a new owner then.
     painted = sorted([*orphans, *collected], key=lambda p: (p[0], p[3], p[2] != SITE_COLORS["poi"]))
+    worth = {site.name: max((robot.incentives.get(site.name, 0.0) for robot in world.robots), default=0.0)
+             for site in world.pois}
+    most = max(worth.values(), default=0.0)
     marks = []
     for kind in SITE_COLORS:
-        mine = [site for site in sites if site.kind == kind]
+        mine = [site for site in world.sites if site.kind == kind]
         index = {site.name: k for k, site in enumerate(mine)}
         now = np.tile(np.array(SITE_COLORS[kind], dtype=np.int64), (len(mine), 1))
         times, rows = [0.0], [now.copy()]
@@ -268,11 +299,17 @@ def _marks(sites: Sequence[Site], traces: Sequence[Trace], colors: dict[str, Col
                     rows.append(now.copy())
         if mine:
             marks.append(Marks(kind=kind, names=tuple(index), at_m=np.array([[s.x_m, s.y_m] for s in mine]),
-                               time_s=np.array(times), colors=np.array(rows)))
+                               time_s=np.array(times), colors=np.array(rows), size=np.array([
+                                   _size(worth[site.name], most) if kind == "poi" else 1.0 for site in mine])))
     return tuple(marks)
 
 
-def _robot_view(trace: Trace, radius_m: float, color: Color, duration_s: float) -> RobotView:
+def _size(worth: float, most: float) -> float:
+    """Factor on the radius of a POI: its area goes by what it is worth, down to one that is still seen."""
+    return max(math.sqrt(worth / most), _SMALLEST) if most > 0 else 1.0
+
+
+def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float) -> RobotView:
     outcome, time, pose = trace.outcome, trace.time_s, trace.pose
     # The first pose at or after each step, and the last pose: the trail is as long as the drive.
     marks = np.searchsorted(time, np.arange(time[0], time[-1], _TRAIL_STEP_S))
@@ -287,10 +324,18 @@ def _robot_view(trace: Trace, radius_m: float, color: Color, duration_s: float) 
         kept = corners(when, left)
         fuel = Series(time_s=when[kept], value=left[kept])
     return RobotView(
-        name=trace.orders.robot, radius_m=radius_m, color=color, time_s=time, pose=pose,
+        name=trace.orders.robot, radius_m=model.radius_m, solids=solids_of(model), color=color, time_s=time, pose=pose,
         disabled_s=outcome.end_time_s if outcome.end in LOST else None,
         planned=dashes(trace.planned, _DASH_M, _GAP_M), trail_s=time[at[1:]][moved], trail=pieces, fuel=fuel,
-        collected=_staircase(_gains(trace), duration_s), believed=trace.believed)
+        collected=_staircase(_gains(trace), duration_s), speed=_speed(trace, duration_s), believed=trace.believed)
+
+
+def _speed(trace: Trace, duration_s: float) -> Series:
+    when, speed = speed_of(trace)
+    if when[-1] < duration_s:
+        when, speed = np.append(when, [min(when[-1] + 0.1, duration_s), duration_s]), np.append(speed, [0.0, 0.0])
+    kept = corners(when, speed)
+    return Series(time_s=when[kept], value=speed[kept])
 
 
 def _gains(trace: Trace) -> FloatArray:

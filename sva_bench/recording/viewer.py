@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+import webbrowser
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 from sva_bench.errors import BadFile, BadInput, ExitCode, SvaBenchError
 from sva_bench.files.atomic import write_file
+from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
+from sva_bench.recording.browser import page_of
+
+_log = logging.getLogger(__name__)
 
 LAVAPIPE = Path("/usr/share/vulkan/icd.d/lvp_icd.x86_64.json")  # Mesa's Vulkan driver that needs no graphics card
 _DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
@@ -23,7 +29,7 @@ _DRIVER_VARIABLES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
 _NOTHING_TO_DRAW_WITH = ("graphics adapter", "render context")  # in what the viewer says when it ends
 _START_S = 30.0  # longest wait until the viewer listens; it takes about a second
 _STOP_S = 5.0  # longest wait until it has ended, before it is killed
-_PICTURE_SIZE = "1600x900"
+_PICTURE_SIZE = 1600, 900
 
 _DISCREET = {"CI": "true"}  # with it the viewer sends no usage statistics
 
@@ -54,16 +60,18 @@ class ViewerFailed(SvaBenchError):
         return f"the Rerun viewer failed: {self.said}"
 
 
-def view(files: Sequence[Path], *, web: bool, screenshot: Path | None, at_s: float | None) -> None:
+def view(files: Sequence[Path], *, web: bool, screenshot: Path | None, at_s: float | None,
+         say: Callable[[str], None] = _log.info) -> None:
     """Show recordings until the viewer is closed or interrupted.
 
     Nothing but this machine can reach the viewer, and it is gone when this returns.
 
     Args:
-        files: ``.rrd`` files, as ``recordings_of`` gives them.
+        files: ``.rrd`` files, as ``recordings_of`` gives them; the first is what is seen first.
         web: In a browser rather than in a window.
         screenshot: Draw a picture of the first into this file instead.
         at_s: Moment of the picture [s]; ``None`` = the end of the mission.
+        say: Told where a browser finds the viewer.
 
     Raises:
         BadInput: If the options contradict each other.
@@ -78,11 +86,14 @@ def view(files: Sequence[Path], *, web: bool, screenshot: Path | None, at_s: flo
     if screenshot is not None:
         _picture(files[0], screenshot, at_s)
         return
-    if not web and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not web and not _has_screen():
         raise BadInput("there is no screen here: use --web, or --screenshot OUT.png")
     for file in files:
         verify(file)
-    _show(files, web=web)
+    if web:
+        _serve(files, say)
+    else:
+        _show(files)
 
 
 def recordings_of(path: Path) -> tuple[Path, ...]:
@@ -146,9 +157,11 @@ def _picture(path: Path, picture: Path, at_s: float | None) -> None:
     environment = {**drawing_environment(os.environ), "RUST_LOG": "error"}  # notices would cover the picture
     with holding_back_ctrl_c():
         from sva_bench.recording import rerun  # takes half a second to import: only once it is needed
+        from sva_bench.recording.pictures import STRIP_PX, without_strip
 
-    port = _free_port()
-    command = [*program(), "--headless", "--hide-welcome-screen", "--window-size", _PICTURE_SIZE, *_at(port)]
+    port, (width, height) = _free_port(), _PICTURE_SIZE
+    command = [*program(), "--headless", "--hide-welcome-screen", "--window-size", f"{width}x{height + STRIP_PX}",
+               *_at(port)]
     with (tempfile.TemporaryFile() as said, tempfile.TemporaryDirectory() as folder,
           _running(command, environment, said.fileno()) as process):
         unfinished = Path(folder) / "picture.png"
@@ -161,21 +174,53 @@ def _picture(path: Path, picture: Path, at_s: float | None) -> None:
             if any(complaint in words for complaint in _NOTHING_TO_DRAW_WITH):
                 raise NoVulkanDriver from error
             raise ViewerFailed(words.split("stack backtrace")[0].strip()[:500] or str(error)) from error
-        write_file(picture, unfinished.read_bytes(), "choose another place with --screenshot")
+        write_file(picture, without_strip(unfinished.read_bytes()), "choose another place with --screenshot")
 
 
-def _show(files: Sequence[Path], *, web: bool) -> None:
-    port = _free_port()
-    command = [*program(), *map(str, files), *_at(port)]
-    if web:
-        command += ["--web-viewer", "--web-viewer-port", str(_free_port())]  # it opens the page, and names it
+def _show(files: Sequence[Path]) -> None:
+    command = [*program(), *map(str, _last_is_seen(files)), *_at(_free_port())]
     with _running(command, os.environ, None) as process:
         try:
             status = process.wait()
         except KeyboardInterrupt:  # the way to close it
             return
     if status:
-        raise ViewerFailed(f"it ended with status {status}" + ("" if web else "; --web needs no window"))
+        raise ViewerFailed(f"it ended with status {status}; --web needs no window")
+
+
+def _serve(files: Sequence[Path], say: Callable[[str], None]) -> None:
+    """Serve recordings to a browser, and open it where there is a screen."""
+    data, page = _free_port(), _free_port()
+    command = [*program(), *_at(data), "--serve-web", "--web-viewer-port", str(page)]
+    quiet = {**os.environ, "RUST_LOG": "error"}  # it would name several addresses, none of them whole
+    with tempfile.TemporaryFile() as said, _running(command, quiet, said.fileno()) as process:
+        try:
+            _await(process, data)
+            _await(process, page)
+            with page_of(files, page) as address:
+                say(f"{address} shows {_named(files)} in a browser of this machine; Ctrl-C ends it")
+                if _has_screen():
+                    webbrowser.open(address)
+                status = process.wait()
+        except KeyboardInterrupt:  # the way to close it
+            return
+        except RuntimeError as error:
+            said.seek(0)
+            raise ViewerFailed(said.read().decode(errors="replace").strip()[-500:] or str(error)) from error
+    raise ViewerFailed(f"it ended with status {status}")
+
+
+def _last_is_seen(files: Sequence[Path]) -> list[Path]:
+    """Recordings in the order in which the viewer has to be given them: it shows the last."""
+    return [*files[1:], files[0]]
+
+
+def _named(files: Sequence[Path]) -> str:
+    return files[0].name if len(files) == 1 else f"{files[0].name} and {counted(len(files) - 1, 'more recording')}"
+
+
+def _has_screen() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def program() -> list[str]:

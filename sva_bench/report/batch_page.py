@@ -8,6 +8,7 @@ from pathlib import Path
 from sva_bench.analysis.over_maps import BatchSummary, OverMaps
 from sva_bench.analysis.reach import maps_without_reach
 from sva_bench.files.printable import counted
+from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.calibration_over_maps import calibrated_over_maps
 from sva_bench.report.calibration_page import bad_pct
 from sva_bench.report.compared_values import compared_answers, compared_notes, compared_table, compared_title

@@ -303,7 +303,7 @@ def _recordings(content: Content, shown: ShownNames) -> list[str]:
                        for (scenario, planner, policy, news), stem in content.reaction_stems.items()})
     parts = [heading("Recordings")]
     if links:
-        parts.append(f"<p>Trial 0 of each plan, for the Rerun viewer: {', '.join(links)}. Open them all with "
+        parts.append(f"<p>A typical trial of each plan, for the Rerun viewer: {', '.join(links)}. Open them all with "
                      "<code>sva-bench view</code> and this folder.</p>")
     if reacting:
         parts.append(f"<p>The most probable course of events in which orders change: {', '.join(reacting)}.</p>")

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field
 
 from sva_bench import __version__
 from sva_bench.analysis.results import Amount, Words
+from sva_bench.choices import News, PolicyName, RecordedKind
 from sva_bench.files.fields import NonNegativeInt, Seed
 from sva_bench.files.records import Record
 from sva_bench.files.versions import library_versions
@@ -40,6 +41,28 @@ class Machine(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
+class RecordingNote(Record):
+    """What a recording of a run shows.
+
+    Attributes:
+        file: Its name in ``recordings/``.
+        scenario: The scenario.
+        planners: Whose plan; of a recording that compares two, both.
+        trial: The trial, or the history.
+        chosen: How it was chosen.
+        policy, news: The reaction.
+    """
+
+    file: Words
+    scenario: Words
+    planners: tuple[Words, ...]
+    trial: NonNegativeInt
+    chosen: RecordedKind
+    policy: PolicyName = "none"
+    news: News = "never"
+
+
+@dataclass(frozen=True, kw_only=True)
 class Manifest(Record):
     """The manifest of a run; the only file with wall-clock times.
 
@@ -49,6 +72,7 @@ class Manifest(Record):
         command, started, seconds: The command line, its start, and the duration of each phase [s].
         machine: Where it was run.
         world: The resolved world, which is validated as any world file.
+        recordings: What the run's recordings show.
     """
 
     format: Literal["sva-bench/manifest@1"] = MANIFEST
@@ -61,10 +85,12 @@ class Manifest(Record):
     machine: Machine
     packages: Mapping[Words, Words]
     world: Mapping[str, Any]
+    recordings: tuple[RecordingNote, ...] = ()
 
 
 def manifest_of(world: Mapping[str, Any], seed: int, options: Mapping[str, Any], started: str,
-                seconds: Mapping[str, float], command: Sequence[str] | None = None) -> Manifest:
+                seconds: Mapping[str, float], command: Sequence[str] | None = None,
+                recordings: Sequence[RecordingNote] = ()) -> Manifest:
     """The manifest of a run of this process; ``command``: ``None`` = its command line."""
     return Manifest(
         version=__version__, seed=seed, options=options, started=started,
@@ -72,4 +98,4 @@ def manifest_of(world: Mapping[str, Any], seed: int, options: Mapping[str, Any],
         seconds={phase: round(taken, 3) for phase, taken in seconds.items()},
         machine=Machine(platform=platform.platform(), python=platform.python_version(),
                         cpus=usable_cores()),
-        packages=library_versions(), world=world)
+        packages=library_versions(), world=world, recordings=tuple(recordings))

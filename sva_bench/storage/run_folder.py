@@ -72,7 +72,7 @@ def stem_of(scenario: str, planner: str, *, foreign: bool) -> str:
     return f"{scenario}{'+' if foreign else '-'}{planner}"
 
 
-def recording_stem(key: tuple[str, str, str, str], trial: int | None = None, *, foreign: bool) -> str:
+def recording_stem(key: tuple[str, str, str, str], trial: int | str | None = None, *, foreign: bool) -> str:
     """The unique name of a recording.
 
     ``+`` ends the planner's name, as planners' own names have none. Given plans may have any name, which therefore
@@ -80,14 +80,20 @@ def recording_stem(key: tuple[str, str, str, str], trial: int | None = None, *, 
 
     Args:
         key: Scenario, planner, policy and news.
-        trial: The trial that was replayed; ``None``: the one that the run recorded.
+        trial: The trial that was asked for, by its number or as in ``worst``; ``None``: the usual one.
         foreign: Whether the plan is from elsewhere.
     """
     scenario, planner, policy, news = key
-    which = "-".join([*([] if policy == "none" else [policy, news]), *([] if trial is None else [f"trial{trial}"])])
+    which = "-".join([*([] if policy == "none" else [policy, news]), *(
+        [] if trial is None else [trial if isinstance(trial, str) else f"trial{trial}"])])
     if not which:
         return stem_of(scenario, planner, foreign=foreign)
     return f"{scenario}@{which}+{planner}" if foreign else f"{scenario}-{planner}+{which}"
+
+
+def pair_stem(scenario: str, *, foreign: bool) -> str:
+    """The unique name of the recording that shows two plans side by side; a given plan may be called ``compare``."""
+    return f"{scenario}{'@' if foreign else '+'}compare"
 
 
 def made_for(planner: str, news: str) -> str:

@@ -11,7 +11,7 @@ from sva_bench.analysis.comparison import comparison_summary
 from sva_bench.analysis.over_trials import Judged
 from sva_bench.analysis.reactions import compared_reaction
 from sva_bench.analysis.summaries import ComparisonSummary
-from sva_bench.execution.case import Case
+from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
@@ -23,6 +23,7 @@ from sva_bench.study.costs import instance_of, reach_of
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import unlimited
 from sva_bench.study.publish import Run, Stopwatch, publish
+from sva_bench.study.recordings import recorded_trials
 from sva_bench.study.recourse import Stage, react_in_scenarios, refuse_trials_beyond_memory
 from sva_bench.study.run import refuse_too_many_rows
 from sva_bench.study.sources import Grounds, with_sources
@@ -40,6 +41,8 @@ class Compared:
     executed: list[Executed]
     summary: ComparisonSummary
     clock: Stopwatch
+    settings: Settings
+    drives: Drives
     reacted: tuple[Reacted, ...] = ()
 
 
@@ -57,7 +60,7 @@ def execute_plans(
         costs: Fuel costs of the world's robot models, as ``plan_costs`` gives them.
     """
     done = measure_plans(world, plans, options, executor, progress, costs)
-    return publish_plans(world, plans, options, done, out, progress, costs)
+    return publish_plans(world, plans, options, done, out, progress, costs, executor=executor)
 
 
 def measure_plans(
@@ -92,17 +95,20 @@ def measure_plans(
     if reactions:
         summary = summary.with_reactions({name: found.results for name, found in reactions.items()})
     summary = with_drives(summary, drives)
-    return Compared(instances=instances, executed=executed, summary=summary, clock=clock,
+    return Compared(instances=instances, executed=executed, summary=summary, clock=clock, settings=settings,
+                    drives=drives,
                     reacted=tuple(run for found in reactions.values() for run in found.reacted))
 
 
 def publish_plans(
     world: World, plans: Mapping[str, Plan], options: Options, done: Compared, out: Path, progress: OnProgress,
-    costs: Mapping[str, FuelCosts], command: Sequence[str] | None = None,
+    costs: Mapping[str, FuelCosts], command: Sequence[str] | None = None, executor: Executor | None = None,
 ) -> Run:
     """Write the run folder of plans that were compared; ``command``: as for ``publish``."""
-    return publish(world, options, costs, done.instances, done.executed, done.summary, out, done.clock, progress,
-                   identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
+    with done.clock.phase("recording"):
+        recorded = recorded_trials(world, costs, done.executed, options.record, done.settings, executor, done.drives)
+    return publish(world, options, costs, done.instances, done.executed, recorded, done.summary, out, done.clock,
+                   progress, identity={"plans": {name: {robot: list(route) for robot, route in plan.routes.items()}
                                        for name, plan in plans.items()}}, command=command,
                    reacted=done.reacted)
 

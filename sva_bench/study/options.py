@@ -12,6 +12,7 @@ from sva_bench.choices import Fidelity, News, PathPlanner, PolicyName
 from sva_bench.execution.case import Settings
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.reacting import Reaction, pairs_of
+from sva_bench.study.recordings import Ask
 from sva_bench.world.model import World
 
 
@@ -35,6 +36,7 @@ class Options:
         calibrate: What a calibrated plan is made for: the greatest share of bad missions, or the greatest value;
             ``None`` = none is made.
         precision: Stopping rule, by which trials and noise draws grow; ``None`` = fixed numbers.
+        record: Trials that are recorded beside the typical ones; results don't depend on them.
     """
 
     seed: int = 0
@@ -51,6 +53,7 @@ class Options:
     anticipate: bool = False
     calibrate: Target | None = None
     precision: Precision | None = None
+    record: tuple[Ask, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Everything that changes results, as asked for; what isn't asked for is left out."""

@@ -12,24 +12,19 @@ from pathlib import Path
 from typing import Any
 
 from sva_bench.analysis.summaries import AnySummary
-from sva_bench.execution.case import Case
 from sva_bench.execution.executed import Executed
 from sva_bench.execution.reacted import Reacted
-from sva_bench.execution.team_trace import TeamTrace
 from sva_bench.files.atomic import draft_file
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.instance_file import write_instance
 from sva_bench.mission.plan_file import write_plan
-from sva_bench.recording.rerun import record
 from sva_bench.report.run_page import write_report
-from sva_bench.storage.agreement import Key
 from sva_bench.storage.leg_paths import paths_of, write_paths
 from sva_bench.storage.manifest import manifest_of
 from sva_bench.storage.met_tables import contact_table, wait_table, write_met
 from sva_bench.storage.run_folder import (
     legs_of,
     made_for,
-    recording_stem,
     run_folder,
     run_name,
     stem_of,
@@ -42,6 +37,8 @@ from sva_bench.storage.run_folder import (
 from sva_bench.storage.stored_run import Content, read_content, run_folder_at
 from sva_bench.storage.trial_counts import Counting
 from sva_bench.study.options import Options, identity_of, settings_of
+from sva_bench.study.recording_files import write_recordings
+from sva_bench.study.recordings import Recorded
 from sva_bench.study.summing import by_case
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -61,13 +58,15 @@ class Run:
 
 def publish(
     world: World, options: Options, costs: Mapping[str, FuelCosts], instances: Mapping[str, Instance],
-    executed: Sequence[Executed], summary: AnySummary, out: Path, clock: Stopwatch, progress: OnProgress,
-    identity: Mapping[str, Any] | None = None, command: Sequence[str] | None = None, reacted: Sequence[Reacted] = (),
+    executed: Sequence[Executed], recorded: Sequence[Recorded], summary: AnySummary, out: Path, clock: Stopwatch,
+    progress: OnProgress, identity: Mapping[str, Any] | None = None, command: Sequence[str] | None = None,
+    reacted: Sequence[Reacted] = (),
 ) -> Run:
     """Write the run folder.
 
     Args:
         world, options, costs, instances, executed, summary: What was measured, and how.
+        recorded: Trials that are recorded.
         out: The folder that receives the run folder.
         clock, progress: How long it took so far; told how far the recording is.
         identity: What results of plans from elsewhere depend on beside the rest.
@@ -80,7 +79,6 @@ def publish(
                     {"world": resolved, "options": identity_of(world, options), **_digests(world), **(identity or {})})
     stems = {key: stem_of(*key, foreign=foreign) for key in by_case(executed)}
     routes = {key: run.case.plan.routes for key, run in by_case(executed).items()}
-    told: dict[Key, str] = {}
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
@@ -88,24 +86,18 @@ def publish(
         write_travel_times(folder / "travel_times.parquet", costs)
         for scenario, instance in instances.items():
             write_instance(folder / f"instance-{scenario}.json", instance)
+        for done in executed:
+            stem = stems[done.case.scenario.name, done.case.planner]
+            write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
+        for team in reacted:
+            if team.case.role == "anticipative":
+                plan = team.case.scenario.name, made_for(team.case.planner, team.case.news)
+                routes[plan] = team.case.plan.routes
+                write_plan(folder / "plans" / f"{stem_of(*plan, foreign=foreign)}.json", team.case.plan)
         with clock.phase("recording"):
-            for number, done in enumerate(executed):
-                scenario, planner = done.case.scenario.name, done.case.planner
-                stem = stems[scenario, planner]
-                write_plan(folder / "plans" / f"{stem}.json", done.case.plan)
-                record(folder / "recordings" / f"{stem}.rrd", world, done.traces,
-                       title=f"{world.name}, {scenario}, {planner}")
-                progress("recording", number + 1, len(executed) + len(reacted))
-            for number, team in enumerate(reacted):
-                case = team.case
-                if case.role == "anticipative":
-                    plan = case.scenario.name, made_for(case.planner, case.news)
-                    routes[plan] = case.plan.routes
-                    write_plan(folder / "plans" / f"{stem_of(*plan, foreign=foreign)}.json", case.plan)
-                if team.shown is not None:
-                    told[case.key] = stem = recording_stem(case.key, foreign=foreign)
-                    record_team(folder / "recordings" / f"{stem}.rrd", world, case, team.shown)
-                progress("recording", len(executed) + number + 1, len(executed) + len(reacted))
+            told, notes = write_recordings(
+                folder / "recordings", world, recorded, reacted, settings_of(world, options),
+                lambda done, of: progress("recording", done, of), foreign=foreign)
         legs = legs_of([*executed, *reacted])
         write_legs(folder / "legs.parquet", legs)
         contacts, waits = contact_table([*executed, *reacted]), wait_table([*executed, *reacted])
@@ -116,17 +108,13 @@ def publish(
         paths = paths_of(world, costs, routes.values(), legs)
         write_paths(folder, paths)
         write_record(folder / "summary.json", summary)
-        manifest = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds, command)
+        manifest = manifest_of(resolved, options.seed, options.as_dict(), clock.started, clock.seconds, command,
+                               notes)
         write_record(folder / "manifest.json", manifest)
         write_report(folder / "report.html", Content(
             summary=summary, routes=routes, stems=stems, reaction_stems=told, legs=legs, world=world,
             manifest=manifest, contacts=contacts, waits=waits, paths=paths, counts=counting.result()))
     return Run(folder=out / name, summary=summary)
-
-
-def record_team(path: Path, world: World, case: Case, team: TeamTrace) -> None:
-    """Write the recording of a mission in which a team reacts."""
-    record(path, world, team.traces, news=team.news, title=f"{world.name}, {case.title}, trial {team.trial}")
 
 
 def report_again(folder: Path) -> Path:
@@ -162,4 +150,4 @@ class Stopwatch:
         try:
             yield
         finally:
-            self.seconds[name] = time.monotonic() - started_s
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.monotonic() - started_s

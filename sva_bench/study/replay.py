@@ -15,19 +15,21 @@ from sva_bench.errors import BadInput, nearest
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
+from sva_bench.execution.outcome import Trace
 from sva_bench.execution.policies.registry import POLICIES, Means
 from sva_bench.execution.react import react_again
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.team_outcome import Reaction
+from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.mission.plan_file import read_plan
-from sva_bench.recording.rerun import record
 from sva_bench.solver.rest import plan_rest
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.run_folder import made_for, recording_stem, stem_of
 from sva_bench.storage.stored_run import Content, find_row, last_trial, read_content, run_folder_at
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.given_plans import without_times
-from sva_bench.study.publish import record_team
+from sva_bench.study.recording_files import about_of, record_team, record_trial
+from sva_bench.study.recordings import Recorded
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
 
@@ -59,12 +61,16 @@ class Replayed:
         rows: Its rows as in ``outcomes.parquet``.
         recording: Where it was recorded; ``None``: nowhere.
         reactions: News that was heard, in order, and how orders changed.
+        traces: The trial over time.
+        news: What was heard, with the paths that orders change.
     """
 
     case: Case
     rows: Sequence[Mapping[str, Any]]
     recording: Path | None
     reactions: Sequence[Reaction] = ()
+    traces: Sequence[Trace] = ()
+    news: Sequence[NewsHeard] = ()
 
     def reactions_as_dicts(self) -> list[dict[str, Any]]:
         """The reactions as ``--json`` prints them."""
@@ -152,21 +158,26 @@ def play_again(
     settings = Settings(seed=summary.seed, trials=summary.trials, rollouts=summary.rollouts, fidelity=summary.fidelity)
     run: Executed | Reacted
     reactions: Sequence[Reaction] = ()
+    news: Sequence[NewsHeard] = ()
     if case.policy == "none":
         settings = replace(settings, first=trial, trials=1)
         (run,) = execute(world, costs, [case], settings, executor)
+        traces = run.traces
         if path is not None:
-            record(path, world, run.traces, title=f"{world.name}, {case.title}, trial {trial}")
+            one = Recorded(case=case, trial=trial, kind="trial", traces=run.traces)
+            record_trial(path, world, case, run.traces, about_of(one, settings))
     else:
         instance = replace(instance_of(world, costs, case.scenario), failure=world.execute_failure)
         policy = POLICIES[case.policy](Means(instance=instance, plans_rest=plan_rest))
         run = react_again(world, costs, case, policy, settings, trial, history, executor)
         assert run.shown is not None, "a mission that is played again is shown"
+        traces, news = run.shown.traces, run.shown.news
         if path is not None:
-            record_team(path, world, case, run.shown)
+            record_team(path, world, case, run.shown, settings, "trial")
         reactions = run.played[0].reactions
     table = outcome_table(run, [robot.name for robot in world.robots], settings)
-    return Replayed(case=case, rows=table.to_pylist(), recording=path, reactions=reactions)
+    return Replayed(case=case, rows=table.to_pylist(), recording=path, reactions=reactions, traces=traces,
+                    news=news)
 
 
 def cases_of(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case, tuple[int, int] | None]]:

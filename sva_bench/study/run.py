@@ -10,7 +10,7 @@ from pathlib import Path
 from sva_bench.analysis.reactions import reaction_result
 from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
-from sva_bench.execution.case import Case
+from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
@@ -22,6 +22,7 @@ from sva_bench.study.informed import cases_of, combined_trials
 from sva_bench.study.options import Options, settings_of
 from sva_bench.study.planning import Planned, model_is_executed, own_cases, plan_scenarios, with_calibration
 from sva_bench.study.publish import Run, Stopwatch, publish
+from sva_bench.study.recordings import recorded_trials
 from sva_bench.study.recourse import Stage, react_in_scenarios, refuse_trials_beyond_memory
 from sva_bench.study.sources import Grounds, with_sources
 from sva_bench.study.summing import head_of, proved, summarise, with_drives
@@ -42,6 +43,8 @@ class Measured:
     executed: list[Executed]
     summary: Summary
     clock: Stopwatch
+    settings: Settings
+    drives: Drives
     reacted: tuple[Reacted, ...] = ()
 
 
@@ -52,18 +55,21 @@ def run(world: World, options: Options, out: Path, executor: Executor | None, pr
         BadInput: If there are too many trials, or the folder can't be written.
         UnreachableSite: If a site can't be reached.
     """
-    return publish_run(world, options, measure(world, options, executor, progress), out, progress)
+    return publish_run(world, options, measure(world, options, executor, progress), out, progress, executor=executor)
 
 
 def publish_run(
     world: World, options: Options, done: Measured, out: Path, progress: OnProgress,
-    command: Sequence[str] | None = None,
+    command: Sequence[str] | None = None, executor: Executor | None = None,
 ) -> Run:
-    """Write the run folder of what was measured; ``command``: as for ``publish``."""
+    """Write the run folder of what was measured; ``command``: as for ``publish``, ``executor``: as for ``run``."""
     instances = {name: p.instance for name, p in done.planned.items()}
     instances |= {f"{name}+calibrated": p.calibrated.instance for name, p in done.planned.items() if p.calibrated}
-    return publish(world, options, done.costs, instances, done.executed, done.summary, out, done.clock, progress,
-                   command=command, reacted=done.reacted)
+    with done.clock.phase("recording"):
+        recorded = recorded_trials(world, done.costs, done.executed, options.record, done.settings, executor,
+                                   done.drives)
+    return publish(world, options, done.costs, instances, done.executed, recorded, done.summary, out, done.clock,
+                   progress, command=command, reacted=done.reacted)
 
 
 def measure(world: World, options: Options, executor: Executor | None, progress: OnProgress) -> Measured:
@@ -116,7 +122,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
     if reactions:
         summary = summary.with_reactions({name: found.results for name, found in reactions.items()})
     summary = with_drives(summary, drives)
-    return Measured(costs=costs, planned=planned, clock=clock, summary=summary,
+    return Measured(costs=costs, planned=planned, clock=clock, summary=summary, settings=settings, drives=drives,
                     reacted=tuple(run for found in reactions.values() for run in found.reacted),
                     executed=[run for run in executed if run.case.role != "worst_tie"])
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import html
 import os
 import pickle
+import re
 import shutil
 import signal
 import struct
@@ -11,6 +13,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.parse import parse_qs, quote, urlsplit
+from urllib.request import urlopen
 
 import pytest
 
@@ -100,25 +105,26 @@ def listening_addresses(process: Path) -> list[str]:
     return [row[1].split(":")[0] for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in sockets]
 
 
-def gone(mark: str) -> bool:
-    """Whether the viewers with the mark end within 5 s."""
+def gone(viewer: Path) -> bool:
+    """Whether a viewer, by its folder in /proc, ends within 5 s."""
     deadline = time.monotonic() + 5
-    while processes(mark) and time.monotonic() < deadline:
+    while viewer.exists() and time.monotonic() < deadline:
         time.sleep(0.02)
-    return not processes(mark)
+    return not viewer.exists()
 
 
-@pytest.mark.skipif(not LAVAPIPE.exists(), reason="no Vulkan driver without a screen: install mesa-vulkan-drivers")
+@pytest.mark.skipif(not (LAVAPIPE.exists() or os.environ.get("VK_ICD_FILENAMES")),
+                    reason="no Vulkan driver without a screen: install mesa-vulkan-drivers")
 def test_a_picture_is_drawn_without_a_screen_and_no_viewer_is_left(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewer, "_PICTURE_SIZE", "1200x701")
+    monkeypatch.setattr(viewer, "_PICTURE_SIZE", (1200, 701))
     picture = tmp_path / "picture.png"
     view((recording,), web=False, screenshot=picture, at_s=None)
     content = picture.read_bytes()
     assert content[:8] == b"\x89PNG\r\n\x1a\n"
     assert struct.unpack(">II", content[16:24]) == (1200, 701)
-    assert not processes("1200x701")
+    assert not processes("1200x737")
 
 
 def test_a_viewer_that_cannot_draw_is_a_missing_driver_and_leaves_no_picture(
@@ -126,25 +132,27 @@ def test_a_viewer_that_cannot_draw_is_a_missing_driver_and_leaves_no_picture(
 ) -> None:
     (tmp_path / "broken.json").write_text("{}")
     monkeypatch.setenv("VK_ICD_FILENAMES", str(tmp_path / "broken.json"))
-    monkeypatch.setattr(viewer, "_PICTURE_SIZE", "1200x702")
+    monkeypatch.setattr(viewer, "_PICTURE_SIZE", (1200, 702))
     with pytest.raises(NoVulkanDriver):
         view((recording,), web=False, screenshot=tmp_path / "picture.png", at_s=None)
     assert not (tmp_path / "picture.png").exists()
-    assert not processes("1200x702")
+    assert not processes("1200x738")
 
 
 @contextmanager
-def served(recording: Path) -> Iterator[subprocess.Popen[str]]:
-    """A program that shows a recording in a browser, once it has said where."""
+def served(*recordings: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A program that shows recordings in a browser, and the address that it names."""
     program = ("import sys; from pathlib import Path; from sva_bench.recording.viewer import view;"
-               "view((Path(sys.argv[1]),), web=True, screenshot=None, at_s=None)")
+               "view([Path(file) for file in sys.argv[1:]], web=True, screenshot=None, at_s=None,"
+               "     say=lambda text: print(text, flush=True))")
     quiet = {**os.environ, "BROWSER": "true"}  # "opens" the page without a browser
-    process = subprocess.Popen([sys.executable, "-c", program, str(recording)], env=quiet, stdout=subprocess.PIPE,
-                               stderr=subprocess.STDOUT, text=True)
+    process = subprocess.Popen([sys.executable, "-c", program, *map(str, recordings)], env=quiet,
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         assert process.stdout is not None
-        assert any("http://127.0.0.1:" in line for line in process.stdout)
-        yield process
+        said = process.stdout.readline()
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+ shows .*\n", said)  # one line, and one address in it
+        yield process, said.split()[0]
     finally:
         process.kill()
         process.communicate()
@@ -152,16 +160,37 @@ def served(recording: Path) -> Iterator[subprocess.Popen[str]]:
 
 @pytest.mark.skipif(shutil.which("setpriv") is None, reason="a killed program can't end its viewer without setpriv")
 def test_a_served_recording_is_reachable_from_this_machine_only_and_ends_with_its_program(recording: Path) -> None:
-    with served(recording) as process:
-        # to open a browser the viewer forks: for a moment there is a copy with its command line
-        (server,) = processes(str(recording), parent=process.pid)
+    with served(recording) as (process, _):
+        (server,) = processes("--serve-web", parent=process.pid)
         assert set(listening_addresses(server)) == {"0100007F"}  # 127.0.0.1
+        assert set(listening_addresses(Path("/proc") / str(process.pid))) == {"0100007F"}
         process.kill()  # not even time to tidy up
-    assert gone(str(recording))
+    assert gone(server)
+
+
+def test_a_browser_gets_the_viewer_and_each_recording_whole_the_first_one_first(recording: Path, tmp_path: Path
+                                                                               ) -> None:
+    other = tmp_path / "other<b>.rrd"
+    other.write_bytes(recording.read_bytes())
+    with served(recording, other) as (_, address), urlopen(address) as answer:
+        page = answer.read().decode()
+        assert "other&lt;b&gt;" in page
+        (first,) = re.findall(r'<iframe [^>]*src="([^"]*)"', page)
+        asked = parse_qs(urlsplit(html.unescape(first)).query)
+        assert asked["theme"] == ["dark"]
+        with urlopen(asked["url"][0]) as file:
+            assert file.read() == recording.read_bytes()
+            assert urlsplit(file.headers["Access-Control-Allow-Origin"]).netloc == urlsplit(first).netloc
+        with urlopen(first) as viewer_page:
+            assert b"wasm" in viewer_page.read()
+        for missing in ("2.rrd", "..%2f..%2fetc/passwd", "-1.rrd", "1e0.rrd", "\u00b2.rrd"):
+            with pytest.raises(HTTPError, match="404"):
+                urlopen(f"{address}/{quote(missing, safe='%/')}")
 
 
 def test_an_interrupted_viewer_ends_in_peace(recording: Path) -> None:
-    with served(recording) as process:
+    with served(recording) as (process, _):
+        (server,) = processes("--serve-web", parent=process.pid)
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 0
-    assert gone(str(recording))
+    assert gone(server)

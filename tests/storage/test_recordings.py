@@ -29,14 +29,14 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(("scenario", "planner", "stems"), [
-    ("S", None, {"S-stochastic", "S-deterministic", "S-stochastic+trial7"}),
-    ("S", "stochastic", {"S-stochastic", "S-stochastic+trial7"}),
-    ("S-stochastic", None, {"S-stochastic-stochastic", "S-stochastic-deterministic"}),
-    (None, "deterministic", {"S-deterministic", "S-stochastic-deterministic"}),
+    ("S", None, ["S+compare", "S-stochastic", "S-stochastic+trial7", "S-deterministic"]),
+    ("S", "stochastic", ["S-stochastic", "S-stochastic+trial7"]),
+    ("S-stochastic", None, ["S-stochastic-stochastic", "S-stochastic-deterministic"]),
+    (None, "deterministic", ["S-deterministic", "S-stochastic-deterministic"]),
 ])
-def test_recordings_are_found_by_scenario_and_planner(run: Path, scenario: str | None, planner: str | None,
-                                                      stems: set[str]) -> None:
-    assert {path.stem for path in recordings_for(run, scenario, planner)} == stems
+def test_recordings_are_found_by_scenario_and_planner_the_most_telling_first(
+        run: Path, scenario: str | None, planner: str | None, stems: list[str]) -> None:
+    assert [path.stem for path in recordings_for(run, scenario, planner)] == stems
 
 
 @pytest.mark.parametrize(("scenario", "planner", "said"), [

@@ -16,7 +16,6 @@ from sva_bench.choices import NEWS, Departures, FailureProcess, Fidelity, Intera
 from sva_bench.errors import BadInput, nearest
 from sva_bench.files.outputs import check_folder, check_output
 from sva_bench.mission.plan import Plan
-from sva_bench.recording.rerun import record as write_recording
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.storage.run_folder import tidy
 from sva_bench.study.bounds import MOST_ROLLOUTS, MOST_SEED, MOST_TRIALS
@@ -45,8 +44,9 @@ from sva_bench.study.public.arguments import (
 )
 from sva_bench.study.public.plans import plan_given
 from sva_bench.study.public.results import Result
-from sva_bench.study.publish import record_team
 from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_the_name
+from sva_bench.study.recording_files import about_of, record_team, record_trial
+from sva_bench.study.recordings import Recorded
 from sva_bench.study.run import measure, publish_run
 from sva_bench.workers.pool import count_of, local_workers
 from sva_bench.workers.progress import OnProgress
@@ -124,9 +124,9 @@ def run(
     check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
     with nullcontext() if path is None else about(path), local_workers(_workers(workers), PRELOAD) as executor:
         done = measure(read, options, executor, told)
-        folder = None if place is None else publish_run(read, options, done, place, told, _command()).folder
-    return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
-                  executed=tuple(done.executed), reacted=tuple(done.reacted))
+        put = None if place is None else publish_run(read, options, done, place, told, _command(), executor)
+    return Result(world=read, summary=done.summary, folder=put.folder if put else None,
+                  settings=settings_of(read, options), executed=tuple(done.executed), reacted=tuple(done.reacted))
 
 
 @called_from_python()
@@ -183,7 +183,7 @@ def execute(
         with local_workers(count, PRELOAD) as executor:
             done = measure_plans(read, given, options, executor, told, costs)
             folder = None if place is None else publish_plans(
-                read, given, options, done, place, told, costs, _command()).folder
+                read, given, options, done, place, told, costs, _command(), executor).folder
     return Result(world=read, summary=done.summary, folder=folder, settings=settings_of(read, options),
                   executed=tuple(done.executed), reacted=tuple(done.reacted))
 
@@ -228,7 +228,7 @@ def record(
         chosen = mine[_one_of("planner", planner, list(mine))]
         if chosen.shown is None:
             raise BadInput(f"{chosen.case.title}: orders never change; record it without a policy")
-        record_team(target, result.world, chosen.case, chosen.shown)
+        record_team(target, result.world, chosen.case, chosen.shown, result.settings)
         return target
     reacts = dict.fromkeys(run.case.policy for run in result.reacted
                            if (run.case.scenario.name, run.case.planner) == (chosen_scenario, planner))
@@ -237,7 +237,8 @@ def record(
     name = _one_of("planner", planner, list(plans[chosen_scenario]))
     executed = next(run for run in result.executed
                     if (run.case.scenario.name, run.case.planner) == (chosen_scenario, name))
-    write_recording(target, result.world, executed.traces, title=f"{result.world.name}, {chosen_scenario}, {name}")
+    first = Recorded(case=executed.case, trial=0, kind="first", traces=executed.traces)
+    record_trial(target, result.world, executed.case, executed.traces, about_of(first, result.settings))
     return target
 
 

@@ -1,0 +1,247 @@
+"""What is seen on the map: floor and walls, sites, robots, their paths, and what became of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from sva_bench.arrays import FloatArray
+from sva_bench.geometry.obstacles import Obstacles
+from sva_bench.recording.colors import ALARM, DISABLED, GREEN, ORANGE, Color, pale
+from sva_bench.recording.hulls import half_of, quaternion_of, top_m
+from sva_bench.recording.meetings import Floor, Gate, Touched, Waiting
+from sva_bench.recording.pen import Pen
+from sva_bench.recording.reactions import Change, Forgone, Lost
+from sva_bench.recording.story import Marks, RobotView, Story, dashes
+
+_FLOOR: Color = (232, 232, 232)
+_WALLS: Color = (176, 176, 176)
+
+_OBSTACLE_M = 0.35  # shown height: low, so that little is hidden behind it
+_FLOOR_M = 0.02  # shown thickness
+_PLANNED_M, _DRIVEN_M = 0.015, 0.03  # heights of lines above the floor, and below the robots
+_ORDERS_M, _LOST_M = 0.045, 0.6  # of changed orders above those, and of what marks a lost robot above all
+_NEW_UI, _CROSS_UI, _MARK_UI = 3.5, 3.5, 6.0  # widths of new orders and crosses, and size of marks
+_PATCH_M, _GATE_M, _RING_M = 0.01, 0.1, 0.02  # thickness of floors' plates, height of gates, and of rings above hulls
+_BAR_M, _GATE_UI = 0.12, 4.0  # length of a gate's dashes and of their gaps, and width
+_FORGONE_M = 0.3  # half the width of crosses over POIs
+_WIDEST = 1.35  # radius of the POI that is worth most, in half widths of a station
+_INSET = 0.08  # share of the floor's width by which words stand beside what they are about
+_NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
+
+
+def write_map(pen: Pen, story: Story) -> None:
+    """Write all that is seen on the map."""
+    _write_solids(pen, story.solids)
+    for marks in story.marks:
+        _write_marks(pen, marks, story.solids)
+    for robot in story.views:
+        _write_robot(pen, robot)
+    for lost in story.lost:
+        _write_lost(pen, lost, story.solids)
+    for forgone in story.forgone:
+        _write_forgone(pen, forgone)
+    _write_floors(pen, story.floors)
+    for gate in story.gates:
+        _write_gate(pen, gate)
+    for touched in story.touched:
+        _write_touched(pen, touched)
+    _write_waiting(pen, story.waiting)
+    for change in story.changes:
+        _write_change(pen, change)
+
+
+def _deep(points: FloatArray, z_m: float) -> NDArray[np.float32]:
+    """Points of the floor at a height: shape (..., 2) to (..., 3)."""
+    return np.concatenate([points, np.full((*points.shape[:-1], 1), z_m)], axis=-1).astype(np.float32)
+
+
+def _about_z(yaw_rad: FloatArray) -> NDArray[np.float32]:
+    """Quaternions x, y, z, w of turns about the vertical, shape (n, 4)."""
+    nought = np.zeros_like(yaw_rad)
+    return np.stack([nought, nought, np.sin(yaw_rad / 2), np.cos(yaw_rad / 2)], axis=-1).astype(np.float32)
+
+
+def _write_solids(pen: Pen, solids: Obstacles) -> None:
+    x0, y0, x1, y1 = solids.bounds_m.tolist()
+    pen.constant("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    pen.constant("world/floor", rr.Boxes3D(
+        centers=[[(x0 + x1) / 2, (y0 + y1) / 2, -_FLOOR_M / 2]],
+        half_sizes=[[(x1 - x0) / 2, (y1 - y0) / 2, _FLOOR_M / 2]], colors=[_FLOOR], fill_mode="solid"))
+    boxes = solids.boxes
+    pen.constant("world/boxes", rr.Boxes3D(
+        centers=_deep(boxes[:, :2], _OBSTACLE_M / 2),
+        half_sizes=_deep(boxes[:, 2:4], _OBSTACLE_M / 2), quaternions=_about_z(boxes[:, 4]),
+        colors=[_WALLS], fill_mode="solid"))
+    if len(solids.cylinders):
+        pen.constant("world/cylinders", rr.Cylinders3D(
+            centers=_deep(solids.cylinders[:, :2], _OBSTACLE_M / 2), radii=solids.cylinders[:, 2],
+            lengths=[_OBSTACLE_M] * len(solids.cylinders), colors=[_WALLS], fill_mode="solid"))
+
+
+def _write_marks(pen: Pen, marks: Marks, solids: Obstacles) -> None:
+    """Sites as plates on the floor: POIs round, stations square, the base a square on its corner."""
+    x0, y0, x1, y1 = solids.bounds_m.tolist()
+    half, thick = max(0.3, max(x1 - x0, y1 - y0) / 60), 0.02  # large enough to be seen in a large world
+    n = len(marks.names)
+    entity = {"base": "world/base", "station": "world/stations", "poi": "world/pois"}[marks.kind]
+    centers = _deep(marks.at_m, thick / 2)
+    if marks.kind == "poi":
+        pen.constant(entity, rr.Cylinders3D.from_fields(
+            centers=centers, radii=(half * _WIDEST * marks.size).tolist(), lengths=[thick] * n, fill_mode="solid"))
+        colors = rr.Cylinders3D.columns(colors=marks.colors.reshape(-1, 3).astype(np.uint8))
+    else:
+        turn = math.radians(45) if marks.kind == "base" else 0.0
+        pen.constant(entity, rr.Boxes3D.from_fields(
+            centers=centers, half_sizes=[[half, half, thick / 2]] * n, quaternions=_about_z(np.full(n, turn)),
+            fill_mode="solid"))
+        colors = rr.Boxes3D.columns(colors=marks.colors.reshape(-1, 3).astype(np.uint8))
+    pen.column(entity, marks.time_s, colors.partition([n] * len(marks.time_s)))
+    pen.names(f"{entity}/names", marks.names, _deep(marks.at_m - [0.0, half], 0.0))
+
+
+def _write_robot(pen: Pen, robot: RobotView) -> None:
+    here, r = f"world/robots/{robot.name}", robot.radius_m
+    height = top_m(robot.solids)
+    # Place and heading apart: the name goes where the robot goes, but stays north of it.
+    pen.column(here, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.pose[:, :2], 0.0)))
+    pen.column(f"{here}/hull", robot.time_s, rr.Transform3D.columns(quaternion=_about_z(robot.pose[:, 2])))
+    pen.names(f"{here}/name", [robot.name], np.array([[0.0, r + _NAME_M, height]]))
+    _write_hull(pen, f"{here}/hull/body", robot)
+    # A white bar on top, from the centre to the front.
+    pen.constant(f"{here}/hull/heading", rr.Boxes3D(
+        centers=[[r / 2, 0, height]], half_sizes=[[r / 2, r / 6, r / 10]], colors=[(255, 255, 255)], fill_mode="solid"))
+    if len(robot.planned):
+        pen.constant(f"world/planned/{robot.name}", rr.LineStrips3D(
+            _deep(robot.planned, _PLANNED_M), colors=[pale(robot.color)], radii=rr.Radius.ui_points(1.0)))
+    if len(robot.believed):
+        # A ring where it believes to be: centimetres beside its hull.
+        turns = np.linspace(0.0, 2 * math.pi, 25)
+        ring, entity = r * np.stack([np.cos(turns), np.sin(turns)], axis=-1), f"world/believed/{robot.name}"
+        pen.column(entity, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.believed, 0.0)))
+        pen.constant(f"{entity}/ring", rr.LineStrips3D(
+            [_deep(ring, height + _RING_M)], colors=[pale(robot.color)], radii=rr.Radius.ui_points(1.25)))
+    if len(robot.trail):
+        entity = f"world/driven/{robot.name}"
+        pen.constant(entity, rr.LineStrips3D.from_fields(
+            colors=[robot.color], radii=rr.Radius.ui_points(1.75)))
+        pen.column(entity, robot.trail_s, rr.LineStrips3D.columns(strips=_deep(robot.trail, _DRIVEN_M)))
+
+
+def _write_hull(pen: Pen, entity: str, robot: RobotView) -> None:
+    """The shape of a robot, dark once it is lost: an entity, or one for each kind of solid that its own body has."""
+    times, colors = [0.0], [robot.color]
+    if robot.disabled_s == 0:
+        colors = [DISABLED]
+    elif robot.disabled_s is not None:
+        times, colors = [0.0, robot.disabled_s], [robot.color, DISABLED]
+    kinds = dict.fromkeys(solid.kind for solid in robot.solids)
+    for kind in kinds:
+        mine = [solid for solid in robot.solids if solid.kind == kind]
+        below = entity if len(robot.solids) == 1 else f"{entity}/{kind}"
+        places: Any = {"centers": [solid.at_m for solid in mine], "fill_mode": "solid",
+                       "quaternions": [quaternion_of(solid) for solid in mine]}
+        halves = [half_of(solid) for solid in mine]
+        if kind == "cylinder":
+            pen.constant(below, rr.Cylinders3D.from_fields(
+                radii=[half[0] for half in halves], lengths=[2 * half[2] for half in halves], **places))
+            painted = rr.Cylinders3D.columns(colors=colors)
+        elif kind == "box":
+            pen.constant(below, rr.Boxes3D.from_fields(half_sizes=halves, **places))
+            painted = rr.Boxes3D.columns(colors=colors)
+        else:
+            pen.constant(below, rr.Ellipsoids3D.from_fields(half_sizes=halves, **places))
+            painted = rr.Ellipsoids3D.columns(colors=colors)
+        pen.column(below, times, painted)
+
+
+def _write_forgone(pen: Pen, forgone: Forgone) -> None:
+    """Crosses in a robot's colour over the POIs that it left and nobody collected, from when on that is so."""
+    entity, r = f"world/forgone/{forgone.robot}", _FORGONE_M
+    cross = np.array([[[-r, -r], [r, r]], [[-r, r], [r, -r]]])
+    strips = (forgone.at_m[:, None, None] + cross).reshape(-1, 2, 2)
+    pen.column(entity, [forgone.time_s], rr.LineStrips3D.columns(
+        strips=_deep(strips, _ORDERS_M), colors=[forgone.color] * len(strips)).partition([len(strips)]))
+    pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_NEW_UI)))
+
+
+def _write_lost(pen: Pen, lost: Lost, solids: Obstacles) -> None:
+    """A red cross where a robot was lost, from then on, larger than the robot, and what happened."""
+    entity, r = f"world/lost/{lost.robot}", 2.2 * lost.radius_m
+    cross = np.array([[[-r, -r], [r, r]], [[-r, r], [r, -r]]]) + lost.at_m
+    pen.column(entity, [lost.time_s], rr.LineStrips3D.columns(
+        strips=_deep(cross, _LOST_M), colors=[ALARM] * 2).partition([2]))
+    pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_CROSS_UI)))
+    # Beside it, where no name of a site or robot stands, and towards the middle of the floor, where the view ends last.
+    x0, _, x1, _ = solids.bounds_m.tolist()
+    aside = (r + _INSET * (x1 - x0)) * (1 if lost.at_m[0] < (x0 + x1) / 2 else -1)
+    at = lost.at_m[None] + [aside, 0.0]
+    pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
+        positions=_deep(at, _LOST_M), colors=[ALARM], labels=[lost.what]))
+    pen.constant(f"{entity}/what", rr.Points3D.from_fields(
+        radii=rr.Radius.ui_points(0.0), show_labels=True))
+
+
+def _write_floors(pen: Pen, floors: Sequence[Floor]) -> None:
+    """Patches of floor as plates, each with its friction."""
+    if floors:
+        boxes = np.array([floor.box for floor in floors])
+        pen.constant("world/floors", rr.Boxes3D(
+            centers=_deep(boxes[:, :2], _PATCH_M / 2), half_sizes=_deep(boxes[:, 2:4], _PATCH_M / 2),
+            quaternions=_about_z(boxes[:, 4]), colors=[floor.color for floor in floors], fill_mode="solid"))
+        pen.names("world/floors/names", [f"friction {floor.friction:g}" for floor in floors],
+                     _deep(boxes[:, :2], 0.0))
+
+
+def _write_gate(pen: Pen, gate: Gate) -> None:
+    """A dashed line across a passage: red while a robot waits before it, green else."""
+    entity = f"world/passages/{gate.name}"
+    pieces = dashes(gate.ends_m, _BAR_M, _BAR_M)
+    pen.constant(entity, rr.LineStrips3D.from_fields(
+        strips=_deep(pieces, _GATE_M), radii=rr.Radius.ui_points(_GATE_UI)))
+    colors = [list(ALARM if shut else GREEN) for shut in gate.shut for _ in pieces]
+    pen.column(entity, gate.time_s, rr.LineStrips3D.columns(
+        colors=np.array(colors, dtype=np.uint8)).partition([len(pieces)] * len(gate.shut)))
+    pen.names(f"{entity}/name", [gate.name], _deep(gate.ends_m[1:], _GATE_M))
+
+
+def _write_touched(pen: Pen, touched: Touched) -> None:
+    """Red marks where a hull touched something, each from then on, and what it was."""
+    entity = f"world/contacts/{touched.robot}"
+    pen.column(entity, touched.time_s, rr.Points3D.columns(positions=_deep(touched.at_m, _LOST_M)))
+    pen.constant(entity, rr.Points3D.from_fields(colors=[ALARM], radii=rr.Radius.ui_points(_MARK_UI)))
+    named = [k for k, what in enumerate(touched.what) if what]
+    pen.column(f"{entity}/what", touched.time_s[named], rr.Points3D.columns(
+        positions=_deep(touched.at_m[named], _LOST_M), labels=[touched.what[k] for k in named]))
+    pen.constant(f"{entity}/what", rr.Points3D.from_fields(
+        colors=[ALARM], radii=rr.Radius.ui_points(0.0), show_labels=True))
+
+
+def _write_waiting(pen: Pen, waiting: Sequence[Waiting]) -> None:
+    """What a robot waits for, and how long, above it as long as it does."""
+    for robot in dict.fromkeys(wait.robot for wait in waiting):
+        mine, entity = [wait for wait in waiting if wait.robot == robot], f"world/waits/{robot}"
+        times = [time for wait in mine for time in (wait.since_s, wait.until_s)]
+        pen.column(entity, times, rr.Points3D.columns(
+            positions=_deep(np.array([wait.at_m for wait in mine]), _LOST_M), labels=[
+                f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine],
+            colors=[ORANGE] * len(mine)).partition([1, 0] * len(mine)))
+        pen.constant(entity, rr.Points3D.from_fields(radii=rr.Radius.ui_points(_MARK_UI), show_labels=True))
+
+
+def _write_change(pen: Pen, change: Change) -> None:
+    """A robot's orders from the moment on at which they change: what was left of them thin, what is left now thick."""
+    for name, paths, color, width in (("old", change.old, pale(change.color), 1.0),
+                                      ("new", change.new, change.color, _NEW_UI)):
+        entity = f"world/orders/{change.robot}/{name}"
+        pen.constant(entity, rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(width)))
+        lines = [path for path in paths if len(path) > 1]
+        # No line is one too: it takes an earlier one away.
+        strips = [_deep(path, _ORDERS_M) if len(path) > 1 else np.zeros((1, 3), dtype=np.float32) for path in paths]
+        if lines:
+            pen.column(entity, change.time_s, rr.LineStrips3D.columns(strips=strips))
