@@ -103,9 +103,9 @@ def run(
         Summary, plans, and the outcomes and legs as Arrow tables; the same figures as those of the command.
 
     Raises:
-        UnreachableSite, NeverArrives, NoRoomForBerths, NoRoomForSlots: If a robot of a ``World`` can't get from the base
-            to a site, can't follow a path, or robots that meet don't fit about base or station; of a world's file,
-            ``BadFile`` says so with the line.
+        UnreachableSite, NeverArrives, NoRoomForBerths, NoRoomForSlots: If a robot of a ``World`` can't get from the
+            base to a site, can't follow a path, or robots that meet don't fit about base or station; of a world's
+            file, ``BadFile`` says so with the line.
         BadFile, BadInput: If something is wrong with the file, or with a value, or two don't go together.
         WorkerLost: If a worker process died.
         ValueError: If an argument is of a wrong type.
