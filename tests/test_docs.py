@@ -207,7 +207,7 @@ def test_a_world_that_stands_in_several_places_is_the_same_in_all() -> None:
 EXAMPLE = (ROOT / "examples" / "from_world_to_vss.py").read_text(encoding="utf-8")
 ALL_PYTHON = [(page.name, block) for page in PAGES for block in blocks(page, "python")
               if not block.startswith("sb.")  # signatures of the reference
-              and page.name != "extending.md"]  # whose blocks test_extending runs
+              and page.name not in ("extending.md", "recordings.md")]  # whose blocks tests of their own run
 PYTHON = [entry for entry in ALL_PYTHON if entry[1] != EXAMPLE]  # which test_examples runs
 
 
