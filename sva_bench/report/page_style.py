@@ -101,5 +101,6 @@ svg.rows .steps{{fill:none;stroke-width:1.8}}
 h2{{break-after:avoid}}nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows{{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
 summary{{list-style:none}}
-table{{font-size:8pt}}th,td,td.text{{white-space:normal;padding:.15rem .25rem}}td.long{{min-width:0}}a{{color:inherit}}}}
+table{{font-size:8pt}}
+th,td,td.text{{white-space:normal;padding:.15rem .25rem}}td.long{{min-width:0}}a{{color:inherit}}}}
 """

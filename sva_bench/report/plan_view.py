@@ -28,7 +28,7 @@ GROUND = "ground"
 _LONGEST = 420.0
 _MARGIN = 5.0  # the wall about the map
 _SCALE = 13.0  # height of the scale below it
-_LETTER, _LINE = 6.3, 12.0  # width and height of a letter of a label, a little more than on average
+_LETTER, _SMALL, _LINE = 6.8, 5.8, 12.0  # widths of letters of labels, a little more than on average; height of a line
 _RADII: dict[SiteKind, float] = {"base": 6.0, "station": 6.0, "poi": 4.5}
 _MOST_CELLS = 700  # of a grid along a side; finer ones are shown coarser
 _MOST_LABELS = 120  # sites from which on only the tooltip names them
@@ -197,13 +197,14 @@ def _sites(world: World, frame: Frame, lines_m: Sequence[FloatArray], busy: Floa
     if len(world.sites) > _MOST_LABELS:
         return "".join(parts)
     labels = [[site.name, *(_earned(world, site) if incentives and site.kind == "poi" else [])] for site in world.sites]
-    sizes = np.array([[_LETTER * max(map(len, lines)), _LINE * len(lines)] for lines in labels])
+    sizes = np.array([[max([_LETTER * len(name), *(_SMALL * len(words) for words in small)]), _LINE * (1 + len(small))]
+                      for name, *small in labels])
     drawn = [_dense(frame.at(path)) for path in lines_m]
     # Placed as in pixels of a picture of twice the size, which the gaps about labels are meant for.
     centres = place_labels(
         2 * at, 2 * sizes, radii=2 * np.array([_RADII[site.kind] for site in world.sites]),
         frame=2 * np.array([_MARGIN, _MARGIN, frame.width - _MARGIN, frame.height - _MARGIN]),
-        lines=2 * np.concatenate([*drawn, busy]), solid=2 * frame.at(within(world))) / 2
+        lines=2 * np.concatenate([*drawn, busy, np.repeat(at, 3, axis=0)]), solid=2 * frame.at(within(world))) / 2
     for lines, (x, y) in zip(labels, centres.tolist(), strict=True):
         top = y - _LINE * len(lines) / 2 + 0.78 * _LINE
         parts += [f'<text x="{_n(x)}" y="{_n(top + k * _LINE)}"{" class=small" if k else ""}>{text(words)}</text>'
@@ -229,7 +230,7 @@ def _told(world: World, site: Site) -> str:
 def _earned(world: World, site: Site) -> list[str]:
     """What each robot earns at a POI, in a few lines."""
     values = [f"{value:g}" if (value := robot.incentives.get(site.name, 0.0)) else "–" for robot in world.robots]
-    return [" | ".join(values[k:k + 4]) for k in range(0, len(values), 4)]
+    return ["|".join(values[k:k + 4]) for k in range(0, len(values), 4)]
 
 
 def _marker(kind: SiteKind, x: float, y: float) -> str:

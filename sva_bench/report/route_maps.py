@@ -20,6 +20,7 @@ from sva_bench.report.marks import marks_of, met_in
 from sva_bench.report.overlays import Mark
 from sva_bench.report.page import details, heading, note, sentence, text
 from sva_bench.report.plan_view import PlanView, frame_of, line
+from sva_bench.report.styles import MARKS, MARKS_OF_MANY
 from sva_bench.report.wording import listed, per_cent, reliability_told, with_interval
 from sva_bench.storage.run_folder import made_for
 from sva_bench.storage.stored_run import Content
@@ -151,9 +152,10 @@ class _Maps:
             marks = self._met_marks(plan) + marks  # where robots ended lies on top
         colours = ";--other:".join(hex_of(plan_color(name, number)) for name, number in plan.colours[:2])
         picture = self._view.picture(f"Routes of the {plan.title} plan in {plan.key[0]}", "".join(legs), "".join(marks))
-        robots = "".join(self._robot(robot, route, ended) for robot, route in plan.routes.items())
+        lines = "".join([*(self._robot(robot, route, ended) for robot, route in plan.routes.items()),
+                         *([] if reacts else self._met_told(plan))])
         return (f'<figure class=map><figcaption style="--plan:{colours}"><b>{text(plan.title)}</b> '
-                f"{sentence(f'executed {with_interval(plan.worth)}')}</figcaption>{picture}<ul>{robots}</ul></figure>")
+                f"{sentence(f'executed {with_interval(plan.worth)}')}</figcaption>{picture}<ul>{lines}</ul></figure>")
 
     def legend(self) -> str:
         """What is what on the maps."""
@@ -235,6 +237,13 @@ class _Maps:
                          f'{size:.1f}l{-size:.1f} {-size:.1f}z"/><text x="{x + size + 2:.1f}" y="{y + 4:.1f}">'
                          f"{mark.count}</text></g>")
         return marks
+
+    def _met_told(self, plan: _Shown) -> list[str]:
+        """A line below a map that counts all that was met; nothing where nothing was."""
+        told = [counted(number, MARKS[kind][2], MARKS_OF_MANY[kind]) for kind, rows in self._met.items()
+                if (number := sum((row["scenario"], row["planner"]) == plan.key[:2] for row in rows))]
+        draws = counted(self._content.summary.rollouts, "noise draw")
+        return [f"<li><span>{listed(told)} under {draws}</span></li>"] if told else []
 
     def _robot(self, robot: str, route: Route, ended: Sequence[Ended]) -> str:
         """A line of the list below a map: where a robot goes, and how it ends."""

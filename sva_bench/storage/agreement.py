@@ -191,7 +191,8 @@ def _grouped(piece: pa.Table) -> list[_Group]:
 def _numbered(piece: pa.Table) -> Iterator[tuple[Key, int, str, IntArray]]:
     """Numbers of the histories of each plan, noise draw and robot, of the rows that have one."""
     found = piece.filter(pc.greater_equal(piece.column("history"), 0)).group_by(
-        ["scenario", "planner", "policy", "news", "rollout", "robot"], use_threads=False).aggregate([("history", "list")])
+        ["scenario", "planner", "policy", "news", "rollout", "robot"], use_threads=False).aggregate(
+            [("history", "list")])
     histories = found.column("history_list")
     for number, row in enumerate(found.drop_columns("history_list").to_pylist()):
         key = row["scenario"], row["planner"], row["policy"], row["news"]

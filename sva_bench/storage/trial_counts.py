@@ -74,7 +74,8 @@ class Counting:
         """Count some rows, which go on where the last ones ended."""
         # A robot that fails by draw along its route is not available, and lost; one that never sets out isn't lost.
         left = piece.append_column("left", pc.or_(piece.column("available"), piece.column("lost")))
-        found = left.group_by([*_KEY, "robot", "end", "stops_reached", "left"], use_threads=False).aggregate([("weight", "sum")])
+        found = left.group_by([*_KEY, "robot", "end", "stops_reached", "left"], use_threads=False).aggregate(
+            [("weight", "sum")])
         for row in found.to_pylist():
             mine = self._ended.setdefault((row["scenario"], row["planner"], row["policy"], row["news"]), Counter())
             mine[row["robot"], row["end"], row["stops_reached"], row["left"]] += row["weight_sum"]
@@ -85,7 +86,8 @@ class Counting:
         self._add_values(kept.slice(0, whole))
 
     def _add_values(self, rows: pa.Table) -> None:
-        found = rows.group_by(["scenario", "planner", "trial"], use_threads=False).aggregate([("value", "sum"), ("value", "count")])
+        found = rows.group_by(["scenario", "planner", "trial"], use_threads=False).aggregate(
+            [("value", "sum"), ("value", "count")])
         for key in found.select(["scenario", "planner"]).group_by(["scenario", "planner"]).aggregate([]).to_pylist():
             plan = key["scenario"], key["planner"]
             mine = found.filter(pc.and_(pc.equal(found.column("scenario"), plan[0]),

@@ -137,8 +137,11 @@ def test_the_page_shows_where_and_how_often(finished: Run) -> None:
     contacts = table(finished.folder, "contacts")
     mine = contacts.filter(pc.equal(contacts["planner"], "stochastic")).num_rows
     # Both plans have the same routes here, so they share a map.
-    assert re.search(rf"nominal stochastic, nominal deterministic: {mine} contacts? with (an )?obstacles? and "
-                     r"\d+ waits? under 8 noise draws", text)
+    assert text.count("<figure class=map>") == 1
+    assert "<b>stochastic and deterministic</b>" in text
+    assert re.search(rf"{mine} contacts? with (an )?obstacles? and \d+ waits? under 8 noise draws", text)
+    marked = re.findall(r'<g class="met contact">.*?>(\d+)</text></g>', text)
+    assert sum(map(int, marked)) == mine
     assert "What robots waited for" in text
 
 
