@@ -23,6 +23,10 @@ from sva_bench.world.model import World
 
 # Measured on a core of a shared virtual machine, over the shipped worlds: within a factor of two of each, cold.
 _PATHS_S, _PLANS_S, _CALIBRATION_S, _REACTION_S, _ROW_S = 1.0, 1.2, 9.0, 2.5, 1.5e-6
+_UNIT_S = 0.15
+"""Of a unit, whatever its trials: reading what is cached, facts, its table and its share of the summary."""
+_STARTED_S = 4.5
+"""Of this process and a worker, which load their libraries: most of it where all is cached."""
 _REAL_TIME = 800.0
 """Speed of physics relative to real time."""
 _TWIN_TIME = 8000.0
@@ -57,11 +61,16 @@ def estimates(grid: Grid, cache: Cache, folder: Path, progress: OnProgress = lam
     return listed
 
 
+def total_s(listed: Sequence[StrandCost]) -> float:
+    """Estimated processor time of all of them with one worker process [s]."""
+    return sum(e.processor_s for e in listed) + (_STARTED_S if any(e.units for e in listed) else 0.0)
+
+
 def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: Cache, seen: set[str]) -> StrandCost:
     world = point.world
     left = [count for first, count in grid.ranges() if grid.unit_name(point, seed, first) not in done]
     rows = sum(left) * len(world.scenarios) * (2 if grid.options.calibrate is None else 3) * len(world.robots)
-    seconds = rows * _ROW_S
+    seconds = rows * _ROW_S + len(left) * _UNIT_S
     if grid.options.fidelity == "physics":
         seconds += rows * _DRIVEN * _mission_s(point) / _REAL_TIME
     steps = strand(grid, point, seed, done)

@@ -230,13 +230,13 @@ def status(folder: Folder, as_json: AsJson = False, wide: Wide = False) -> None:
 def _list(grid: Grid, folder: Path, cache: Path | None, as_json: bool, *, wide: bool) -> None:
     with loading():
         from sva_bench.batch.cache import Cache, default_folder
-        from sva_bench.batch.estimates import estimates
+        from sva_bench.batch.estimates import estimates, total_s
         from sva_bench.cli.watching import print_grid
 
     with progress_bars() as progress:
         listed = estimates(grid, Cache(folder=cache or default_folder()), folder, progress)
     if as_json:
-        print_json({"format": "sva-bench/batch-grid@1", "strands": [
+        print_json({"format": "sva-bench/batch-grid@1", "processor_s": round(total_s(listed), 1), "strands": [
             {"world": e.point.world.name, "variant": e.point.variant, "seed": e.seed, "units": e.units, "rows": e.rows,
              "disk_mb": round(e.disk_bytes / 1e6, 3), "processor_s": round(e.processor_s, 1)} for e in listed]})
     else:

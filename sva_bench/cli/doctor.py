@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import typer
 
 from sva_bench.cli.loading import loading
@@ -28,6 +30,9 @@ def doctor(as_json: AsJson = False) -> None:
         width = max(len(one.part) for one in checked)
         for one in checked:
             state = {"ok": "ok     ", "missing": "missing", "failed": "FAILED "}[one.state]
-            results().print(f"{state} {one.part:{width}}  {one.found}", highlight=False, markup=False, soft_wrap=True)
+            head, console = f"{state} {one.part:{width}}  ", results()
+            for line in textwrap.wrap(head + one.found, console.width, subsequent_indent=" " * len(head),
+                                      break_long_words=False, break_on_hyphens=False):
+                console.print(line, highlight=False, markup=False, soft_wrap=True)
     if broken:
         raise typer.Exit(ExitCode.FAULT)

@@ -150,9 +150,11 @@ def _lines(sheet: Sheet, above: int, heads: _Break, cells: _Break, width: int) -
     found = [(indent + line, True) for line in _joined(
         [[""] * (tall - len(lines)) + lines for lines in head], columns, widths)]
     found.append((indent + _GAP.join("─" * room for room in widths), True))
+    before = ""
     for number, row in enumerate(rows):
-        if any(sheet.rows[number][:above]):
-            label = ", ".join(cell for cell in sheet.rows[number][:above] if cell)
+        label = ", ".join(cell for cell in sheet.rows[number][:above] if cell)
+        if label and label != before:
+            before = label
             found += [(line, True) for line in textwrap.wrap(label, width, subsequent_indent=_GAP,
                                                              break_long_words=False, break_on_hyphens=False)]
         found += [(indent + line, False) for line in _joined(row, columns, widths)]

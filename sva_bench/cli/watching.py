@@ -15,7 +15,7 @@ from rich.text import Text
 from sva_bench.analysis.compared_values import KeyComparison
 from sva_bench.analysis.over_maps import BatchSummary, GivenUp, OverMaps, ReactionOverMaps, UnitSummary
 from sva_bench.analysis.reach import maps_without_reach
-from sva_bench.batch.estimates import StrandCost
+from sva_bench.batch.estimates import StrandCost, total_s
 from sva_bench.batch.run import BatchProgress
 from sva_bench.cli.sheets import Column, Sheet, fitted, print_sheet
 from sva_bench.cli.terminal import messages, results
@@ -204,7 +204,7 @@ def print_grid(listed: Sequence[StrandCost], *, wide: bool = False) -> None:
         for number, e in enumerate(listed[:_MOST_LISTED])]), console, wide=wide)
     if len(listed) > _MOST_LISTED:
         console.print(f"and {len(listed) - _MOST_LISTED} more", highlight=False)
-    seconds = sum(e.processor_s for e in listed)
+    seconds = total_s(listed)
     console.print(f"{counted(sum(e.units for e in listed), 'unit')}, {counted(sum(e.rows for e in listed), 'row')}; "
                   f"about {sum(e.disk_bytes for e in listed) / 1e6:.1f} MB and {timedelta(seconds=round(seconds))} of "
                   "processor time, to be divided by the number of workers. Time is rough until travel times and plans "

@@ -10,7 +10,7 @@ import pytest
 
 from sva_bench.__main__ import run_command_line
 from sva_bench.batch.cache import Cache
-from sva_bench.batch.estimates import estimates
+from sva_bench.batch.estimates import estimates, total_s
 from sva_bench.batch.folder import begin, settings_in
 from sva_bench.batch.grid import grid_of as grid_from
 from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
@@ -407,6 +407,9 @@ def test_a_dry_run_counts_what_is_left(tmp_path: Path) -> None:
     listed = estimates(grid, Cache(folder=tmp_path / "cache"), tmp_path / "out")
     assert [(e.units, e.rows) for e in listed] == [(3, 25 * 2 * 2 * 2)] * 2
     assert listed[0].processor_s > 0
+    # Where all is cached there is still the start of two processes, and something for each unit.
+    assert total_s(listed) > sum(e.processor_s for e in listed) > 6 * 0.1
+    assert total_s([]) == 0
     done = sva_bench("batch", world(tmp_path), "--trials", 25, "--dry-run", "--cache", "cache", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "1 unit, 200 rows" in done.stdout

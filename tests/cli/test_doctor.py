@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -42,3 +43,14 @@ def test_what_is_missing_for_one_option_is_said_with_what_to_install_and_is_no_f
     parts = {part["part"]: part for part in json.loads(done.stdout)["parts"]}
     assert parts["pictures"]["state"] == parts["browser"]["state"] == "missing"
     assert "mesa-vulkan-drivers" in parts["pictures"]["found"]
+
+
+def test_lines_fit_eighty_columns_and_take_seconds_of_processor_time() -> None:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run([sys.executable, "-m", "sva_bench", "doctor"], text=True, capture_output=True, check=False,
+                          env={key: value for key, value in os.environ.items() if key != "COLUMNS"})
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert all(line.startswith(("ok ", "missing ", " ")) for line in done.stdout.splitlines())
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 10  # 1.5 s measured

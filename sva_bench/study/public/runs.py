@@ -92,8 +92,7 @@ def run(
         informed: Execute as well what somebody would plan who knew beforehand who is available.
         assumptions: Execute the plans made for each failure process under all of them.
         precision: Go on until the executed VSS is known to so many per cent of the stochastic mean: 1 or ``"1%"``.
-        anytime: With ``precision``: stop by intervals that hold whenever a run stops, wider ones.
-        max_trials: With ``precision``: trials at which to stop all the same, 100 000 by default.
+        anytime, max_trials: With ``precision``: stop by intervals that hold at any stop; the most trials (100 000).
         interaction, departures: As in world files: ``shared`` and its like, ``together`` or ``staggered``.
         out: Folder that receives the run folder.
         workers: Processes that drive; by default one a core. A script needs no guard of its main module for them.
