@@ -125,7 +125,7 @@ def test_every_command_in_the_text_of_a_page_is_one() -> None:
 
 PYTHON = [(page.name, block) for page in PAGES for block in blocks(page, "python")
           if not block.startswith("sb.")  # signatures of the reference
-          and page.name != "extending.md"]  # whose blocks test_extending runs
+          and page.name not in ("extending.md", "recordings.md")]  # whose blocks tests of their own run
 EXAMPLE = (ROOT / "examples" / "from_world_to_vss.py").read_text(encoding="utf-8")
 
 
