@@ -32,7 +32,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 @pytest.mark.parametrize(("word", "told"), [
     ("S9:1", "there is no scenario 'S9'; known: half, safe"), ("half:20", "the first is 0, the last 19"),
-    ("-1", "expected a trial's number"), ("best", "expected a trial's number"), ("", "expected a trial's number"),
+    ("-1", "expected a trial's number"), ("best", "expected a trial's number"), ("", "its value is empty"),
 ])
 @pytest.mark.parametrize("command", ["run", "execute"])
 def test_a_recording_that_cannot_be_is_refused_before_anything_is_done(
@@ -62,7 +62,7 @@ def test_a_video_that_cannot_be_is_refused(arguments: tuple[str, ...], told: str
 
 @pytest.mark.parametrize(("arguments", "told"), [
     ((), "say which with --trial"),
-    (("--trial", "-1"), "is not in the range"),
+    (("--trial", "-1"), "expected at least 0"),
     (("--trial", "20", "--scenario", "half"), "no such trial; the first is 0, the last 19"),
     (("--trial", "1"), "the run has several"),
     (("--trial", "1", "--scenario", "S9"), "the run has none of that name"),
