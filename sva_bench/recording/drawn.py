@@ -205,7 +205,7 @@ def _write_lost(pen: Pen, lost: Lost, solids: Obstacles) -> None:
     aside = (r + _INSET * (x1 - x0)) * (1 if lost.at_m[0] < (x0 + x1) / 2 else -1)
     at = lost.at_m[None] + [aside, 0.0]
     pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
-        positions=_deep(at, _LOST_M), colors=[ALARM], labels=[lost.what]))
+        positions=_deep(at, _LOST_M), colors=[pale(ALARM)], labels=[lost.what]))  # light: names have dark shields
     pen.constant(f"{entity}/what", rr.Points3D.from_fields(
         radii=rr.Radius.ui_points(0.0), show_labels=True))
 
