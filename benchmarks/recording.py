@@ -22,7 +22,7 @@ from sva_bench.world.noise import Noise
 
 ROBOTS, POIS, LEG_S, MISSION_S, POSES_HZ = 4, 40, 60.0, 600.0, 20
 SPEED_M_S, SIDE_M = 0.5, 40.0
-MOST_S, MOST_MB = 0.2, 3.0
+MOST_S, MOST_MB = 0.2, 4.0
 
 
 def world() -> World:

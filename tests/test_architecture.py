@@ -30,7 +30,7 @@ ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet_utils": ("execution/engines/bullet.py",), "ompl": ("travel/roadmap.py",),
     "highspy": ("solver/highs.py",), "rerun": (
         "recording/rerun.py", "recording/pen.py", "recording/drawn.py", "recording/charts.py", "recording/layout.py",
-        "recording/read_back.py"),
+        "recording/read_back.py", "recording/live.py"),
     "networkx": ("solver/flow/cuts.py",),
     "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py", "recording/pictures.py", "recording/frames.py",
                                                "recording/video.py"),

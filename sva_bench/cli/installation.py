@@ -183,8 +183,19 @@ def _distributed() -> str:
     return "distributed, for batch --dask"
 
 
+def _optional(package: str, extra: str, what: str) -> Callable[[], str]:
+    """A check of an optional package."""
+    def check() -> str:
+        if find_spec(package) is None:
+            raise _Missing(f"for {what}: pip install 'sva-bench[{extra}]'")
+        return f"{package}, for {what}"
+    return check
+
+
 _CHECKS: dict[str, Callable[[], str]] = {
     "sva-bench": lambda: __version__, "Python": _python, "libraries": _libraries, "physics": _physics,
     "path planner": _planner, "solver": _solver, "recordings": _recording, "pictures": _pictures, "browser": _browser,
+    "videos": _optional("av", "video", "view --video OUT.mp4"),
+    "bags": _optional("mcap_ros2", "mcap", "export --to mcap"),
     "cluster": _distributed, "folders": _folders, "machine": _machine}
 

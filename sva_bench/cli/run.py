@@ -85,6 +85,8 @@ def run(
         min=1, max=MOST_TRIALS, help="With --precision: trials at which to stop all the same.",
         show_default="100000")] = None,
     record: RecordWords = None,
+    live: Annotated[bool, typer.Option("--live", help="Show robots in the Rerun viewer as they drive, under the first "
+                                       "noise draw.")] = False,
     out: Out = Path("runs"),
     workers: WorkerCount = None,
     csv: AsCsv = False,
@@ -99,6 +101,7 @@ def run(
     with loading():
         from sva_bench.analysis.calibration import target_of
         from sva_bench.analysis.precision import precision_of
+        from sva_bench.recording.viewer import refuse_without_screen, watching
         from sva_bench.study.inputs import about, load
         from sva_bench.study.recordings import asks_of
 
@@ -113,8 +116,13 @@ def run(
     target = None if calibrate is None else target_of(calibrate)
     policies, heard = policies_of(policy or ()), news_of(news or ())
     check_folder(out, "--out")
+    if live:
+        refuse_without_screen()
     loaded = load(world, scenario, margin, plan_failure, execute_failure, interaction, departures)
     check_reactions(loaded, policies, heard, anticipate=anticipate)
+    if live and loaded.meets:
+        raise BadInput("--live: robots that meet are played mission by mission, and not seen before it is over; leave "
+                       "it out, and see the recordings afterwards")
     recorded = asks_of(record or (), [told.name for told in loaded.scenarios], trials)
     load_libraries()  # after the world is read: an error in the file is said at once
     with loading():
@@ -129,7 +137,7 @@ def run(
                       assumptions=assumptions, policies=policies, news=heard, anticipate=anticipate,
                       calibrate=target, precision=asked, record=recorded)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
-        result = run_bench(loaded, options, out, executor, progress)
+        result = run_bench(loaded, options, out, executor, progress, watching(loaded) if live else None)
     _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
 
 

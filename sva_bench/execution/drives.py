@@ -43,6 +43,9 @@ RouteKey = tuple[str, Route, int, int]
 HopKey = tuple[str, Disturbance, str, str]
 """Kind of robot, disturbance, origin and destination: what a hop depends on in one world."""
 
+Watch = Callable[[str, Driven], None]
+"""What follows drives as they are made."""
+
 
 @dataclass(eq=False, kw_only=True)
 class Drives:
@@ -53,12 +56,14 @@ class Drives:
         whole: Routes as they were driven whole.
         routes: Routes, driven whole or composed, with what the robot's tank holds and where it has to wait.
         missions: Missions of robots that share a world.
+        watch: Told of each drive whose poses are kept, as it is made: the robot or kind of robot, and the drive.
     """
 
     hops: dict[HopKey, Driven] = field(default_factory=dict)
     whole: dict[RouteKey, Driven] = field(default_factory=dict)
     routes: dict[RouteKey, Driven] = field(default_factory=dict)
     missions: dict[MissionKey, TeamDriven] = field(default_factory=dict)
+    watch: Watch | None = None
 
     @property
     def of_missions(self) -> list[Driven]:
@@ -248,6 +253,8 @@ def receive(drives: Drives, chunk: Chunk, driven: Sequence[Driven]) -> None:
             drives.hops[key] = result
         else:
             drives.whole[key] = result
+        if drives.watch is not None and len(result.pose):
+            drives.watch(key[0], result)
 
 
 def drive_all(

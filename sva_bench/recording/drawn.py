@@ -37,9 +37,7 @@ _NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sit
 
 def write_map(pen: Pen, story: Story) -> None:
     """Write all that is seen on the map."""
-    _write_solids(pen, story.solids)
-    for marks in story.marks:
-        _write_marks(pen, marks, story.solids)
+    write_ground(pen, story.solids, story.marks)
     for robot in story.views:
         _write_robot(pen, robot)
     for lost in story.lost:
@@ -54,6 +52,31 @@ def write_map(pen: Pen, story: Story) -> None:
     _write_waiting(pen, story.waiting)
     for change in story.changes:
         _write_change(pen, change)
+
+
+def write_ground(pen: Pen, solids: Obstacles, sites: Sequence[Marks]) -> None:
+    """Write floor, walls and sites."""
+    _write_solids(pen, solids)
+    for marks in sites:
+        _write_marks(pen, marks, solids)
+
+
+def write_drive(pen: Pen, entity: str, time_s: FloatArray, pose: FloatArray, radius_m: float, color: Color) -> None:
+    """Write a robot as it drives, and the line that it leaves.
+
+    Args:
+        pen, entity: Where.
+        time_s: When it is where, shape (n,).
+        pose: x, y [m], yaw [rad], shape (n, 3).
+        radius_m, color: Its radius and colour.
+    """
+    pen.column(f"{entity}/robot", time_s, rr.Transform3D.columns(
+        translation=_deep(pose[:, :2], 0.0), quaternion=_about_z(pose[:, 2])))
+    pen.constant(f"{entity}/robot/body", rr.Cylinders3D(
+        centers=[[0, 0, radius_m]], radii=[radius_m], lengths=[2 * radius_m], colors=[color], fill_mode="solid"))
+    pen.column(f"{entity}/line", time_s[-1:], rr.LineStrips3D.columns(
+        strips=_deep(pose[None, :, :2], _DRIVEN_M)))
+    pen.constant(f"{entity}/line", rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(1.75)))
 
 
 def _deep(points: FloatArray, z_m: float) -> NDArray[np.float32]:
@@ -182,7 +205,7 @@ def _write_lost(pen: Pen, lost: Lost, solids: Obstacles) -> None:
     aside = (r + _INSET * (x1 - x0)) * (1 if lost.at_m[0] < (x0 + x1) / 2 else -1)
     at = lost.at_m[None] + [aside, 0.0]
     pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
-        positions=_deep(at, _LOST_M), colors=[ALARM], labels=[lost.what]))
+        positions=_deep(at, _LOST_M), colors=[pale(ALARM)], labels=[lost.what]))  # light: names have dark shields
     pen.constant(f"{entity}/what", rr.Points3D.from_fields(
         radii=rr.Radius.ui_points(0.0), show_labels=True))
 

@@ -62,6 +62,21 @@ def layout_of_pair(stories: Mapping[str, Story]) -> rrb.Blueprint:
     return _whole(rrb.Vertical(maps, states, charts, row_shares=[10, 1.6 * lanes, 6]), longest)
 
 
+def layout_of_drives(title: str, kinds: Sequence[str], eye_m: Sequence[float], target_m: Sequence[float]
+                     ) -> rrb.Blueprint:
+    """The map alone, followed as robots drive; of the lines that they leave all are seen."""
+    whole = rrb.VisibleTimeRanges(
+        timeline=TIMELINE, start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.cursor_relative())
+    space = rrb.Spatial3DView(
+        origin="world", name=title, background=rrb.Background(kind="SolidColor", color=_BACKGROUND), line_grid=False,
+        eye_controls=rrb.EyeControls3D(kind="Orbital", position=eye_m, look_target=target_m, eye_up=(0, 0, 1)),
+        overrides=dict.fromkeys([f"world/drives/{kind}/line" for kind in kinds], whole))
+    return rrb.Blueprint(
+        space, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"), auto_layout=False,
+        auto_views=False)
+
+
 def _whole(views: rrb.Container, story: Story) -> rrb.Blueprint:
     return rrb.Blueprint(
         views, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"),

@@ -27,10 +27,13 @@ from sva_bench.recording.drawn import write_map
 from sva_bench.recording.layout import layout_of, layout_of_pair
 from sva_bench.recording.pen import TIMELINE as TIMELINE
 from sva_bench.recording.pen import Pen, part
+from sva_bench.recording.pictures import has_notice
 from sva_bench.recording.story import Story, story_of
 from sva_bench.world.model import World
 
 _SETTLE_S, _SETTLE_TRIES = 0.5, 40  # between pictures; a third or fourth one is the last, on a slow machine a tenth
+
+_NOTICE_TRIES = 16  # as often as it is looked whether a notice is gone: it lasts some seconds
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,6 +154,11 @@ def photograph(port: int, path: Path, picture: Path, at_s: float) -> None:
         RuntimeError: If the viewer doesn't answer, or can't.
     """
     client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+    for _ in range(_NOTICE_TRIES):  # a slow viewer tells where it listens; what would come later is not told
+        client.save_screenshot(str(picture.resolve()))
+        if not has_notice(picture.read_bytes()):
+            break
+        time.sleep(_SETTLE_S)
     client.open(str(path.resolve()))
     client.set_time(TIMELINE, duration=at_s, play_state="paused")
     _hide_panels(client)

@@ -178,6 +178,16 @@ class Story:
     target_m: tuple[float, float, float]
 
 
+def ground_of(world: World) -> tuple[Obstacles, tuple[Marks, ...]]:
+    """What stands in a world, and its sites before anybody visits them."""
+    return world.obstacles.walled(_WALL_M), _marks(world, (), {}, ())
+
+
+def eye_of(world: World) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Camera position and target [m] from which the whole floor is seen."""
+    return _eye(world.obstacles.bounds_m)
+
+
 def story_of(
     world: World, traces: Sequence[Trace], title: str, news: Sequence[NewsHeard] = (), about: About | None = None,
     routes: Mapping[str, Sequence[str]] | None = None,

@@ -14,12 +14,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sva_bench.errors import BadFile, BadInput, ExitCode, SvaBenchError
 from sva_bench.files.atomic import write_file
 from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.recording.browser import page_of
+
+if TYPE_CHECKING:
+    from sva_bench.recording.live import Live
+    from sva_bench.world.model import World
 
 _log = logging.getLogger(__name__)
 
@@ -94,6 +99,42 @@ def view(files: Sequence[Path], *, web: bool, screenshot: Path | None, at_s: flo
         _serve(files, say)
     else:
         _show(files)
+
+
+def watching(world: World) -> Live:
+    """Open the viewer's window for drives of a world, as they are made; it stays until somebody closes it.
+
+    Nothing but this machine can reach it.
+
+    Raises:
+        BadInput: If there is no screen.
+        ViewerFailed: If the viewer doesn't start.
+    """
+    refuse_without_screen()
+    with holding_back_ctrl_c():
+        from sva_bench.recording.live import connected  # as above
+
+    port = _free_port()
+    process = subprocess.Popen([*program(), *_at(port), "--expect-data-soon"], env={**os.environ, **_DISCREET},
+                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                               start_new_session=True)
+    try:
+        _await(process, port)
+    except RuntimeError as error:
+        process.kill()
+        raise ViewerFailed(f"{error}; leave out --live") from error
+    return connected(world, port)
+
+
+def refuse_without_screen() -> None:
+    """Refuse to open a window where there is none.
+
+    Raises:
+        BadInput: If there is no screen.
+    """
+    if not _has_screen():
+        raise BadInput("--live opens a window, and there is no screen here: leave it out, and see the recordings "
+                       "afterwards with 'sva-bench view' and --web, --screenshot or --video")
 
 
 def recordings_of(path: Path) -> tuple[Path, ...]:

@@ -11,7 +11,7 @@ from sva_bench.analysis.reactions import reaction_result
 from sva_bench.analysis.summaries import Summary
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Case, Settings
-from sva_bench.execution.drives import Drives
+from sva_bench.execution.drives import Drives, Watch
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
 from sva_bench.execution.react import Reacted
@@ -48,14 +48,20 @@ class Measured:
     reacted: tuple[Reacted, ...] = ()
 
 
-def run(world: World, options: Options, out: Path, executor: Executor | None, progress: OnProgress) -> Run:
+def run(world: World, options: Options, out: Path, executor: Executor | None, progress: OnProgress,
+        watch: Watch | None = None) -> Run:
     """Plan, execute, measure and record a world's mission, and write the run folder.
+
+    Args:
+        world, options, out, executor, progress: What is run, how and where, and what is told of it.
+        watch: Follows the drives as they are made.
 
     Raises:
         BadInput: If there are too many trials, or the folder can't be written.
         UnreachableSite: If a site can't be reached.
     """
-    return publish_run(world, options, measure(world, options, executor, progress), out, progress, executor=executor)
+    done = measure(world, options, executor, progress, watch)
+    return publish_run(world, options, done, out, progress, executor=executor)
 
 
 def publish_run(
@@ -72,8 +78,9 @@ def publish_run(
                    progress, command=command, reacted=done.reacted)
 
 
-def measure(world: World, options: Options, executor: Executor | None, progress: OnProgress) -> Measured:
-    """Plan, execute and measure a world's mission.
+def measure(world: World, options: Options, executor: Executor | None, progress: OnProgress,
+            watch: Watch | None = None) -> Measured:
+    """Plan, execute and measure a world's mission; the arguments are those of ``run``.
 
     Raises:
         BadInput: If there are more trials than a run can keep in memory.
@@ -90,7 +97,7 @@ def measure(world: World, options: Options, executor: Executor | None, progress:
     cases = [case for scenario in world.scenarios for case in _cases_of(world, scenario, planned[scenario.name])]
     refuse_trials_beyond_memory(world, costs, [case for case in cases if case.role in ("stochastic", "deterministic")],
                                 options, settings_of(world, options))
-    drives = Drives()
+    drives = Drives(watch=watch)
     reach = reach_of(world, costs)
     while True:
         settings = settings_of(world, options)
