@@ -16,6 +16,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
+from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
 from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
@@ -101,6 +102,19 @@ def record_pair(path: Path, world: World, sides: Sequence[Side], *, title: str) 
 def _write(path: Path, title: str, stories: Mapping[str, Story], layout: rrb.Blueprint,
            properties: Mapping[str, str | int | float]) -> None:
     """Write stories, each below its path, as one recording."""
+    try:
+        content = _encoded(title, stories, layout, properties)
+    finally:
+        # Else the library keeps two threads of each recording to the end of the process, and they wake all the time;
+        # those of the layout, which it sends on a stream of its own, it keeps all the same.
+        flush_and_cleanup_orphaned_recordings()
+    unfinished = path.with_name(f"{path.name}.tmp")
+    with by_way_of(unfinished, path):
+        unfinished.write_bytes(content)
+
+
+def _encoded(title: str, stories: Mapping[str, Story], layout: rrb.Blueprint,
+             properties: Mapping[str, str | int | float]) -> bytes:
     # Layouts are kept per application id, so each recording has its own. The recording's id follows from its content:
     # the same trial is the same recording, and two that are opened together stay apart.
     recording = rr.RecordingStream(_application(title), recording_id=_identity(title, stories), send_properties=False)
@@ -120,9 +134,7 @@ def _write(path: Path, title: str, stories: Mapping[str, Story], layout: rrb.Blu
         if len(stories) > 1:
             _write_compared(Pen(stream=recording), stories)
         recording.flush()
-        unfinished = path.with_name(f"{path.name}.tmp")
-        with by_way_of(unfinished, path):
-            unfinished.write_bytes(memory.drain_as_bytes())
+        return memory.drain_as_bytes()
     finally:
         recording.disconnect()
 

@@ -112,6 +112,17 @@ def test_another_mission_is_another_recording(tour: Path, tmp_path: Path) -> Non
     assert one.recording_id != other.recording_id
 
 
+def test_recordings_leave_no_threads_but_those_of_their_layouts(tmp_path: Path) -> None:
+    def threads() -> int:
+        return len(list(Path("/proc/self/task").iterdir()))
+
+    record(tmp_path / "first.rrd", WORLD, [trace("uv1")], title="first")
+    before = threads()
+    for number in range(5):
+        record(tmp_path / f"{number}.rrd", WORLD, [trace("uv1")], title=f"mission {number}")
+    assert threads() <= before + 5 * 2
+
+
 def test_a_failed_recording_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="one trace per robot"):
         record(tmp_path / "x.rrd", WORLD, [], title="nobody")
