@@ -198,8 +198,8 @@ def test_a_page_has_their_section_and_is_the_same_again(finished: Finished) -> N
     text = page.decode()
     assert "Robots in one world" in text
     assert "Interaction shared: they drive in one world, coordinated" in text
-    assert "<!-- berth of a robot -->" in text  # as the picture's legend has it
-    assert "<!-- slot of a station -->" in text
+    assert "<title>berth of uv1</title>" in text
+    assert "<title>slot of " in text
     for figure in ("0.50", "3.8", "0.25", "75.0"):
         assert f">{figure}<" in text
     report_again(finished.run.folder)
