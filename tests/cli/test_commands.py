@@ -52,7 +52,7 @@ def test_a_run_leaves_every_file_of_the_contract(finished: tuple[Path, dict[str,
     found = {str(path.relative_to(run)) for path in run.rglob("*") if path.is_file()}
     assert found == {
         "manifest.json", "travel_times.parquet", "legs.parquet", "instance-half.json", "instance-safe.json",
-        "outcomes.parquet", "paths.parquet", "summary.json", "report.html",
+        "outcomes.parquet", "summary.json", "report.html", "paths.parquet", "recordings/half+compare.rrd",
         *(f"plans/{stem}.json" for stem in stems), *(f"recordings/{stem}.rrd" for stem in stems)}
     checked = subprocess.run([str(Path(sys.executable).with_name("rerun")), "rrd", "verify",
                               *map(str, (run / "recordings").iterdir())], capture_output=True, check=False)

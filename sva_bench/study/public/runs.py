@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -46,10 +47,11 @@ from sva_bench.study.public.plans import plan_given
 from sva_bench.study.public.results import Result
 from sva_bench.study.reacting import check_reactions, news_of, policies_of, refuse_the_name
 from sva_bench.study.recording_files import about_of, record_team, record_trial
-from sva_bench.study.recordings import Recorded
+from sva_bench.study.recordings import Recorded, asks_of
 from sva_bench.study.run import measure, publish_run
 from sva_bench.workers.pool import count_of, local_workers
 from sva_bench.workers.progress import OnProgress
+from sva_bench.world.model import World
 
 PlanLike = Plan | str | os.PathLike[str]
 
@@ -64,7 +66,8 @@ def run(
     gap: float = 1e-6, evpi: bool = False, informed: bool = False, assumptions: bool = False,
     calibrate: float | str | None = None, precision: float | str | None = None, anytime: bool = False,
     max_trials: int | None = None, interaction: Interaction | None = None, departures: Departures | None = None,
-    out: PathLike | None = None, workers: int | None = None, progress: OnProgress | None = None,
+    record: str | Sequence[str] | None = None, out: PathLike | None = None, workers: int | None = None,
+    progress: OnProgress | None = None,
 ) -> Result[Summary]:
     """Plan, execute and measure a mission, as ``sva-bench run`` does; nothing is written unless ``out`` says where.
 
@@ -94,6 +97,7 @@ def run(
         precision: Go on until the executed VSS is known to so many per cent of the stochastic mean: 1 or ``"1%"``.
         anytime, max_trials: With ``precision``: stop by intervals that hold at any stop; the most trials (100 000).
         interaction, departures: As in world files: ``shared`` and its like, ``together`` or ``staggered``.
+        record: Trials to record beside typical ones, as in ``"S3:17"`` or ``"worst"``; with ``out``.
         out: Folder that receives the run folder.
         workers: Processes that drive; by default one a core. A script needs no guard of its main module for them.
         progress: Called with what is being done, how much of it is done, and how much there is.
@@ -119,7 +123,7 @@ def run(
         precision=_precision(precision, max_trials, trials, rollouts, anytime=flag("anytime", anytime))))
     read, path = world_given(world, scenario, margin, _process("plan_failure", plan_failure),
                              _process("execute_failure", execute_failure), interaction, departures)
-    check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
+    options = _checked(options, record, read)
     with nullcontext() if path is None else about(path), local_workers(_workers(workers), PRELOAD) as executor:
         done = measure(read, options, executor, told)
         put = None if place is None else publish_run(read, options, done, place, told, _command(), executor)
@@ -134,8 +138,8 @@ def execute(
     planner: PathPlanner = "prmstar", scenario: str | Sequence[str] | None = None, margin: float | None = None,
     execute_failure: FailureProcess | None = None, policy: PolicyName | Sequence[PolicyName] | None = None,
     news: News | Sequence[News] | None = None, anticipate: bool = False, interaction: Interaction | None = None,
-    departures: Departures | None = None, out: PathLike | None = None, workers: int | None = None,
-    progress: OnProgress | None = None,
+    departures: Departures | None = None, record: str | Sequence[str] | None = None, out: PathLike | None = None,
+    workers: int | None = None, progress: OnProgress | None = None,
 ) -> Result[ComparisonSummary]:
     """Execute plans from anywhere in a world and compare them pair by pair, as ``sva-bench execute`` does.
 
@@ -145,7 +149,7 @@ def execute(
         allow_infeasible: Drive plans that break fuel capacity or mission limit too; each is warned of.
         seed, trials, rollouts, fidelity, planner, scenario, margin, execute_failure, policy, news, anticipate: As for
             ``run``.
-        interaction, departures, out, workers, progress: As for ``run``.
+        interaction, departures, record, out, workers, progress: As for ``run``.
 
     Returns:
         Summary with the comparisons, and the outcomes and legs as Arrow tables.
@@ -169,7 +173,7 @@ def execute(
     named = _named(plans)
     read, path = world_given(world, scenario, margin, None, _process("execute_failure", execute_failure), interaction,
                              departures)
-    check_reactions(read, options.policies, options.news, anticipate=options.anticipate)
+    options = _checked(options, record, read)
     refuse_the_name(named, anticipate=options.anticipate)
     bare = without_times(read)
     labels: dict[str, Path | str] = {name: _label(plans, name, plan) for name, plan in named.items()}
@@ -259,6 +263,17 @@ def _options(
         planner=choice("planner", planner, PathPlanner), limits=rest.limits, evpi=rest.evpi, informed=rest.informed,
         assumptions=rest.assumptions, policies=rest.policies, news=rest.news, anticipate=rest.anticipate,
         calibrate=rest.calibrate, precision=rest.precision)
+
+
+def _checked(options: Options, record: str | Sequence[str] | None, world: World) -> Options:
+    """The options, if they go with a world, with what is to be recorded.
+
+    Raises:
+        BadInput: If a reaction or a recording doesn't.
+    """
+    check_reactions(world, options.policies, options.news, anticipate=options.anticipate)
+    return replace(options, record=asks_of(names_of("record", record) or (), [s.name for s in world.scenarios],
+                                           options.trials))
 
 
 def _target(calibrate: float | str | None) -> Target | None:
