@@ -6,8 +6,9 @@ from sva_bench.analysis.compared_values import KeyComparison, ValueRow, numbers_
 from sva_bench.analysis.over_maps import labelled
 from sva_bench.analysis.results import Estimate
 from sva_bench.report.canvas import Axes, chart
-from sva_bench.report.charts import columns_of, legend_of, mark
+from sva_bench.report.charts import columns_of, legend_of, marker
 
+_INK, _STROKES = "#000000", ("-", "--", ":", "-.")  # colours are those of robots and plans
 _APART = 0.012  # of the axis: lines of several scenarios would hide each other's intervals
 
 
@@ -30,14 +31,13 @@ def response(found: KeyComparison, *, more: bool = False) -> str:
         for number, place in enumerate(places):
             rows = sorted((row for row in found.rows if (row.scenario, row.others) == place),
                           key=lambda row: at[row.value])
-            colour, shape = mark(number)
             aside = _APART * reach * (number - (len(places) - 1) / 2)
             points = [(at[row.value] + aside, shown) for row in rows if (shown := _shown(found, row, more=more))]
-            axes.plot([x for x, _ in points], [shown.mean for _, shown in points], color=colour, marker=shape,
-                      linestyle="-" if numbers else "none", label=labelled(*place))
+            axes.plot([x for x, _ in points], [shown.mean for _, shown in points], color=_INK, marker=marker(number),
+                      linestyle=_STROKES[number % len(_STROKES)] if numbers else "none", label=labelled(*place))
             for x, shown in points:
                 if shown.ci95 is not None:
-                    axes.plot([x, x], shown.ci95, color=colour, linewidth=1.4, marker="_", markersize=7)
+                    axes.plot([x, x], shown.ci95, color=_INK, linewidth=1.4, marker="_", markersize=7)
         axes.axvline(at[found.reference], color="#444", linewidth=1, linestyle="--",
                      label=f"the reference, {shown_value(found.reference)}")
         if more:
