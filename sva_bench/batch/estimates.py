@@ -31,6 +31,7 @@ _REAL_TIME = 800.0
 """Speed of physics relative to real time."""
 _TWIN_TIME = 8000.0
 _USUAL_MISSION_S = 600.0
+_USUAL_POIS = 16  # of the shipped worlds, at least
 _OWN_LEGS = 0.3  # share of the legs of all plans that are driven anew: plans have legs in common
 _IN_PHYSICS = 0.19  # share of them that is driven in physics, up to rollouts
 _DRIVEN = 0.5  # share of the mission limit that a robot drives, failures considered
@@ -85,7 +86,8 @@ def _estimate(grid: Grid, point: Point, seed: int, done: frozenset[str], cache: 
             seen.add(key)
             results.append(found)
         if any(result is None for result in results):
-            seconds += _beyond(jobs[0], point, grid)
+            seconds += _beyond(jobs[0], point, grid, planned=f"plans of {point.name}" in seen)
+            seen.add(f"plans of {point.name}")
             break
         jobs = steps.send(results)
     steps.close()
@@ -97,13 +99,18 @@ def _seconds(job: Job) -> float:
     if isinstance(job, TravelTimesJob):
         return _PATHS_S
     if isinstance(job, PlansJob):
-        return (_PLANS_S + _calibration_s(job.options)) * len(job.world.scenarios)
+        return (_plans_s(job.world) + _calibration_s(job.options)) * len(job.world.scenarios)
     if isinstance(job, ReactionsJob):
         return _reactions_s(job.world, job.options)
     assert isinstance(job, DriveJob)
     task = job.tasks[0]
     driving_s = float(np.hypot(*np.diff(task.course, axis=0).T).sum()) / task.model.followed_speed_m_s
     return len(job.tasks) * driving_s / (_REAL_TIME if task.fidelity == "physics" else _TWIN_TIME)
+
+
+def _plans_s(world: World) -> float:
+    """Estimated processor time to solve a scenario [s]; few POIs are planned in no time."""
+    return _PLANS_S * min(1.0, (len(world.pois) / _USUAL_POIS) ** 2)
 
 
 def _calibration_s(options: Options) -> float:
@@ -115,10 +122,18 @@ def _reactions_s(world: World, options: Options) -> float:
     return _REACTION_S * len(world.scenarios) * len(reactions_of(world, options)) * (2 if options.anticipate else 1)
 
 
-def _beyond(job: Job, point: Point, grid: Grid) -> float:
-    """Estimated processor time of the steps after one whose result isn't cached [s]."""
+def _beyond(job: Job, point: Point, grid: Grid, *, planned: bool) -> float:
+    """Estimated processor time of the steps after one whose result isn't cached [s].
+
+    Args:
+        job: A job of that step.
+        point, grid: What it is of.
+        planned: Whether another seed of the point counts its plans, which all seeds share.
+    """
     scenarios = len(point.world.scenarios)
-    plans = (_PLANS_S + _calibration_s(grid.options)) * scenarios if isinstance(job, TravelTimesJob) else 0.0
+    plans = 0.0
+    if isinstance(job, TravelTimesJob) and not planned:
+        plans = (_plans_s(point.world) + _calibration_s(grid.options)) * scenarios
     if not isinstance(job, ReactionsJob):
         plans += _reactions_s(point.world, grid.options)
     if isinstance(job, DriveJob | ReactionsJob) or grid.options.fidelity == "physics":
