@@ -140,8 +140,8 @@ def test_arguments_are_named_as_options_are_and_have_their_defaults(
     function: Callable[..., Any], command: Callable[..., Any]
 ) -> None:
     mine, typed = inspect.signature(function).parameters, inspect.signature(command).parameters
-    # What is printed, files that ``.outcomes`` stands for, a window, and what an instance says itself.
-    only_typed = {"csv", "as_json", "verbose", "live", *({"plan_failure"} if function is sb.plan else ())}
+    # What is printed and how wide, files that ``.outcomes`` stands for, a window, and what an instance says itself.
+    only_typed = {"csv", "as_json", "verbose", "wide", "live", *({"plan_failure"} if function is sb.plan else ())}
     assert set(mine) - {"progress"} == set(typed) - only_typed
     for name in set(mine) & set(typed) - {"out"}:  # without ``out`` nothing is written
         assert mine[name].default == typed[name].default, name

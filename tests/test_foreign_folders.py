@@ -290,7 +290,7 @@ def test_the_shard_of_another_unit_is_refused(
 
 
 @pytest.mark.parametrize(("command", "kind", "said"), [
-    (["report"], "batch", "the folder of a batch, not of a run"), (["view"], "batch", "the folder of a batch"),
+    (["view"], "batch", "the folder of a batch"),
     (["batch", "status"], "run", "the folder of a run, not of a batch"),
     (["batch", "retry"], "run", "the folder of a run, not of a batch"),
     (["report"], "parent", "holds 1 run, and is none itself; name one of them; the newest is"),

@@ -23,7 +23,8 @@ OTHER: dict[str, Any] = {
     "precision": Precision(pct=1.5, max_trials=70, anytime=True)}
 
 
-@pytest.mark.parametrize("name", [field.name for field in fields(Options)])
+# What is recorded changes no result; the manifest names the recordings.
+@pytest.mark.parametrize("name", [field.name for field in fields(Options) if field.name != "record"])
 def test_every_option_survives_the_way_through_a_file(name: str) -> None:
     told = replace(Options(), **{name: OTHER[name]})
     assert told.as_dict() != Options().as_dict() or name == "seed"

@@ -44,7 +44,7 @@ from sva_bench.report.wording import (
     vss_verdict,
     with_interval,
 )
-from sva_bench.storage.manifest import Manifest
+from sva_bench.storage.manifest import Manifest, RecordingNote
 from sva_bench.storage.stored_run import Content
 from sva_bench.storage.trial_counts import TrialCounts
 from sva_bench.world.model import World
@@ -297,6 +297,15 @@ def _recordings(content: Content, shown: ShownNames) -> list[str]:
         return [f'<a href="recordings/{quote(stem)}.rrd">{text(what)}</a>' for what, stem in stems.items()
                 if f"recordings/{stem}.rrd" not in lacking]
 
+    def named(told: RecordingNote) -> str:
+        plans = listed([shown.of(told.scenario, planner) for planner in told.planners])
+        return f"{told.scenario}, {plans}, trial {told.trial}"
+
+    notes = [told for told in content.manifest.recordings if told.policy == "none"]
+    pairs = linked({told.scenario: told.file.removesuffix(".rrd") for told in notes if len(told.planners) > 1})
+    asked = linked({named(told): told.file.removesuffix(".rrd") for told in notes
+                    if len(told.planners) == 1 and told.chosen in ("trial", "median", "worst")})
+
     links = linked({f"{scenario}, {shown.of(scenario, planner)}": stem
                     for (scenario, planner), stem in content.stems.items()})
     reacting = linked({f"{scenario}, {planner}, {policy} on {news} news": stem
@@ -305,6 +314,11 @@ def _recordings(content: Content, shown: ShownNames) -> list[str]:
     if links:
         parts.append(f"<p>A typical trial of each plan, for the Rerun viewer: {', '.join(links)}. Open them all with "
                      "<code>sva-bench view</code> and this folder.</p>")
+    if pairs:
+        parts.append("<p>Two plans side by side, under the same failures and noise, where they differ: "
+                     f"{', '.join(pairs)}.</p>")
+    if asked:
+        parts.append(f"<p>Asked for: {', '.join(asked)}.</p>")
     if reacting:
         parts.append(f"<p>The most probable course of events in which orders change: {', '.join(reacting)}.</p>")
     if lacking:

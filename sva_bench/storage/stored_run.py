@@ -265,7 +265,9 @@ def _content(folder: Path) -> Content:
     return Content(summary=summary, routes=routes, stems=stems, manifest=manifest, world=world, legs=legs,
                    reaction_stems=told, contacts=contacts, waits=waits, paths=read_paths(folder, world),
                    counts=counting.result(), lacking=_lacking(
-                       folder, [scenario.name for scenario in world.scenarios], [*stems.values(), *told.values()]))
+                       folder, [scenario.name for scenario in world.scenarios], dict.fromkeys([
+                           *(f"{stem}.rrd" for stem in [*stems.values(), *told.values()]),
+                           *(note.file for note in manifest.recordings)])))
 
 
 def _claims(summary: AnySummary, world: World) -> dict[Key, Claim]:
@@ -327,10 +329,10 @@ def _rows_of(path: Path, key: Key) -> Iterator[pa.Table]:
         yield piece.filter(mask)
 
 
-def _lacking(folder: Path, scenarios: Iterable[str], stems: Iterable[str]) -> tuple[str, ...]:
+def _lacking(folder: Path, scenarios: Iterable[str], recordings: Iterable[str]) -> tuple[str, ...]:
     """The files of a run folder that aren't there and that no page rests on, relative to it."""
     expected = ["travel_times.parquet", *(f"instance-{name}.json" for name in scenarios),
-                *(f"recordings/{stem}.rrd" for stem in stems)]
+                *(f"recordings/{name}" for name in recordings)]
     return tuple(name for name in expected if not (folder / name).is_file())
 
 

@@ -12,6 +12,7 @@ from dataclasses import fields, replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -118,7 +119,8 @@ def test_a_page_loads_nothing_and_every_reference_in_it_is_met(finished: Run) ->
     assert inner <= set(page.ids)
     outer = [link for link in page.links if not link.startswith(("#", "data:"))]
     assert outer
-    assert all((finished.folder / link).is_file() for link in outer)
+    assert all((finished.folder / unquote(link)).is_file() for link in outer)
+    assert any("+compare.rrd" in unquote(link) for link in outer)
     assert "@import" not in text
 
 

@@ -41,8 +41,9 @@ def of_kind(folder: Path, interaction: Interaction) -> World:
     return world_of(folder, text)
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-@pytest.mark.parametrize("interaction", INTERACTIONS)
+@pytest.mark.parametrize(("interaction", "fidelity"), [
+    pytest.param(interaction, fidelity, marks=[pytest.mark.long] * (fidelity == "physics" and interaction != "shared"))
+    for interaction in INTERACTIONS for fidelity in FIDELITIES])
 def test_a_trial_that_is_replayed_gives_its_rows_again(interaction: Interaction, fidelity: Fidelity, tmp_path: Path
                                                        ) -> None:
     world = of_kind(tmp_path, interaction)
