@@ -96,7 +96,7 @@ def _values(given: Any) -> list[str]:
         low, high = (None if bound is None else f"{bound:,}".replace(",", " ") for bound in (given.min, given.max))
         endless = high is None or given.max > 10 ** 12
         return [f"{low} or more" if endless else f"up to {high}" if low is None else f"{low} to {high}"]
-    return [f"`{given.metavar}`"] if given.metavar and _is_option(given) else []
+    return [f"`{word}`" for word in given.metavar.split("|")] if given.metavar and _is_option(given) else []
 
 
 def _default(given: Any) -> str:
@@ -111,7 +111,7 @@ def _default(given: Any) -> str:
 
 def _plain(text: str | None) -> str:
     """Help without its markup, paragraphs unwrapped."""
-    plain = Text.from_markup(text or "").plain.replace("\b", "")
+    plain = Text.from_markup(text or "").plain.replace("\b", "").replace("*", "\\*")
     return "\n\n".join(" ".join(part.split()) for part in plain.split("\n\n")).strip()
 
 

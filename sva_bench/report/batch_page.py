@@ -56,7 +56,7 @@ def write_batch_report(path: Path, summary: BatchSummary) -> None:
                for unit in summary.units for s in unit.scenarios],
               sections=[unit.label for unit in summary.units for _ in unit.scenarios]),
     ]
-    write_page(path, "batch", [*parts, *_calibrated(summary)])
+    write_page(path, f"VSS over {counted(len(summary.worlds), 'map')}", [*parts, *_calibrated(summary)])
 
 
 def _calibrated(summary: BatchSummary) -> list[str]:

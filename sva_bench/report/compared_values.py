@@ -28,6 +28,8 @@ def compared_answers(found: KeyComparison) -> list[str]:
         worse = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean < 0]
         if not rows:
             said.append(f"{where}: nothing to compare with {reference}, of which nothing is done.")
+        elif all(row.gain and row.gain.ci95 is None and row.gain.mean == 0 for row in rows):
+            said.append(f"{where}: no difference from {reference} was met.")
         elif all(row.gain and row.gain.ci95 is None for row in rows):
             said.append(f"{where}: no interval; " + ("more maps would tell how maps differ." if found.sample == "maps"
                                                       else "more trials or noise draws would give one."))

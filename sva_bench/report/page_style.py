@@ -98,7 +98,7 @@ svg.rows .grid{{stroke:var(--line)}}svg.rows .zero{{stroke:var(--soft)}}svg.rows
 svg.rows .steps{{fill:none;stroke-width:1.8}}
 @media(max-width:40rem){{body{{font-size:15px;padding:.8rem}}th,td{{padding:.25rem .45rem}}}}
 @media print{{html,body{{font-size:10pt}}body{{max-width:none;padding:0}}.wide{{overflow:visible;background:none}}
-h2{{break-after:avoid}}nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows{{break-inside:auto}}
+h2,h3,summary,thead{{break-after:avoid}}nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows{{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
 summary{{list-style:none}}
 table{{font-size:8pt}}

@@ -25,6 +25,7 @@ from sva_bench.solver.two_stage import (
     wait_and_see,
 )
 from tests.oracles.energy import driven, greatest_value, with_energy
+from tests.oracles.rest import TooMany
 from tests.solver.oracle import discounted_optimum, random_instance, risk_optimum, truth
 from tests.solver.test_discounts import risky
 from tests.solver.test_rest import check as check_rest
@@ -229,5 +230,10 @@ def test_so_are_ties_and_measures_of_risk_on_many_instances(block: int, method: 
 @pytest.mark.parametrize("process", PROCESSES)
 @pytest.mark.parametrize("block", range(20))
 def test_the_rest_of_a_mission_is_planned_as_well_on_many_teams(block: int, process: FailureProcess) -> None:
+    passed_over = 0
     for seed in range(40_000 + 30 * block, 40_030 + 30 * block):
-        check_rest(energetic_rest(seed, process))
+        try:
+            check_rest(energetic_rest(seed, process))
+        except TooMany:  # more states than enumeration goes through
+            passed_over += 1
+    assert passed_over <= 3
