@@ -36,7 +36,8 @@ $(STAMP): $(LOCK) pyproject.toml
 	$(PYTHON) -m venv $(if $(wildcard $(VENV)/lib/python$(VERSION)),,--clear) $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $(LOCK)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	# Compile the solver once, before many processes want it at a time; smaller instances never get to its pricing.
+	@echo "compiling the solver, once: one to two minutes"
+	# Before many processes want it at a time; smaller instances never get to its pricing.
 	$(BIN)/sva-bench instance random --family B --pois 12 -o $(VENV)/warm.json
 	$(BIN)/sva-bench plan $(VENV)/warm.json -o $(VENV)/warm-plan.json
 	touch $@

@@ -36,8 +36,8 @@ def beyond_reach(reach: Reach) -> list[str]:
     if reach.nothing:
         return []
     sentences = [f"{robot} reaches no POI within its fuel and limit, and stays home." if robot in reach.robots else
-            f"{robot} reaches none of {_named(pois)} within its fuel and limit, and will never be sent there."
-            for robot, pois in reach.missed.items()]
+            f"{robot} {'reaches none of' if len(pois) > 1 else 'does not reach'} {_named(pois)} within its fuel and "
+            "limit, and will never be sent there." for robot, pois in reach.missed.items()]
     if reach.pois:
         sentences.append(f"No robot reaches {_named(reach.pois)}.")
     return sentences

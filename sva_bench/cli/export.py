@@ -71,6 +71,9 @@ def export(
         write_result(output, bag)
         return
     _refuse(to, of_trials, "a plan is no trial of a run")
+    if source.is_dir():
+        raise BadInput(f"{source}: a folder, and --to {to} writes a plan: name its file, as in "
+                       f"{source / 'plans' / 'S1-stochastic.json'}, and its world with --world")
     if world is None:
         raise BadInput(f"--to {to} writes a plan, whose sites stand in a world: name its file with --world")
     _export_plan(source, world, next(name for name in EXPORT_FORMATS if name == to), output, robot, interaction)

@@ -9,7 +9,7 @@ from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.cli.sheets import Column, Sheet, print_sheet
 from sva_bench.report.compared_reactions import given_reacting, reaction_lines
-from sva_bench.report.reaction_shares import DOUBTED, doubted, lead_pct, recourse_pct, tell, vss_pct, without_pct
+from sva_bench.report.reaction_shares import doubted, lead_pct, recourse_pct, tell, vss_pct, without_pct
 from sva_bench.report.reaction_wording import (
     GivenReacting,
     Reacting,
@@ -19,7 +19,7 @@ from sva_bench.report.reaction_wording import (
     reaction_answers,
     reaction_assumptions,
 )
-from sva_bench.report.wording import listed, with_interval
+from sva_bench.report.wording import DOUBTED, listed, with_interval
 
 _MOST_NAMED = 6
 

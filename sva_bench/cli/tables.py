@@ -23,11 +23,13 @@ from sva_bench.report.interaction_section import INTERACTION_HEAD, interaction_t
 from sva_bench.report.source_table import SOURCES_HEAD, source_rows, source_title
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
+    DOUBTED_TOLD,
     answer,
     assumed,
     assumption_rows,
     cell,
     dependent_robots,
+    doubts_told,
     ranked,
     remarks,
     vss_verdict,
@@ -52,6 +54,8 @@ def print_summary(
     console, travel = results(), summary.travel
     robots = list(summary.scenarios[0].availability)
     _print_plans(summary, robots, console, wide=wide)
+    if doubts_told(summary.scenarios):
+        console.print(DOUBTED_TOLD, highlight=False)
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
                   f"{travel.max_excess_pct:.1f} %; {assumed(summary)}.", highlight=False)
     for said in dependent_robots(world, summary) if world else ():

@@ -12,7 +12,6 @@ from sva_bench.interrupts import holding_back_ctrl_c
 from sva_bench.report.compared_reactions import given_answers, given_reacting
 from sva_bench.report.page import figure, heading, note, sentence, table, text
 from sva_bench.report.reaction_shares import (
-    DOUBTED,
     doubted,
     lead_pct,
     of_best_pct,
@@ -32,7 +31,7 @@ from sva_bench.report.reaction_wording import (
     reacting,
     reaction_answers,
 )
-from sva_bench.report.wording import adjusted, with_interval
+from sva_bench.report.wording import DOUBTED, adjusted, with_interval
 
 
 def _rows(summary: AnySummary) -> Sequence[AnyReacting]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from sva_bench.analysis.over_trials import percent
 from sva_bench.analysis.reaction_results import ReactionFigures, ReactionResult
 from sva_bench.analysis.results import Estimate
-from sva_bench.report.wording import with_interval
+from sva_bench.report.wording import DOUBTED, with_interval
 
 MOST_PER_CENT = 1000.0
 """Beyond it a percentage says more about how little its base is than about what it is of."""
@@ -61,10 +61,6 @@ def lead_pct(reaction: ReactionResult) -> Estimate | None:
 def tell(found: Iterable[Estimate | None]) -> bool:
     """Whether percentages tell something: each is there, and none is absurd for the little that it is of."""
     return all(pct is not None and abs(pct.mean) <= MOST_PER_CENT for pct in found)
-
-
-DOUBTED = "°"
-"""Behind figures whose interval holds zero."""
 
 
 def doubted(found: Estimate | None, show: Callable[[Estimate], str] = with_interval) -> str:

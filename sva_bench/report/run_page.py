@@ -30,11 +30,13 @@ from sva_bench.report.route_maps import route_maps
 from sva_bench.report.source_table import source_section
 from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
+    DOUBTED_TOLD,
     adjusted,
     answer,
     assumed,
     assumption_rows,
     cell,
+    doubts_told,
     finding,
     listed,
     optional,
@@ -160,7 +162,8 @@ def _comparison(summary: Summary, counts: TrialCounts) -> list[str]:
             for s in summary.scenarios]
     return [table(head, rows, caption="Executed values of both plans, and the value of the stochastic solution "
                                       "(VSS): how much more the stochastic plan is worth, in the same trials"),
-            note("Robots lost: how many a mission left the base and never came back, on average, stochastic | "
+            note(("" if not doubts_told(summary.scenarios) else f"{DOUBTED_TOLD} ")
+                 + "Robots lost: how many a mission left the base and never came back, on average, stochastic | "
                  "deterministic.")]
 
 

@@ -77,7 +77,8 @@ def _of_the_two_plans(summary: Summary) -> str:
         more = f" The stochastic plan found is worth more in {named}." if pays else ""
         return f"Whether planning for failures pays is not settled: {_UNPROVED}.{more}{other}{loses}{same}"
     if not pays:
-        return f"Planning for failures pays in no scenario, as far as these trials can tell.{loses}{same}"
+        return (f"In {listed(rest)} these trials can't tell whether planning for failures pays: more of them may "
+                f"(--trials, --precision)." if rest else "Planning for failures pays in no scenario.") + loses + same
     return f"Planning for failures pays in {named}.{other}{loses}{same}"
 
 
@@ -249,8 +250,20 @@ def verdict(difference: WithInterval, *, distinguishable: bool, same: bool = Fal
 
 
 def vss_verdict(vss: VssFigures) -> str:
-    """The executed VSS of a scenario with its interval, or that there is none to speak of."""
-    return verdict(vss.executed, distinguishable=vss.distinguishable, same=vss.same_plan)
+    """The executed VSS of a scenario with its interval, marked where it is not distinguishable from zero."""
+    if vss.same_plan or vss.distinguishable or vss.executed.ci95 is None:
+        return verdict(vss.executed, distinguishable=vss.distinguishable, same=vss.same_plan)
+    return with_interval(vss.executed).replace(" [", f"{DOUBTED} [", 1)
+
+
+DOUBTED = "°"
+"""Behind figures whose interval holds zero."""
+DOUBTED_TOLD = f"{DOUBTED}: not distinguishable from zero."
+
+
+def doubts_told(scenarios: Sequence[ScenarioSummary | ComparedScenario]) -> bool:
+    """Whether some executed VSS is marked as not distinguishable from zero."""
+    return any(DOUBTED in vss_verdict(s.vss) for s in scenarios if isinstance(s, ScenarioSummary))
 
 
 def with_interval(estimate: WithInterval, digits: int = 1, unit: str = "") -> str:

@@ -25,7 +25,7 @@ from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.reaction_charts import MOST_SCENARIOS
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
-from sva_bench.report.reaction_shares import DOUBTED, doubted, in_per_cent
+from sva_bench.report.reaction_shares import doubted, in_per_cent
 from sva_bench.report.reaction_wording import (
     DEFINITIONS,
     KNOWS,
@@ -34,7 +34,7 @@ from sva_bench.report.reaction_wording import (
     reaction_answers,
     reaction_assumptions,
 )
-from sva_bench.report.wording import answer
+from sva_bench.report.wording import DOUBTED, answer
 from sva_bench.storage.stored_run import write_csv
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run

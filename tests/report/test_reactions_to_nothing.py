@@ -18,8 +18,8 @@ from sva_bench.cli.reaction_table import reaction_table
 from sva_bench.execution import plays
 from sva_bench.report.compared_reactions import reaction_lines
 from sva_bench.report.reaction_page import reaction_section, reactions_answered
-from sva_bench.report.reaction_shares import DOUBTED
 from sva_bench.report.reaction_wording import reacting, reaction_answers
+from sva_bench.report.wording import DOUBTED
 from tests.worlds_for_tests import SMALL, world_of
 
 QUICK: dict[str, Any] = {"trials": 12, "rollouts": 3, "fidelity": "kinematic", "workers": 1}
