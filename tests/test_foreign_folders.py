@@ -126,7 +126,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sva_bench.report.charts.legs_driven", lambda *_: "")
 
 
-COUNTS = [60, pytest.param(3000, marks=pytest.mark.long)]
+COUNTS = [30, pytest.param(3000, marks=pytest.mark.long)]
 
 
 @pytest.mark.parametrize("count", COUNTS)

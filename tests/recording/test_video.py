@@ -101,6 +101,7 @@ def test_a_gif_shows_the_whole_mission_and_is_the_same_each_time(pair: Path) -> 
         assert np.abs(np.asarray(video.convert("RGB")).astype(int) - first).max() > 100
 
 
+@pytest.mark.long
 def test_an_mp4_has_the_same_frames_and_is_the_same_each_time(tour: Path) -> None:
     av = pytest.importorskip("av")
     content = video_of(tour, ".mp4", quiet)
