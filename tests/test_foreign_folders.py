@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pyarrow as pa
@@ -365,6 +367,24 @@ def test_a_report_names_the_missing_files_that_it_can_do_without(
     assert f"missing, but the report doesn't rest on them: {named}" in said
     assert f"Missing in this run folder: {named}." in page
     assert f'href="{recording}"' not in page
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("name", ["../../outside.rrd", "x" * 5000 + ".rrd", "a/b.rrd", "no recording"])
+def test_a_recording_that_the_manifest_invents_is_missing_and_not_linked(
+    name: str, folders: dict[str, Path], tmp_path: Path
+) -> None:
+    work = tmp_path / "work"
+    shutil.copytree(folders["run"], work)
+    manifest = json.loads((work / "manifest.json").read_text())
+    manifest["recordings"][-1]["file"] = name
+    (work / "manifest.json").write_text(json.dumps(manifest))
+    code = run_command_line(["report", str(work)])
+    assert code in (0, 2), "one clear error, or a page"
+    if code == 0:
+        links = re.findall('href="recordings/([^"]*)"', (work / "report.html").read_text())
+        assert links
+        assert all("/" not in link and (work / "recordings" / unquote(link)).is_file() for link in links)
 
 
 def test_a_run_that_was_not_finished_is_called_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -109,6 +109,7 @@ def numbers_of(words: tuple[str, ...]) -> Mapping[str, float] | None:
         found[word] = float(match[2])
     return found if len({plain.startswith("x") for plain in map(shown_value, words)}) == 1 else None
 
+
 def own_value(values: Sequence[Any], in_files: Sequence[Any]) -> str | None:
     """The value of a key that leaves the files as they are, as JSON, if there is one.
 

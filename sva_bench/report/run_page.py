@@ -304,7 +304,7 @@ def _recordings(content: Content, shown: ShownNames) -> list[str]:
         plans = listed([shown.of(told.scenario, planner) for planner in told.planners])
         return f"{told.scenario}, {plans}, trial {told.trial}"
 
-    notes = [told for told in content.manifest.recordings if told.policy == "none"]
+    notes = [told for told in content.manifest.recordings if told.policy == "none" and told.file.endswith(".rrd")]
     pairs = linked({told.scenario: told.file.removesuffix(".rrd") for told in notes if len(told.planners) > 1})
     asked = linked({named(told): told.file.removesuffix(".rrd") for told in notes
                     if len(told.planners) == 1 and told.chosen in ("trial", "median", "worst")})

@@ -107,7 +107,7 @@ def read_paths(folder: Path, world: World) -> LegPaths:
     for piece in pieces_of(path, PATHS, most=MOST_POINTS, words=words):
         for kind, origin, destination, number, x, y in zip(*(_plain(piece, name) for name in PATHS.names), strict=True):
             points = found.setdefault((kind, origin, destination), [])
-            if number != len(points) or not max(abs(x), abs(y)) <= _FARTHEST_M:
+            if number != len(points) or not (abs(x) <= _FARTHEST_M and abs(y) <= _FARTHEST_M):  # nor NaN
                 raise BadFile(path, None, "point", f"expected the points of the path from {origin!r} to "
                               f"{destination!r} in order; run the command in manifest.json again")
             points.append((x, y))

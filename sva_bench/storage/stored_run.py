@@ -331,9 +331,11 @@ def _rows_of(path: Path, key: Key) -> Iterator[pa.Table]:
 
 def _lacking(folder: Path, scenarios: Iterable[str], recordings: Iterable[str]) -> tuple[str, ...]:
     """The files of a run folder that aren't there and that no page rests on, relative to it."""
-    expected = ["travel_times.parquet", *(f"instance-{name}.json" for name in scenarios),
-                *(f"recordings/{name}" for name in recordings)]
-    return tuple(name for name in expected if not (folder / name).is_file())
+    expected = ["travel_times.parquet", *(f"instance-{name}.json" for name in scenarios)]
+    # Looked up among those that are there: a manifest from elsewhere may name anything, and paths to other folders.
+    held = {path.name for path in (folder / "recordings").glob("*.rrd")}
+    return (*(name for name in expected if not (folder / name).is_file()),
+            *(f"recordings/{name}" for name in recordings if name not in held))
 
 
 def _some(names: Sequence[str]) -> str:
