@@ -19,7 +19,6 @@ from sva_bench.solver.knowledge import (
     Knowledge,
     Progress,
     Solution,
-    adopt,
     best_known,
     grain_of,
     routes_of,
@@ -30,8 +29,8 @@ from sva_bench.solver.methods import method_for
 from sva_bench.solver.outcomes import Outcomes
 from sva_bench.solver.preprocess import Scope, scope_of
 from sva_bench.solver.problem import Problem
-from sva_bench.solver.routes.heuristic import STARTS, search, shorten
-from sva_bench.solver.routes.packing import Route
+from sva_bench.solver.routes.heuristic import STARTS, shorten
+from sva_bench.solver.searching import searched
 from sva_bench.solver.units import ROUNDING, factor_of, most_of_a_visit
 
 _log = logging.getLogger(__name__)
@@ -91,7 +90,7 @@ def _solve(
     used = method_for(method, problem)
     try:
         with hearing_ctrl_c():
-            routes = _search(problem)
+            routes = searched(problem)
             if not progress.closed(gap):
                 used.prove(replace(problem, routes=routes))
     except KeyboardInterrupt:
@@ -118,29 +117,3 @@ def _arrival(instance: Instance, goal: Goal, scopes: Sequence[Scope]) -> FloatAr
         greatest_survival(leg_survival(np.where(scope.legs, scope.driven_s, np.inf), pois, goal.discount(m)),
                           instance.base)
         for m, scope in enumerate(scopes)]).reshape(goal.weights.shape)
-
-
-def _search(problem: Problem) -> Sequence[Route]:
-    """Improve the incumbent by the heuristic; the good routes that it found."""
-    goal, progress, clock = problem.goal, problem.progress, problem.clock
-    if (goal.floors and not goal.risk) or goal.driving or bool((goal.weights < 0).any()):
-        return ()
-    started_s = clock.used_s()
-    found = search(
-        problem.known.tables, _searched(goal), goal.discounts, progress.orders,
-        starts=problem.starts,
-        stop=lambda value: clock.is_over() or (
-            goal.risk is None and progress.bound - value <= problem.gap * abs(value)),
-        offer=lambda orders: adopt(progress, goal, problem.known, orders))
-    adopt(progress, goal, problem.known, found.orders)
-    progress.seconds["heuristic"] = clock.used_s() - started_s
-    return found.routes
-
-
-def _searched(goal: Goal) -> FloatArray:
-    """Weights that the heuristic maximises, shape (M, n): a measure of risk is replaced by its expected incentive."""
-    if goal.risk is None:
-        return goal.weights
-    outcomes = goal.risk.outcomes
-    return goal.weights + goal.risk.measure.weight * outcomes.incentives * (
-        outcomes.probability @ outcomes.available)[:, None]

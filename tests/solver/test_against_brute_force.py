@@ -11,7 +11,7 @@ from sva_bench.choices import Cuts, InstanceFamily, Method
 from sva_bench.generate.instances import random_instance as paper_instance
 from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
-from sva_bench.solver import solve as solving
+from sva_bench.solver import searching
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.two_stage import (
@@ -57,7 +57,7 @@ def check(seed: int, method: Method = "auto") -> None:
 @pytest.fixture
 def no_heuristic(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave everything to the model."""
-    monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
+    monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
 def check_two_stages(seed: int, method: Method, cuts: Cuts) -> None:

@@ -132,7 +132,7 @@ def test_labels_stop_growing_when_ctrl_c_is_pressed_or_time_is_up() -> None:
 
     def labels(left_s: float) -> Priced:
         return price(graph, np.array(vehicle.incentives), np.zeros(n), 0.0, neighbours(graph, instance.pois),
-                     threshold=0.0, exact=True, most_routes=5, most_labels=10**9,
+                     threshold=0.0, compared=None, most_routes=5, most_labels=10**9,
                      cut_duals=cut_duals_of((), np.zeros(0), 0, n), left_s=left_s)
 
     began = time.process_time()

@@ -66,7 +66,7 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
         routes = [route for route in routes if all(reward[j] > dual[j] for j in route if j in instance.pois)]
     counter, everything = Counter(cuts, n), np.full((n, 1), np.uint64(0xFFFFFFFFFFFFFFFF))
     worth = {route: sum(reward[j] - dual[j] for j in route) - duals @ counter.of(0, route) for route in routes}
-    found = price(graph, reward, dual, 0.0, everything, threshold=0.0, exact=True, most_routes=5, most_labels=10**6,
+    found = price(graph, reward, dual, 0.0, everything, threshold=0.0, compared=None, most_routes=5, most_labels=10**6,
                   cut_duals=cut_duals_of(cuts, duals, 0, n))
     assert found.complete
     assert found.best == pytest.approx(max([0.0, *worth.values()]), abs=1e-9)

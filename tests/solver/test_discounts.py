@@ -14,7 +14,7 @@ from sva_bench.choices import FailureProcess
 from sva_bench.generate.instances import random_instance as paper_instance
 from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance, Vehicle
-from sva_bench.solver import solve as solving
+from sva_bench.solver import searching
 from sva_bench.solver.columns.graph import Graph, graph_of
 from sva_bench.solver.columns.pricing import price
 from sva_bench.solver.columns.subset_row import cut_duals_of
@@ -60,7 +60,7 @@ def check(seed: int, failure: FailureProcess, *, costs: bool = True) -> None:
 @pytest.fixture
 def no_heuristic(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave everything to the columns."""
-    monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
+    monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
 @pytest.mark.usefixtures("no_heuristic")
@@ -133,7 +133,7 @@ def test_the_best_discounted_route_is_the_one_that_listing_finds(seed: int) -> N
     everything = np.full((n, 1), np.uint64(0xFFFFFFFFFFFFFFFF))
     worth = [reduced(graph, route, vehicle, reward, dual)
              for route in routes(graph, frozenset(), (graph.base,), 0.0, 0.0) if len(route) > 2]
-    found = price(graph, reward, dual, 0.0, everything, threshold=0.0, exact=True, most_routes=5, most_labels=10**6,
+    found = price(graph, reward, dual, 0.0, everything, threshold=0.0, compared=None, most_routes=5, most_labels=10**6,
                   cut_duals=cut_duals_of((), np.zeros(0), 0, n))
     assert found.complete
     assert found.best == pytest.approx(max([0.0, *worth]), abs=1e-8)
@@ -177,7 +177,7 @@ def test_labels_that_forget_visits_find_the_best_route_that_may_repeat_them(seed
              if set(route) <= set(usable)}
     # Bounds on the rest of a route leave out those that go from a POI to another and straight back.
     plain = [value for route, value in worth.items() if all(i != j for i, j in zip(route, route[2:], strict=False))]
-    found = price(graph, reward, dual, 0.0, memory, threshold=0.0, exact=True, most_routes=5, most_labels=10**6,
+    found = price(graph, reward, dual, 0.0, memory, threshold=0.0, compared=None, most_routes=5, most_labels=10**6,
                   cut_duals=cut_duals_of((), np.zeros(0), 0, n))
     assert found.complete
     assert max([0.0, *plain]) - 1e-8 <= found.best <= max([0.0, *worth.values()]) + 1e-8

@@ -12,7 +12,7 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.plan import Plan
 from sva_bench.mission.rest import Rest
-from sva_bench.solver import solve as solving
+from sva_bench.solver import searching
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
 from sva_bench.solver.two_stage import (
@@ -55,7 +55,7 @@ def by_hand(instance: Instance, plan: Plan) -> float:
 def heuristic(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave everything to the method, or not."""
     if not request.param:
-        monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
+        monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
 def check(seed: int, method: Method) -> None:

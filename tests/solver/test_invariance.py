@@ -18,7 +18,7 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.failures import JointState, marginals
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
-from sva_bench.solver import solve as solving
+from sva_bench.solver import searching
 from sva_bench.solver.methods import METHODS
 from sva_bench.solver.risk import RiskMeasure
 from sva_bench.solver.routes.heuristic import Found
@@ -206,7 +206,7 @@ def test_names_and_order_change_nothing_on_many_instances(seed: int, what: str) 
 @pytest.fixture
 def no_heuristic(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave everything to the model."""
-    monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
+    monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
 @pytest.mark.usefixtures("no_heuristic")

@@ -26,7 +26,7 @@ from sva_bench.mission.failures import JointState
 from sva_bench.mission.instance import Instance, Vehicle
 from sva_bench.mission.instance_file import read_instance
 from sva_bench.mission.plan import Plan
-from sva_bench.solver import solve as solving
+from sva_bench.solver import searching
 from sva_bench.solver.columns import column_generation
 from sva_bench.solver.flow import branch_and_cut
 from sva_bench.solver.flow.expected import euler_walk
@@ -77,7 +77,7 @@ def test_an_optimal_route_may_drive_the_same_station_leg_twice(
         heuristic: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     # base r1 r2 p1 r1 r2 p2 base: 5 + 8 | 5 + 5 | 8 | 5 + 5 s between refuels, F = 10: worth 20; once only: 10.
     if not heuristic:
-        monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
+        monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
     instance = instance_of("base r1 r2 p1 p2", (1, 2),
                            vehicle(STATION_LEG_TWICE, [0, 0, 0, 10, 10], capacity=10, limit=60))
     plan = plan_stochastic(instance)
@@ -170,7 +170,7 @@ def test_a_poi_without_reward_is_visited_only_as_a_shortcut() -> None:
 
 def test_legs_that_cost_nothing_close_no_subtour(monkeypatch: pytest.MonkeyPatch) -> None:
     # p1 and p2 lie in one spot, far from the base: a loop between them is free, but no robot gets there.
-    monkeypatch.setattr(solving, "search", lambda *given, **_: Found(orders=given[3], routes=()))
+    monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
     fuel = np.array([[0, 20, 20, 1], [20, 0, 0, 20], [20, 0, 0, 20], [1, 20, 20, 0]], dtype=float)
     for capacity in (30.0, 40.0):
         instance = instance_of("base p1 p2 p3", (), vehicle(fuel, [0, 5, 5, 1], capacity=capacity, limit=50))
@@ -265,7 +265,8 @@ def test_a_solve_stops_at_a_wide_gap() -> None:
 
 
 @pytest.mark.parametrize(("where", "what", "method"), [
-    (solving, "search", "auto"), (column_generation, "best_routes", "auto"), (branch_and_cut, "maximise", "expected")])
+    (searching, "search", "auto"), (column_generation, "best_routes", "auto"),
+    (branch_and_cut, "maximise", "expected")])
 def test_ctrl_c_keeps_the_best_plan_so_far(
     where: ModuleType, what: str, method: Method, monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -23,9 +23,9 @@ _log = logging.getLogger(__name__)
 
 _SLACK = 0.03  # share of the gap: a relaxation this close to its bound counts as solved
 _VIOLATED = 1e-6  # violation of a requirement that counts as rounding
-_COARSE = 0.3  # the same while ng-sets still grow: cycles show before the relaxation is solved to the end
 _STRONG = 8  # candidates of strong branching
 CUTTING = 6  # vehicles from which subset-row cuts shorten the proof
+_LONG = 1_000_000  # labels of the root from which the search is a long one
 _TAIL = 0.02  # share of the gap: a round of cuts that lowers the bound by less is the last (tailing off)
 
 
@@ -43,6 +43,7 @@ class BranchAndPrice:
     Attributes:
         generation: The columns, and the pricing that generates them.
         offer: Takes a plan, as POIs of each vehicle in order, and keeps it if it is better.
+        search_again: Runs the heuristic, and adds its routes to the columns.
         left_s: Time left [s].
         report_bound: Takes every upper bound on the goal.
         nodes: Nodes of the search tree so far.
@@ -50,6 +51,7 @@ class BranchAndPrice:
 
     generation: ColumnGeneration
     offer: Callable[[tuple[tuple[int, ...], ...]], None]
+    search_again: Callable[[], None]
     left_s: Callable[[], float]
     report_bound: Callable[[float], None]
     nodes: int = 0
@@ -79,11 +81,12 @@ class BranchAndPrice:
     def _process(self, node: _Node) -> tuple[list[_Node] | None, float]:
         """Solve a node: its children, ``None`` if time ran out or labels overflowed; and its upper bound."""
         generation, cutoff = self.generation, self.generation.cutoff
-        centre, best, slack, before, dived = node.duals, node.bound, _COARSE, math.inf, False
+        centre, best, slack, before, dived = node.duals, node.bound, _SLACK, math.inf, False
+        proving = False  # while ng-sets still grow: cycles show before the relaxation is solved to the end
         penalty = generation.penalty
         while True:
             master = generation.master(node.state, centre, penalty=penalty)
-            made = generation.generate(master, node.state, centre, known=best, slack=slack,
+            made = generation.generate(master, node.state, centre, known=best, slack=slack, proving=proving,
                                        report_bound=self.report_bound if self.nodes == 1 else None)
             solved, centre = made.relaxed, made.duals
             best = min(best, made.bound)
@@ -96,9 +99,10 @@ class BranchAndPrice:
             integral = not undecided or all(abs(share - round(share)) < 1e-6 for *_, share in used)
             # With no fractional visit left, only routes that visit a POI twice can make the solution fractional.
             if generation.remember([column for _, column, _ in used], ignore_most=integral):
+                proving = False
                 continue
-            if slack == _COARSE:
-                slack = _SLACK
+            if not proving:
+                proving = True
                 continue
             if master.violation(solved.values) > _VIOLATED:
                 # Violating a requirement cost less than any plan that keeps it, and branching would not change that:
@@ -120,6 +124,10 @@ class BranchAndPrice:
             if not (self._cutting() and before - best > _TAIL * (best - cutoff()) and generation.cut(used)):
                 if self.nodes == 1 and generation.cuts:
                     self._dive(node.state, centre)
+                if self.nodes == 1 and generation.calls["labels"] > _LONG:
+                    self.search_again()
+                    if best <= cutoff():
+                        return [], best
                 return self._branch(node.state, solved, undecided, best, centre), best
             before = best
 
@@ -181,7 +189,7 @@ class BranchAndPrice:
                 for number, group in enumerate(groups):
                     if group.count:
                         threshold = float(duals.group[number]) + self.generation.tolerance
-                        priced = self.generation.price(group, duals, threshold, exact=False)
+                        priced = self.generation.price(group, duals, threshold, 0)
                         added += self.generation.add(master, number, group, priced)
                 if not added:
                     break

@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 ROUTES_A_ROUND = 40  # columns of one vehicle group and pricing run
 MOST_LABELS = 4_000_000
-_SMOOTHING = 0.5  # weight of the stability centre, the duals of the best bound so far
+LEVELS = (3, 7)  # POIs of each site's ng-set that dominance compares, after none and before all
 _EPSILON = 1e-7
 ENUMERATED = 0.03  # relative gap below which routes may be few enough to enumerate
 RETRIED = 0.7  # share of the gap that last left too many, below which enumeration is tried again
@@ -113,6 +113,7 @@ class ColumnGeneration:
         self.pool: dict[tuple[int, tuple[int, ...]], Column] = {}
         self._single_vehicle = [k for k, c in enumerate(self.classes) if len(c.vehicles) == 1]
         self._too_many = math.inf
+        self._bounded = False  # one early exact run gives a bound to whoever ends the search soon
         self.cuts: tuple[SubsetRow, ...] = ()
         self._counter = Counter((), n)
         self._counts: dict[tuple[int, tuple[int, ...]], FloatArray] = {}
@@ -168,23 +169,22 @@ class ColumnGeneration:
         return master
 
     def generate(
-        self, master: Master, state: BranchState, centre: Duals | None, *, known: float, slack: float,
+        self, master: Master, state: BranchState, centre: Duals | None, *, known: float, slack: float, proving: bool,
         report_bound: Callable[[float], None] | None = None,
     ) -> Generated:
-        """Add columns until the relaxation is within ``slack`` of its bound, with dual smoothing.
+        """Add columns until quick pricing finds no more, or until the relaxation is within ``slack`` of its bound.
 
         Args:
             master: The program.
             state: Its branching decisions.
-            centre: Stability centre to begin with; ``None`` = none.
+            centre: Duals of the best bound so far; ``None`` = none.
             known: Upper bound on the node.
             slack: Distance from relaxation to bound at which it counts as solved, as a share of the gap.
+            proving: Whether to price exactly in the end, which proves the bound.
             report_bound: Takes every improved bound.
         """
         best, limits = math.inf, np.zeros(len(state.groups))
         centre = None if centre is None else self._padded(centre)
-        smooth = _SMOOTHING if centre is not None and slack > 0 else 0.0
-        quick = True
         while True:
             solved = master.solve(math.inf)
             if solved.values is None:
@@ -192,58 +192,49 @@ class ColumnGeneration:
             if self.is_over():
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
             duals = master.duals(solved)
-            if quick:
-                added = sum(self.add(master, number, group, self.price(
-                    group, duals, max(float(duals.group[number]), 0.0) + self.tolerance, exact=False))
-                    for number, group in enumerate(state.groups))
-                if added:
-                    continue
-            trial = duals if centre is None or smooth == 0.0 else duals.between(centre, smooth)
-            most, added, complete = self._price_exactly(
-                master, state, trial, duals, min(best, known) - solved.objective)
-            if not complete:
+            if self._price_all(master, state, duals, 0):
+                continue
+            early, self._bounded = not self._bounded, True
+            if not early and any(self._price_all(master, state, duals, compared) for compared in LEVELS):
+                continue
+            if not early and not proving:
+                return Generated(relaxed=solved, bound=known, duals=centre, most=limits, complete=True)
+            priced = self._price_exactly(master, state, duals)
+            if priced is None:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
-            bound = master.bound(trial, most)
+            most, added = priced
+            bound = master.bound(duals, most)
             if bound < best or centre is None:
-                best, centre, limits = min(bound, best), trial, most
+                best, centre, limits = min(bound, best), duals, most
                 if report_bound:
                     report_bound(max(best, self.cutoff()))
             room = slack * (best - self.cutoff()) + 1e-9 * max(self._most, abs(best))
-            if min(best, known) <= self.cutoff() or best <= solved.objective + room:
+            if min(best, known) <= self.cutoff() or best <= solved.objective + room or not added:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
-            if not added:
-                if trial is duals:
-                    return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
-                smooth = smooth / 2 if smooth > 0.1 else 0.0
-                quick = False
-            else:
-                smooth, quick = _SMOOTHING, True
 
-    def _price_exactly(
-        self, master: Master, state: BranchState, trial: Duals, duals: Duals, width: float,
-    ) -> tuple[FloatArray, int, bool]:
+    def _price_all(self, master: Master, state: BranchState, duals: Duals, compared: int) -> int:
+        """Add the columns of all groups that heuristic pricing finds; how many are new."""
+        return sum(self.add(master, number, group, self.price(group, duals, self._threshold(duals, number), compared))
+                   for number, group in enumerate(state.groups))
+
+    def _threshold(self, duals: Duals, number: int) -> float:
+        """Reduced value above which a route of a group enters the program."""
+        return max(float(duals.group[number]), 0.0) + self.tolerance
+
+    def _price_exactly(self, master: Master, state: BranchState, duals: Duals) -> tuple[FloatArray, int] | None:
         """Add the columns that exact pricing finds.
 
-        Args:
-            master: The program.
-            state: Its branching decisions.
-            trial: Duals to price at.
-            duals: The program's own duals, at which columns must have positive reduced value.
-            width: Routes worth less than the best by up to so much are returned too: they may improve the program.
-
         Returns:
-            Greatest reduced value of each group's routes, shape (groups,); columns added; whether the former is proved.
+            Greatest reduced value of each group's routes, shape (groups,), and columns added; ``None`` without a proof.
         """
-        most, added, complete = master.most(trial), 0, True
+        most, added = master.most(duals), 0
         for number, group in enumerate(state.groups):
-            threshold = max(most[number] - (width if math.isfinite(width) else 0.0), 0.0)
-            priced = self.price(group, trial, threshold + self.tolerance, exact=True)
-            complete &= priced.complete
+            priced = self.price(group, duals, self._threshold(duals, number), None)
+            if not priced.complete:
+                return None
             most[number] = max(priced.best, most[number])
-            routes = [self._column(group.vehicle_class, route) for route in priced.routes]
-            added += master.add(number, [c for c in routes if self._reduced(c, duals)
-                                         > max(duals.group[number], 0.0) + self.tolerance])
-        return most, added, complete
+            added += self.add(master, number, group, priced)
+        return most, added
 
     def _reward(self, group: VehicleGroup, duals: Duals) -> FloatArray:
         """Reward of each site for a vehicle group, floors' duals included, shape (n,); ``-inf`` = forbidden."""
@@ -254,15 +245,15 @@ class ColumnGeneration:
             reward[list(group.forbidden)] = -np.inf
         return reward
 
-    def price(self, group: VehicleGroup, duals: Duals, threshold: float, *, exact: bool) -> Priced:
-        """Routes of a vehicle group of reduced value above a threshold."""
+    def price(self, group: VehicleGroup, duals: Duals, threshold: float, compared: int | None) -> Priced:
+        """Routes of a vehicle group of reduced value above a threshold; ``compared`` as in ``pricing.price``."""
         graph, reward = self.graphs[group.vehicle_class], self._reward(group, duals)
-        self.calls["exact" if exact else "heuristic"] += 1
+        self.calls["exact" if compared is None else "heuristic"] += 1
         cut_duals = cut_duals_of(self.cuts, duals.cut, group.vehicle_class, self._n)
         with deferring_ctrl_c():
             priced = best_routes(
                 graph, reward, duals.visit, self.goal.driving, self.memory[group.vehicle_class], threshold=threshold,
-                exact=exact, most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS, cut_duals=cut_duals,
+                compared=compared, most_routes=ROUTES_A_ROUND, most_labels=MOST_LABELS, cut_duals=cut_duals,
                 left_s=self.left_s())
         self.calls["labels"] += priced.labels
         return priced

@@ -66,14 +66,16 @@ def completion(legs, time, gain, charge, bit, base, step, steps, stop):
 
 
 @njit(cache=True)
-def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charge, discounted, survival, low, high,
-                  start, base, half, capacity, limit, bound, step, threshold, exact, forwards, most_labels, in_cut,
+def extend_labels(following, count, time, fuel, bit, memory, compared, reward, dual, charge, discounted, survival, low,
+                  high, start, base, half, capacity, limit, bound, step, threshold, forwards, most_labels, in_cut,
                   in_memory, at_first_visit, cut_dual, stop, left_s):
     """All nondominated labels from one end of the route up to half the limit.
 
     Long because compiled: its arrays grow, and each part would need nearly all of them.
 
     Args:
+        compared: The POIs of each site's ng-set that dominance compares, as bits, shape (n, words): all of them, or
+            fewer for a heuristic; none = it compares no cuts either.
         discounted: Whether ``survival``, ``low``, ``high`` and ``start`` count.
         survival: Probability to survive a leg, shape (n, n).
         low: Least weight of the value, or probability, that the other end of a route multiplies a label's with.
@@ -103,7 +105,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
     chunks = 256
     chunk_of, chunk_next, chunk_size = np.full((n, 1 << KEYS), -1, np.int64), np.full(chunks, -1, np.int64), \
         np.zeros(chunks, np.int64)
-    keys = _keys(bit, memory, time)
+    keys, exact = _keys(bit, compared, time), compared.any()
     c_t, c_q = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
     c_x, c_y = np.zeros((chunks, CHUNK)), np.zeros((chunks, CHUNK))
     c_mask, c_cut_state = np.zeros((chunks, CHUNK, words), np.uint64), np.zeros((chunks, CHUNK), np.uint64)
@@ -154,7 +156,7 @@ def extend_labels(following, count, time, fuel, bit, memory, reward, dual, charg
                                     dominated = True
                                     if exact:
                                         for w in range(words):
-                                            if c_mask[chunk, k, w] & ~mask[label, w]:
+                                            if c_mask[chunk, k, w] & ~mask[label, w] & compared[i, w]:
                                                 dominated = False
                                                 break
                                         if dominated and has_cuts:
@@ -281,8 +283,8 @@ def _at_both_ends(forwards, x, y, low, high):
 
 
 @njit(cache=True)
-def _keys(bit, memory, time):
-    """The POIs by which each site's labels are grouped: the nearest of its ng-set, shape (n, KEYS)."""
+def _keys(bit, compared, time):
+    """The POIs by which each site's labels are grouped: the nearest of those compared, shape (n, KEYS)."""
     n = len(bit)
     keys, taken = np.full((n, KEYS), -1, np.int64), np.zeros(n, np.bool_)
     for i in range(n):
@@ -291,7 +293,7 @@ def _keys(bit, memory, time):
             best, least = -1, np.inf
             for j in range(n):
                 b = bit[j]
-                if b < 0 or j == i or taken[j] or not memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
+                if b < 0 or j == i or taken[j] or not compared[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1):
                     continue
                 far = time[j, i] if time[j, i] > 0 else 1e300  # 0 marks a leg outside the graph
                 if far < least:

@@ -42,7 +42,7 @@ class Priced:
 
 def price(
     graph: Graph, reward: FloatArray, dual: FloatArray, charge: float, memory: NDArray[np.uint64], *, threshold: float,
-    exact: bool, most_routes: int, most_labels: int, cut_duals: CutDuals, left_s: float = math.inf,
+    compared: int | None, most_routes: int, most_labels: int, cut_duals: CutDuals, left_s: float = math.inf,
 ) -> Priced:
     """The routes of greatest reduced value.
 
@@ -53,7 +53,8 @@ def price(
         charge: Cost of a second of driving and stopping.
         memory: ng-sets: the POIs that each site remembers, as bits, shape (n, words).
         threshold: Reduced value that a route must exceed.
-        exact: Whether to prove the best ng-route; else a heuristic that finds some good elementary routes quickly.
+        compared: How many POIs of each site's ng-set dominance compares, the nearest, and twice as many at stations.
+            ``None`` = all, which proves the best ng-route; fewer find good routes sooner; 0 finds some elementary ones.
         most_routes: Most routes to return.
         most_labels: Labels from one end after which an exact run ends without a proof.
         cut_duals: Duals of the cuts; none under a discount.
@@ -71,29 +72,32 @@ def price(
     subgraph = pricing_graph(graph, reward, dual, cut_duals)
     legs, time, fuel, base = subgraph.legs, subgraph.time_s, subgraph.fuel_s, subgraph.base
     half = graph.limit_s * (0.5 if plain else _MIDDLE)
-    memory = memory[subgraph.sites] if exact else np.full((len(legs), subgraph.words), np.uint64(0xFFFFFFFFFFFFFFFF))
+    everything = np.full((len(legs), subgraph.words), np.uint64(0xFFFFFFFFFFFFFFFF))
+    quick, exact = compared == 0, compared is None
+    memory = everything if quick else memory[subgraph.sites]
+    weighed = everything if compared is None else _nearest(subgraph, memory, compared)
     none = np.zeros((0, len(legs)))
-    step, ahead_bound, behind_bound = bounds_of(graph, subgraph, charge) if exact else (1.0, none, none)
+    step, ahead_bound, behind_bound = (1.0, none, none) if quick else bounds_of(graph, subgraph, charge)
     following, count = _adjacent(legs)
     stop, survival, arrival = stop_flag(), subgraph.survival, subgraph.arrival
     # What the rest of a route is worth if it is reached, and the probability to reach it: both within a range, over
     # which a label dominates; heuristic runs take one value of it.
     typical = _TYPICAL * (home + float(subgraph.reward.sum()))
     low, high = (home * graph.least_survival, home + graph.most_visits * float(subgraph.reward.max(initial=0.0))) \
-        if exact else (typical, typical)
-    least, most = (graph.least_survival, arrival) if exact else (_TYPICAL, np.full_like(arrival, _TYPICAL))
+        if not quick else (typical, typical)
+    least, most = (_TYPICAL, np.full_like(arrival, _TYPICAL)) if quick else (graph.least_survival, arrival)
     ahead = behind = extend_labels(
-        following, count, time, fuel, subgraph.bit, memory, subgraph.reward, subgraph.dual, charge, not plain, survival,
-        low, np.full(len(legs), high), 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s,
-        ahead_bound, step, threshold, exact, True, most_labels, subgraph.in_cut, subgraph.in_memory,
+        following, count, time, fuel, subgraph.bit, memory, weighed, subgraph.reward, subgraph.dual, charge, not plain,
+        survival, low, np.full(len(legs), high), 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s,
+        ahead_bound, step, threshold, True, most_labels, subgraph.in_cut, subgraph.in_memory,
         cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     if not graph.symmetric:
         following, count = _adjacent(legs.T)
         behind = extend_labels(
-            following, count, time.T.copy(), fuel.T.copy(), subgraph.bit, memory, subgraph.reward, subgraph.dual,
-            charge, not plain, survival.T.copy(), least, most, 0.0 if plain else home, base, graph.limit_s - half,
-            graph.capacity_s, graph.limit_s, behind_bound, step, threshold, exact, plain, most_labels, subgraph.in_cut,
-            subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
+            following, count, time.T.copy(), fuel.T.copy(), subgraph.bit, memory, weighed, subgraph.reward,
+            subgraph.dual, charge, not plain, survival.T.copy(), least, most, 0.0 if plain else home, base,
+            graph.limit_s - half, graph.capacity_s, graph.limit_s, behind_bound, step, threshold, plain, most_labels,
+            subgraph.in_cut, subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     value, left, right = join_labels(
         legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, not plain, survival, arrival,
         home, cut_duals.at_first_visit, cut_duals.dual, stop, *ahead[1:7], ahead[8], *behind[1:7], behind[8])
@@ -223,6 +227,18 @@ def _discounted_gains(graph: Graph, subgraph: PricingGraph, left_s: FloatArray) 
     behind = subgraph.arrival * reward - subgraph.dual
     behind[base] = -graph.discount.departure
     return chance * reward - subgraph.dual, behind[None, :]
+
+
+def _nearest(subgraph: PricingGraph, memory: NDArray[np.uint64], most: int) -> NDArray[np.uint64]:
+    """The POIs nearest to each site of those that it remembers, as bits, shape (k, words)."""
+    found = np.zeros_like(memory)
+    far = np.where(subgraph.legs, subgraph.time_s, np.inf)
+    far = np.minimum(far, far.T)
+    for i, order in enumerate(np.argsort(far, axis=1, kind="stable") if most else ()):
+        near = [b for b in subgraph.bit[order] if b >= 0 and memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1)]
+        for b in near[:most if subgraph.bit[i] >= 0 else 2 * most]:
+            found[i, b >> 6] |= np.uint64(1) << np.uint64(b & 63)
+    return found
 
 
 def _adjacent(legs: BoolArray) -> tuple[IntArray, IntArray]:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 
 from sva_bench.solver.columns.branch_and_price import BranchAndPrice
 from sva_bench.solver.columns.column_generation import ColumnGeneration
 from sva_bench.solver.knowledge import adopt, route_over, routes_of
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.routes.heuristic import VisitOrders
+from sva_bench.solver.routes.packing import Route
+from sva_bench.solver.searching import searched
 
 _log = logging.getLogger(__name__)
 
 _WITHIN = 0.99  # of the gap, for rounding
+_SEARCHES = 10  # with other seeds, before a long proof
 
 
 def prove_by_columns(problem: Problem) -> None:
@@ -29,13 +33,22 @@ def prove_by_columns(problem: Problem) -> None:
     generation = ColumnGeneration(instance=problem.instance, goal=problem.goal, scopes=problem.scopes,
                                   cutoff=cutoff, is_over=problem.clock.is_over,
                                   left_s=problem.clock.left_s)
-    legs_by_vehicle = problem.known.legs_by_vehicle
-    for m, route in enumerate(routes_of(problem.goal, legs_by_vehicle, problem.progress.orders)):
-        generation.add_route(m, route)
-    for m, order in problem.routes:
-        generation.add_route(m, route_over(legs_by_vehicle[m], order))
-    search_tree = BranchAndPrice(generation=generation, offer=offer, left_s=problem.clock.left_s,
-                                 report_bound=problem.progress.tighten)
+
+    def add(routes: Sequence[Route]) -> None:
+        legs_by_vehicle = problem.known.legs_by_vehicle
+        for m, route in enumerate(routes_of(problem.goal, legs_by_vehicle, problem.progress.orders)):
+            generation.add_route(m, route)
+        for m, order in routes:
+            generation.add_route(m, route_over(legs_by_vehicle[m], order))
+
+    def search_again() -> None:
+        for seed in range(1, _SEARCHES + 1):
+            if not problem.clock.is_over():
+                add(searched(problem, seed=seed))
+
+    add(problem.routes)
+    search_tree = BranchAndPrice(generation=generation, offer=offer, search_again=search_again,
+                                 left_s=problem.clock.left_s, report_bound=problem.progress.tighten)
     try:
         if search_tree.run():
             problem.progress.tighten(cutoff())

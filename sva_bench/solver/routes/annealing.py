@@ -12,7 +12,7 @@ from numba import njit
 
 from sva_bench.solver.polling import poll
 from sva_bench.solver.routes.pool import keep
-from sva_bench.solver.routes.tours import EPSILON, improve_tour, tour_time
+from sva_bench.solver.routes.tours import EPSILON, improve_tour, swap_routes, tour_time
 
 _POLL_EVERY = 64  # rounds
 _SWAP = 0.03  # share of the rounds in which two vehicles swap routes instead
@@ -76,7 +76,8 @@ def anneal(rng, begin, end, count, hot, cold, price, detour, vehicle_class, time
             lengths[m], changed[m] = current_length[m], False
             orders[m, :lengths[m]] = current[m, :lengths[m]]
         if vehicles > 1 and rng.random() < _SWAP:
-            _swap(rng, orders, lengths, allowed, changed, spare)
+            for m in swap_routes(rng, orders, lengths, allowed, spare):
+                changed[m] = True
         else:
             _remove_strings(rng, orders, lengths, near, where, changed)
         for m in range(vehicles):
@@ -150,26 +151,6 @@ def _worth(orders, lengths, vehicle_class, time, weights):
         for k in range(lengths[m]):
             value += weights[m, orders[m, k]]
     return value, seconds
-
-
-@njit(cache=True)
-def _swap(rng, orders, lengths, allowed, changed, spare):
-    """Swap the routes of two random vehicles, without the POIs that the other may not visit."""
-    a = int(rng.random() * len(lengths))
-    b = (a + 1 + int(rng.random() * (len(lengths) - 1))) % len(lengths)
-    length = lengths[a]
-    spare[:length] = orders[a, :length]
-    lengths[a] = 0
-    for k in range(lengths[b]):
-        if allowed[a, orders[b, k]]:
-            orders[a, lengths[a]] = orders[b, k]
-            lengths[a] += 1
-    lengths[b] = 0
-    for k in range(length):
-        if allowed[b, spare[k]]:
-            orders[b, lengths[b]] = spare[k]
-            lengths[b] += 1
-    changed[a] = changed[b] = True
 
 
 @njit(cache=True)

@@ -14,6 +14,7 @@ from sva_bench.solver.routes.charged_fronts import FRONT
 from sva_bench.solver.routes.fronts import fronts, route_time, time_with
 from sva_bench.solver.routes.local_search import improve_order, route_value
 from sva_bench.solver.routes.pool import keep
+from sva_bench.solver.routes.tours import swap_routes
 
 _RUIN = 0.6  # greatest share of the visits removed
 _BAN = 0.7  # share of the iterations in which POIs are barred from a random vehicle
@@ -54,7 +55,7 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
     vehicles, n = weights.shape
     orders, lengths = current.copy(), current_length.copy()
     visited = np.zeros(n, np.bool_)
-    allowed = np.zeros((vehicles, n), np.bool_)
+    allowed, earning = np.zeros((vehicles, n), np.bool_), weights > 0
     factor = np.ones((vehicles, n))
     ahead, ahead_size = np.zeros((vehicles, n + 2, 2, FRONT)), np.zeros((vehicles, n + 2), np.int64)
     behind, behind_size = np.zeros((vehicles, n + 2, 3, FRONT)), np.zeros((vehicles, n + 2), np.int64)
@@ -73,7 +74,7 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
             break
         orders[:], lengths[:] = current, current_length
         if vehicles > 1 and rng.random() < _SWAP:
-            _swap(rng, orders, lengths, weights, spare)
+            swap_routes(rng, orders, lengths, earning, spare)
         _ruin(rng, orders, lengths, near, removed)
         for m in range(vehicles):
             k = vehicle_class[m]
@@ -127,25 +128,6 @@ def rounds(rng, count, done, cycle, heat, vehicle_class, base, fuel, time, quick
                 current_length[:] = 0
                 current_value = 0.0
     return pool_size
-
-
-@njit(cache=True)
-def _swap(rng, orders, lengths, weights, spare):
-    """Swap the routes of two random vehicles, without the POIs at which the other earns nothing."""
-    a = int(rng.random() * len(lengths))
-    b = (a + 1 + int(rng.random() * (len(lengths) - 1))) % len(lengths)
-    length = lengths[a]
-    spare[:length] = orders[a, :length]
-    lengths[a] = 0
-    for k in range(lengths[b]):
-        if weights[a, orders[b, k]] > 0:
-            orders[a, lengths[a]] = orders[b, k]
-            lengths[a] += 1
-    lengths[b] = 0
-    for k in range(length):
-        if weights[b, spare[k]] > 0:
-            orders[b, lengths[b]] = spare[k]
-            lengths[b] += 1
 
 
 @njit(cache=True)

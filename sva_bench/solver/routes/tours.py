@@ -1,4 +1,4 @@
-"""The order of one route's visits improved in compiled code, where fuel can't bind: the clock is a sum over legs."""
+"""Routes changed in compiled code: swapped between vehicles, or, where fuel can't bind, their order improved."""
 
 from __future__ import annotations
 
@@ -166,3 +166,23 @@ def _shift(order, start, size, place, backwards, spare):
             order[k - size] = order[k]
     for k in range(size):
         order[to + k] = spare[k]
+
+
+@njit(cache=True)
+def swap_routes(rng, orders, lengths, allowed, spare):
+    """Swap the routes of two random vehicles, without the POIs that the other may not visit: which two."""
+    a = int(rng.random() * len(lengths))
+    b = (a + 1 + int(rng.random() * (len(lengths) - 1))) % len(lengths)
+    length = lengths[a]
+    spare[:length] = orders[a, :length]
+    lengths[a] = 0
+    for k in range(lengths[b]):
+        if allowed[a, orders[b, k]]:
+            orders[a, lengths[a]] = orders[b, k]
+            lengths[a] += 1
+    lengths[b] = 0
+    for k in range(length):
+        if allowed[b, spare[k]]:
+            orders[b, lengths[b]] = spare[k]
+            lengths[b] += 1
+    return a, b
