@@ -25,7 +25,8 @@ _SLACK = 0.03  # share of the gap: a relaxation this close to its bound counts a
 _VIOLATED = 1e-6  # violation of a requirement that counts as rounding
 _STRONG = 8  # candidates of strong branching
 CUTTING = 6  # vehicles from which subset-row cuts shorten the proof
-_LONG = 1_000_000  # labels of the root from which the search is a long one
+_SEARCH_EVERY = 5_000_000  # labels for which the heuristic runs once more: a small part of their time
+_SEARCHES = 10  # at most
 _TAIL = 0.02  # share of the gap: a round of cuts that lowers the bound by less is the last (tailing off)
 
 
@@ -43,18 +44,20 @@ class BranchAndPrice:
     Attributes:
         generation: The columns, and the pricing that generates them.
         offer: Takes a plan, as POIs of each vehicle in order, and keeps it if it is better.
-        search_again: Runs the heuristic, and adds its routes to the columns.
+        search_again: Runs the heuristic with a seed, and adds its routes to the columns.
         left_s: Time left [s].
         report_bound: Takes every upper bound on the goal.
         nodes: Nodes of the search tree so far.
+        searches: Runs of the heuristic so far.
     """
 
     generation: ColumnGeneration
     offer: Callable[[tuple[tuple[int, ...], ...]], None]
-    search_again: Callable[[], None]
+    search_again: Callable[[int], None]
     left_s: Callable[[], float]
     report_bound: Callable[[float], None]
     nodes: int = 0
+    searches: int = 0
 
     def run(self) -> bool:
         """Search until no node's bound is above the cutoff; ``False`` if time runs out or labels overflow before."""
@@ -124,12 +127,18 @@ class BranchAndPrice:
             if not (self._cutting() and before - best > _TAIL * (best - cutoff()) and generation.cut(used)):
                 if self.nodes == 1 and generation.cuts:
                     self._dive(node.state, centre)
-                if self.nodes == 1 and generation.calls["labels"] > _LONG:
-                    self.search_again()
-                    if best <= cutoff():
-                        return [], best
+                self._search_again()
+                if best <= cutoff():
+                    return [], best
                 return self._branch(node.state, solved, undecided, best, centre), best
             before = best
+
+    def _search_again(self) -> None:
+        """Run the heuristic with other seeds, as often as the proof is long."""
+        while self.searches < min(_SEARCHES, self.generation.calls["labels"] // _SEARCH_EVERY) \
+                and not self.generation.is_over():
+            self.searches += 1
+            self.search_again(self.searches)
 
     def _cutting(self) -> bool:
         """Whether to separate cuts: worthwhile with many vehicles; discounted labels carry no duals of cuts."""

@@ -195,7 +195,8 @@ class ColumnGeneration:
             if self._price_all(master, state, duals, 0):
                 continue
             early, self._bounded = not self._bounded, True
-            if not early and any(self._price_all(master, state, duals, compared) for compared in LEVELS):
+            levels = LEVELS if proving else LEVELS[:1]
+            if not early and any(self._price_all(master, state, duals, compared) for compared in levels):
                 continue
             if not early and not proving:
                 return Generated(relaxed=solved, bound=known, duals=centre, most=limits, complete=True)

@@ -16,7 +16,6 @@ from sva_bench.solver.searching import searched
 _log = logging.getLogger(__name__)
 
 _WITHIN = 0.99  # of the gap, for rounding
-_SEARCHES = 10  # with other seeds, before a long proof
 
 
 def prove_by_columns(problem: Problem) -> None:
@@ -41,10 +40,8 @@ def prove_by_columns(problem: Problem) -> None:
         for m, order in routes:
             generation.add_route(m, route_over(legs_by_vehicle[m], order))
 
-    def search_again() -> None:
-        for seed in range(1, _SEARCHES + 1):
-            if not problem.clock.is_over():
-                add(searched(problem, seed=seed))
+    def search_again(seed: int) -> None:
+        add(searched(problem, seed=seed))
 
     add(problem.routes)
     search_tree = BranchAndPrice(generation=generation, offer=offer, search_again=search_again,
