@@ -72,6 +72,15 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
     assert found.best == pytest.approx(max([0.0, *worth.values()]), abs=1e-9)
     if found.routes:
         assert worth[found.routes[0]] == pytest.approx(found.best, abs=1e-9)
+    # Quick runs, which compare few POIs, find routes that there are, worth what is said, and prove nothing.
+    for compared in (0, *column_generation.LEVELS):
+        quick = price(graph, reward, dual, 0.0, everything, threshold=0.0, compared=compared, most_routes=5,
+                      most_labels=10**6, cut_duals=cut_duals_of(cuts, duals, 0, n))
+        assert not quick.complete
+        for route in quick.routes:
+            assert 0.0 < worth[route] <= found.best + 1e-9
+        if quick.routes:
+            assert worth[quick.routes[0]] == pytest.approx(quick.best, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(25))

@@ -19,6 +19,7 @@ STEPS = 500  # of time, for completion bounds
 MOST_STEPS = 4000
 _MIDDLE = 0.6  # share of the limit up to which labels grow from the start under a discount: from the end, without
 # knowing their probability to be reached, more of them stay undominated
+_FEW, _NEAREST = 3, 8  # runs that compare so few POIs go from a POI to so many others only
 _TYPICAL = 0.3  # share of the greatest worth of the rest, and probability of a site, at which heuristic runs compare
 
 
@@ -54,7 +55,8 @@ def price(
         memory: ng-sets: the POIs that each site remembers, as bits, shape (n, words).
         threshold: Reduced value that a route must exceed.
         compared: How many POIs of each site's ng-set dominance compares, the nearest, and twice as many at stations.
-            ``None`` = all, which proves the best ng-route; fewer find good routes sooner; 0 finds some elementary ones.
+            ``None`` = all, which proves the best ng-route; fewer find good routes sooner, up to 3 over short legs only;
+            0 finds some elementary ones.
         most_routes: Most routes to return.
         most_labels: Labels from one end after which an exact run ends without a proof.
         cut_duals: Duals of the cuts; none under a discount.
@@ -78,6 +80,8 @@ def price(
     weighed = everything if compared is None else _nearest(subgraph, memory, compared)
     none = np.zeros((0, len(legs)))
     step, ahead_bound, behind_bound = (1.0, none, none) if quick else bounds_of(graph, subgraph, charge)
+    if compared is not None and compared <= _FEW:
+        legs = legs & _near(subgraph)
     following, count = _adjacent(legs)
     stop, survival, arrival = stop_flag(), subgraph.survival, subgraph.arrival
     # What the rest of a route is worth if it is reached, and the probability to reach it: both within a range, over
@@ -238,6 +242,17 @@ def _nearest(subgraph: PricingGraph, memory: NDArray[np.uint64], most: int) -> N
         near = [b for b in subgraph.bit[order] if b >= 0 and memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1)]
         for b in near[:most if subgraph.bit[i] >= 0 else 2 * most]:
             found[i, b >> 6] |= np.uint64(1) << np.uint64(b & 63)
+    return found
+
+
+def _near(subgraph: PricingGraph) -> BoolArray:
+    """Whether a leg joins a POI to one of its nearest, or leads to or from another site, shape (k, k)."""
+    refuels = subgraph.bit < 0
+    far = np.where(subgraph.legs, subgraph.time_s, np.inf)
+    far = np.minimum(far, far.T)
+    far[:, refuels] = np.inf
+    near = np.argsort(np.argsort(far, axis=1, kind="stable"), axis=1, kind="stable") < _NEAREST
+    found: BoolArray = near | near.T | refuels[:, None] | refuels[None, :]
     return found
 
 
