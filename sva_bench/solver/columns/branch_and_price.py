@@ -23,7 +23,8 @@ _log = logging.getLogger(__name__)
 
 _SLACK = 0.03  # share of the gap: a relaxation this close to its bound counts as solved
 _VIOLATED = 1e-6  # violation of a requirement that counts as rounding
-_STRONG = 8  # candidates of strong branching
+_STRONG, _PROBED = 8, 3  # candidates of strong branching by the columns there are, and of these by new ones too
+_ROUNDS = 6  # of pricing for that
 CUTTING = 6  # vehicles from which subset-row cuts shorten the proof
 _SEARCH_EVERY = 5_000_000  # labels for which the heuristic runs once more: a small part of their time
 _SEARCHES = 10  # at most
@@ -104,7 +105,7 @@ class BranchAndPrice:
             if generation.remember([column for _, column, _ in used], ignore_most=integral):
                 proving = False
                 continue
-            if not proving:
+            if not made.exact:
                 proving = True
                 continue
             if master.violation(solved.values) > _VIOLATED:
@@ -241,16 +242,25 @@ class BranchAndPrice:
         """Two children, by strong branching: on whether a POI is visited, or whether a vehicle group visits it."""
         if not candidates:
             raise RuntimeError("a fractional solution without a fractional visit")
-        best, chosen = -math.inf, self._children(state, *candidates[0][1:])
-        for _, poi, number in candidates[:_STRONG if len(candidates) > 1 else 0]:
-            children = self._children(state, poi, number)
-            drops = [max(solved.objective - self.generation.master(child, duals).solve(math.inf).objective, 0.0)
-                     for child in children]
-            score = max(min(drops), 1e-6) * max(max(drops), 1e-6)
-            if score > best * (1 + 1e-9):
-                best, chosen = score, children
+        looks = [self._children(state, poi, number) for _, poi, number in candidates[:_STRONG]]
+        if len(looks) > 1:
+            looks = sorted(looks, key=lambda children: -self._score(solved, children, duals, rounds=0))[:_PROBED]
+            looks = [max(looks, key=lambda children: self._score(solved, children, duals, rounds=_ROUNDS))]
         return [_Node(state=child, bound=bound, duals=None if duals is None else _fitted(duals, state, child))
-                for child in chosen]
+                for child in looks[0]]
+
+    def _score(self, solved: Relaxed, children: Sequence[BranchState], duals: Duals | None, *, rounds: int) -> float:
+        """How far a branch brings the relaxation down, after so many rounds of the quickest pricing."""
+        drops = []
+        for child in children:
+            master = self.generation.master(child, duals)
+            relaxed = master.solve(math.inf)
+            for _ in range(rounds):
+                if relaxed.values is None or not self.generation.price_all(master, child, master.duals(relaxed), 0):
+                    break
+                relaxed = master.solve(math.inf)
+            drops.append(max(solved.objective - relaxed.objective, 1e-6))
+        return round(math.log(math.prod(drops)), 9)
 
     def _children(self, state: BranchState, poi: int, number: int) -> tuple[BranchState, BranchState]:
         if number < 0:

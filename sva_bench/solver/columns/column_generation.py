@@ -33,6 +33,7 @@ _log = logging.getLogger(__name__)
 ROUTES_A_ROUND = 40  # columns of one vehicle group and pricing run
 MOST_LABELS = 4_000_000
 LEVELS = (3, 7)  # POIs of each site's ng-set that dominance compares, after none and before all
+DEAR = 50_000  # labels of an exact run from which the levels before it pay
 _EPSILON = 1e-7
 ENUMERATED = 0.03  # relative gap below which routes may be few enough to enumerate
 RETRIED = 0.7  # share of the gap that last left too many, below which enumeration is tried again
@@ -50,6 +51,7 @@ class Generated:
         duals: The duals that give the bound; ``None`` if none were priced exactly.
         most: Greatest reduced value of each vehicle group's routes at these duals, shape (groups,).
         complete: Whether the bound is proved: neither time nor labels ran out.
+        exact: Whether the last pricing run was an exact one.
     """
 
     relaxed: Relaxed
@@ -57,6 +59,7 @@ class Generated:
     duals: Duals | None
     most: FloatArray
     complete: bool
+    exact: bool = True
 
 
 @dataclass(eq=False, kw_only=True)
@@ -113,7 +116,7 @@ class ColumnGeneration:
         self.pool: dict[tuple[int, tuple[int, ...]], Column] = {}
         self._single_vehicle = [k for k, c in enumerate(self.classes) if len(c.vehicles) == 1]
         self._too_many = math.inf
-        self._bounded = False  # one early exact run gives a bound to whoever ends the search soon
+        self._exact_labels = 0  # of the dearest exact run; the first, an early one, gives those who stop soon a bound
         self.cuts: tuple[SubsetRow, ...] = ()
         self._counter = Counter((), n)
         self._counts: dict[tuple[int, tuple[int, ...]], FloatArray] = {}
@@ -192,14 +195,15 @@ class ColumnGeneration:
             if self.is_over():
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
             duals = master.duals(solved)
-            if self._price_all(master, state, duals, 0):
+            if self.price_all(master, state, duals, 0):
                 continue
-            early, self._bounded = not self._bounded, True
-            levels = LEVELS if proving else LEVELS[:1]
-            if not early and any(self._price_all(master, state, duals, compared) for compared in levels):
-                continue
-            if not early and not proving:
-                return Generated(relaxed=solved, bound=known, duals=centre, most=limits, complete=True)
+            if self._exact_labels > DEAR:
+                levels = LEVELS if proving else LEVELS[:1]
+                if any(self.price_all(master, state, duals, compared) for compared in levels):
+                    continue
+                if not proving:
+                    return Generated(relaxed=solved, bound=known, duals=centre, most=limits, complete=True,
+                                     exact=False)
             priced = self._price_exactly(master, state, duals)
             if priced is None:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=False)
@@ -213,7 +217,7 @@ class ColumnGeneration:
             if min(best, known) <= self.cutoff() or best <= solved.objective + room or not added:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
 
-    def _price_all(self, master: Master, state: BranchState, duals: Duals, compared: int) -> int:
+    def price_all(self, master: Master, state: BranchState, duals: Duals, compared: int) -> int:
         """Add the columns of all groups that heuristic pricing finds; how many are new."""
         return sum(self.add(master, number, group, self.price(group, duals, self._threshold(duals, number), compared))
                    for number, group in enumerate(state.groups))
@@ -231,6 +235,7 @@ class ColumnGeneration:
         most, added = master.most(duals), 0
         for number, group in enumerate(state.groups):
             priced = self.price(group, duals, self._threshold(duals, number), None)
+            self._exact_labels = max(self._exact_labels, priced.labels)
             if not priced.complete:
                 return None
             most[number] = max(priced.best, most[number])
