@@ -23,7 +23,8 @@ ROOMS = (
 # The same within the solver, whose rooms are many.
 SOLVER = (
     "polling", "program", "highs", "outcomes", "risk", "discounts", "goal", "units", "preprocess", "routes",
-    "knowledge", "problem", "flow", "edges", "columns", "methods", "solve", "ties", "finished", "two_stage", "rest",
+    "knowledge", "problem", "searching", "flow", "edges", "columns", "methods", "solve", "ties", "finished",
+    "two_stage", "rest",
 )
 ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet": ("execution/engines/bullet.py",), "pybullet_data": ("execution/engines/bullet.py",),

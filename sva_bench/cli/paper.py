@@ -13,6 +13,7 @@ from sva_bench.cli.options import FidelityOption, Rollouts, Seed, Trials, Verbos
 from sva_bench.cli.terminal import messages, progress_bars, set_up_logging
 from sva_bench.cli.usage import PlainCommand, PlainGroup
 from sva_bench.files.outputs import check_folder, check_output, write_result
+from sva_bench.files.words import words_of
 from sva_bench.study.libraries import PRELOAD
 from sva_bench.workers.pool import local_workers
 
@@ -100,6 +101,8 @@ def reaction(
 def runtimes(
     whole: Annotated[bool, typer.Option("--whole", help="The paper's whole grid, which takes a day and more; default: "
                                         "four sizes, one seed, one availability, under ten minutes.")] = False,
+    method: Annotated[list[str] | None, typer.Option(metavar="NAME,...", help="Only these methods of the five; others "
+                                                     "can follow in the same folder.", show_default="all")] = None,
     time_limit: Annotated[float | None, typer.Option(
         metavar="S", min=0, callback=finite, show_default="10, of the whole grid 60",
         help="Wall-clock limit of each solve.")] = None,
@@ -113,9 +116,12 @@ def runtimes(
     set_up_logging(verbose)
     with loading():
         from sva_bench.paper.runtimes import NAME, QUICK, reproduce
-        from sva_bench.paper.solves import FULL
+        from sva_bench.paper.solves import FULL, METHODS
 
     study = FULL if whole else QUICK
+    if method:
+        chosen = words_of(method, "--method ", METHODS, "method in these tables")
+        study = replace(study, methods=tuple(name for name in METHODS if name in chosen))
     study = replace(study, tau=tau, time_limit_s=study.time_limit_s if time_limit is None else time_limit)
     folder = out or Path("runs") / (NAME if whole else f"{NAME}-quick")
     check_folder(folder, "--out")

@@ -10,6 +10,7 @@ from statistics import fmean, median, stdev
 from typing import TypeVar
 
 from sva_bench.errors import BadInput
+from sva_bench.files.printable import counted
 from sva_bench.paper.printed import FIGURE_3, FIGURE_3_LETTERS, LIMIT_S, TABLE_2, TABLE_3, Box, box_of
 from sva_bench.paper.solves import FULL, METHODS, VEHICLES, Row, Study, read_rows, run
 
@@ -81,20 +82,14 @@ def markdown(rows: Sequence[Row], study: Study, picture: str | None = None) -> s
         "time. A gap is bound minus plan in per cent of the plan, as CPLEX has it; 0.0001 % counts as none."
         + _busy(rows),
         f"Proved: {_proofs(rows)}.",
-        "Made by `sva-bench reproduce runtimes --whole`; its rows are in the `.csv` beside this file.",
+        f"Made by `{_command(study)}`; its rows are in the `.csv` beside this file.",
         "Methods: `dep` is the paper's formulation (its *a*), `relaxed` its reformulation (*b*), `lshaped` its "
         "decomposition (*c*); `expected` is the one-stage model that the three collapse to, and `auto` what "
         "`sva-bench plan` takes unasked. All of them begin with the heuristic's plan.",
-        "## Cuts and gap of the decomposition (Table 2)", cuts_table(rows),
-        "BD: optimality cuts, SEC: subtour cuts, averages; up to the limit where a solve met it. The paper adds its "
-        "cuts while CPLEX branches. HiGHS takes none there, so ours come between runs of the master program, and a "
-        "limit that ends the first run leaves one optimality cut and no subtour cut. Ours count a subtour cut for each "
-        "POI of a component that is not connected with the base, and for each vehicle; the paper has one a component.",
-        "## Runtime of the decomposition (Table 3)", runtime_table(rows),
-        f"In seconds. A solve that met its limit counts with the time it took: {LIMIT_S:g} in the paper.",
-        "## Gaps (Figure 3)", f"![Box plots of gaps]({picture})" if picture else "", gaps_table(rows),
-        "Least / lower quartile / median / upper quartile / greatest gap in per cent; the picture's whiskers reach to "
-        "the least and the greatest. A square is a box without height.",
+        *(_decomposition(rows) if _of(rows, DECOMPOSITION) else ()),
+        "## Gaps (Figure 3)", f"![Box plots of gaps]({picture})" if picture else "", gaps := gaps_table(rows),
+        ("Least / lower quartile / median / upper quartile / greatest gap in per cent; the" if gaps else "The")
+        + " picture's whiskers reach to the least and the greatest. A square is a box without height.",
         "## All methods by number of POIs",
         methods_table(rows, "POIs", lambda row: row.pois),
         "BD and SEC are averages. All but `lshaped` have subtour cuts only: those of their last program.",
@@ -105,6 +100,19 @@ def markdown(rows: Sequence[Row], study: Study, picture: str | None = None) -> s
         "## What the paper leaves open", "\n".join(f"- {line}" for line in _left_open(study)),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _decomposition(rows: Sequence[Row]) -> list[str]:
+    """The paper's two tables of its decomposition."""
+    return [
+        "## Cuts and gap of the decomposition (Table 2)", cuts_table(rows),
+        "BD: optimality cuts, SEC: subtour cuts, averages; up to the limit where a solve met it. The paper adds its "
+        "cuts while CPLEX branches. HiGHS takes none there, so ours come between runs of the master program, and a "
+        "limit that ends the first run leaves one optimality cut and no subtour cut. Ours count a subtour cut for each "
+        "POI of a component that is not connected with the base, and for each vehicle; the paper has one a component.",
+        "## Runtime of the decomposition (Table 3)", runtime_table(rows),
+        f"In seconds. A solve that met its limit counts with the time it took: {LIMIT_S:g} in the paper.",
+    ]
 
 
 def cuts_table(rows: Sequence[Row]) -> str:
@@ -200,12 +208,18 @@ def _left_open(study: Study) -> list[str]:
     ]
 
 
+def _command(study: Study) -> str:
+    """The command that makes, or goes on with, a study of the shipped kinds."""
+    chosen = "" if study.methods == METHODS else "".join(f" --method {method}" for method in study.methods)
+    return f"sva-bench reproduce runtimes{' --whole' if study.pois == FULL.pois else ''}{chosen}"
+
+
 def _grid(study: Study) -> str:
     def listed(values: Iterable[float], unit: str = "") -> str:
         return ", ".join(f"{value:g}{unit}" for value in values)
     return (f"{listed(study.pois)} POIs; seeds {listed(study.seeds)}; fuel capacities of "
             f"{listed(study.fuel_multiples)} largest distances; availability of the second of {VEHICLES} vehicles "
-            f"{listed((100 * p for p in study.availabilities), ' %')}; {len(study.methods)} methods")
+            f"{listed((100 * p for p in study.availabilities), ' %')}; {counted(len(study.methods), 'method')}")
 
 
 def _of(rows: Sequence[Row], method: str) -> list[Row]:

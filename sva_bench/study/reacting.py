@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from sva_bench.choices import NEWS, POLICY_NAMES, USUAL_NEWS, News, PolicyName
-from sva_bench.errors import BadInput, nearest
-from sva_bench.files.complaints import shown
+from sva_bench.errors import BadInput
+from sva_bench.files.words import words_of
 
 if TYPE_CHECKING:
     from sva_bench.world.model import World  # commands check their words before they load it
 
-Word = TypeVar("Word", bound=str)
 Reaction = tuple[PolicyName, News]
 
 
@@ -27,7 +26,7 @@ def policies_of(words: Sequence[str], what: str = "--policy ") -> tuple[PolicyNa
     Raises:
         BadInput: If a name is unknown, missing or a duplicate.
     """
-    return _words(words, what, POLICY_NAMES, "policy")
+    return words_of(words, what, POLICY_NAMES, "policy")
 
 
 def news_of(words: Sequence[str], what: str = "--news ") -> tuple[News, ...]:
@@ -36,23 +35,7 @@ def news_of(words: Sequence[str], what: str = "--news ") -> tuple[News, ...]:
     Raises:
         BadInput: If a word is unknown, missing or a duplicate.
     """
-    return _words(words, what, NEWS, "kind of news")
-
-
-def _words(words: Sequence[str], what: str, known: Sequence[Word], kind: str) -> tuple[Word, ...]:
-    by_name = {str(word): word for word in known}
-    found: list[Word] = []
-    for part in ",".join(words).split(",") if words else ():
-        name = part.strip()
-        if not name:
-            raise BadInput(f"{what}{shown(','.join(words))}: an entry is empty; expected names with commas between "
-                           f"them, of {', '.join(known)}")
-        if name not in by_name:
-            raise BadInput(f"{what}{shown(name)}: there is no such {kind}; {nearest(name, list(by_name))}")
-        if by_name[name] in found:
-            raise BadInput(f"{what}{name}: given twice; give it once")
-        found.append(by_name[name])
-    return tuple(found)
+    return words_of(words, what, NEWS, "kind of news")
 
 
 def pairs_of(world: World, policies: Sequence[PolicyName], news: Sequence[News]) -> tuple[Reaction, ...]:

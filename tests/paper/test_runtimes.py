@@ -177,6 +177,26 @@ def test_a_limit_that_makes_no_sense_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+def test_methods_can_be_solved_one_after_the_other_in_a_folder(folder: Path, tmp_path: Path) -> None:
+    for methods in (("auto",), ("auto", "lshaped")):
+        page = reproduce(replace(TINY, methods=methods), tmp_path / "parts")
+        assert "--method auto" in page
+        assert ("Table 2" in page) == ("lshaped" in methods)
+    parts, whole = read_rows(tmp_path / "parts" / "paper-runtimes.csv"), read_rows(folder / "paper-runtimes.csv")
+    assert [(one.case, one.value) for one in parts] == [
+        (one.case, one.value) for method in ("auto", "lshaped") for one in whole if one.method == method]
+
+
+@pytest.mark.parametrize(("method", "said"), [
+    ("lsaped", "did you mean 'lshaped'?"), ("auto,auto", "given twice"), ("auto,", "an entry is empty")])
+def test_methods_that_the_tables_do_not_have_are_refused(
+    method: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command_line(["reproduce", "runtimes", "--method", method, "--out", str(tmp_path / "out")]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     assert run_command_line(["reproduce", "runtimes", "--out", str(tmp_path / "file" / "out")]) == 2

@@ -72,7 +72,7 @@ def price(
     if len(cut_duals.dual) and not plain:
         raise ValueError("discounted labels can't account for the duals of cuts")
     subgraph = pricing_graph(graph, reward, dual, cut_duals)
-    legs, time, fuel, base = subgraph.legs, subgraph.time_s, subgraph.fuel_s, subgraph.base
+    legs, time, fuel, base = _legs(subgraph, compared), subgraph.time_s, subgraph.fuel_s, subgraph.base
     half = graph.limit_s * (0.5 if plain else _MIDDLE)
     everything = np.full((len(legs), subgraph.words), np.uint64(0xFFFFFFFFFFFFFFFF))
     quick, exact = compared == 0, compared is None
@@ -80,19 +80,12 @@ def price(
     weighed = everything if compared is None else _nearest(subgraph, memory, compared)
     none = np.zeros((0, len(legs)))
     step, ahead_bound, behind_bound = (1.0, none, none) if quick else bounds_of(graph, subgraph, charge)
-    if compared is not None and compared <= _FEW:
-        legs = legs & _near(subgraph)
     following, count = _adjacent(legs)
-    stop, survival, arrival = stop_flag(), subgraph.survival, subgraph.arrival
-    # What the rest of a route is worth if it is reached, and the probability to reach it: both within a range, over
-    # which a label dominates; heuristic runs take one value of it.
-    typical = _TYPICAL * (home + float(subgraph.reward.sum()))
-    low, high = (home * graph.least_survival, home + graph.most_visits * float(subgraph.reward.max(initial=0.0))) \
-        if not quick else (typical, typical)
-    least, most = (_TYPICAL, np.full_like(arrival, _TYPICAL)) if quick else (graph.least_survival, arrival)
+    stop, survival = stop_flag(), subgraph.survival
+    low, high, least, most = _ranges(graph, subgraph, quick=quick)
     ahead = behind = extend_labels(
         following, count, time, fuel, subgraph.bit, memory, weighed, subgraph.reward, subgraph.dual, charge, not plain,
-        survival, low, np.full(len(legs), high), 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s,
+        survival, low, high, 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s,
         ahead_bound, step, threshold, True, most_labels, subgraph.in_cut, subgraph.in_memory,
         cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     if not graph.symmetric:
@@ -103,13 +96,11 @@ def price(
             graph.limit_s - half, graph.capacity_s, graph.limit_s, behind_bound, step, threshold, plain, most_labels,
             subgraph.in_cut, subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
     value, left, right = join_labels(
-        legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, not plain, survival, arrival,
-        home, cut_duals.at_first_visit, cut_duals.dual, stop, *ahead[1:7], ahead[8], *behind[1:7], behind[8])
+        legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, not plain, survival,
+        subgraph.arrival, home, cut_duals.at_first_visit, cut_duals.dual, stop, *ahead[1:7], ahead[8],
+        *behind[1:7], behind[8])
     order = np.argsort(-value, kind="stable")[:most_routes]
-    routes = []
-    for k in order:
-        first, second = _chain(ahead, int(left[k])), _chain(behind, int(right[k])) if right[k] >= 0 else []
-        routes.append(tuple(subgraph.sites[[*first[::-1], *(second or [base])]].tolist()))
+    routes = [_route(subgraph, _chain(ahead, int(left[k])), _chain(behind, int(right[k]))) for k in order]
     return Priced(routes=tuple(dict.fromkeys(routes)), best=float(value[order[0]]) if len(order) else threshold,
                   complete=exact and not ahead[9] and not behind[9], labels=len(ahead[0]))
 
@@ -233,6 +224,19 @@ def _discounted_gains(graph: Graph, subgraph: PricingGraph, left_s: FloatArray) 
     return chance * reward - subgraph.dual, behind[None, :]
 
 
+def _ranges(graph: Graph, subgraph: PricingGraph, *, quick: bool) -> tuple[float, FloatArray, float, FloatArray]:
+    """Over which a label dominates: of what the rest of a route is worth if it is reached, and of the probability to.
+
+    Least and greatest of both, the greatest by site, shape (k,); a quick run takes one value of each.
+    """
+    home, sites = graph.discount.home, len(subgraph.sites)
+    if quick:
+        typical = _TYPICAL * (home + float(subgraph.reward.sum()))
+        return typical, np.full(sites, typical), _TYPICAL, np.full(sites, _TYPICAL)
+    high = home + graph.most_visits * float(subgraph.reward.max(initial=0.0))
+    return home * graph.least_survival, np.full(sites, high), graph.least_survival, subgraph.arrival
+
+
 def _nearest(subgraph: PricingGraph, memory: NDArray[np.uint64], most: int) -> NDArray[np.uint64]:
     """The POIs nearest to each site of those that it remembers, as bits, shape (k, words)."""
     found = np.zeros_like(memory)
@@ -245,14 +249,16 @@ def _nearest(subgraph: PricingGraph, memory: NDArray[np.uint64], most: int) -> N
     return found
 
 
-def _near(subgraph: PricingGraph) -> BoolArray:
-    """Whether a leg joins a POI to one of its nearest, or leads to or from another site, shape (k, k)."""
+def _legs(subgraph: PricingGraph, compared: int | None) -> BoolArray:
+    """The legs that a run takes, shape (k, k): a quick one from a POI to its nearest only, and to other sites."""
+    if compared is None or compared > _FEW:
+        return subgraph.legs
     refuels = subgraph.bit < 0
     far = np.where(subgraph.legs, subgraph.time_s, np.inf)
     far = np.minimum(far, far.T)
     far[:, refuels] = np.inf
     near = np.argsort(np.argsort(far, axis=1, kind="stable"), axis=1, kind="stable") < _NEAREST
-    found: BoolArray = near | near.T | refuels[:, None] | refuels[None, :]
+    found: BoolArray = subgraph.legs & (near | near.T | refuels[:, None] | refuels[None, :])
     return found
 
 
@@ -273,3 +279,8 @@ def _chain(labels: tuple[Any, ...], number: int) -> list[int]:
         found.append(int(site[number]))
         number = int(parent[number])
     return found
+
+
+def _route(subgraph: PricingGraph, ahead: list[int], behind: list[int]) -> tuple[int, ...]:
+    """Sites of the whole route that two chains make; without the second, the first goes back to the base at once."""
+    return tuple(subgraph.sites[[*ahead[::-1], *(behind or [subgraph.base])]].tolist())
