@@ -230,3 +230,38 @@ def test_few_sites_take_few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(long_routes, "anneal", noted)
     found(paper_instance("A", pois=11, vehicles=2, availability=0.75, seed=0), starts=1)
     assert max(ends) == 1 + long_routes.ROUNDS * 12 // 60
+
+
+def test_crossing_the_plans_of_the_starts_never_loses_value_and_pays_on_most_large_instances(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    better = 0
+    for seed in range(4):
+        instance = paper_instance("A", pois=60, vehicles=2, availability=0.75, seed=seed)
+        weights = weights_of(instance)
+        crossed = worth(weights, found(instance, starts=3))
+        with monkeypatch.context() as patch:
+            patch.setattr(long_routes, "CROSSINGS", 0)
+            alone = worth(weights, found(instance, starts=3))
+        assert crossed >= alone - 1e-9  # the starts are the same
+        better += crossed > alone + 1e-9
+    assert better >= 2
+
+
+def test_crossing_begins_over_pairs_of_the_best_plans_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    instance = paper_instance("A", pois=40, vehicles=2, availability=0.75, seed=0)
+    weights, masks, real = weights_of(instance), list[np.ndarray](), long_routes._Run.anneal
+
+    def noted(self: long_routes._Run, rng: np.random.Generator, start: VisitOrders, rounds: int, heat: float,
+              allowed: np.ndarray) -> VisitOrders:
+        masks.append(allowed)
+        return real(self, rng, start, rounds, heat, allowed)
+
+    monkeypatch.setattr(long_routes._Run, "anneal", noted)
+    found(instance, starts=4)
+    every = int((weights > 0).sum())
+    pairs = [int(mask.sum()) for mask in masks]
+    assert pairs[:4] == [every] * 4
+    assert len(pairs) == 4 + 2 * 4 * long_routes.CROSSINGS
+    assert all(0 < near < every for near in pairs[4::2])
+    assert pairs[5::2] == [every] * (4 * long_routes.CROSSINGS)

@@ -35,7 +35,7 @@ _CYCLE = 50  # iterations between two restarts, from the best plan or the empty 
 _HEAT = 0.03  # loss that is accepted at the start of a cycle, relative to the best value
 _PAIRS = 150  # POIs times vehicles beyond which the search anneals
 _LONG = 2.0  # mission limit, in longest legs, from which it does
-_LONG_STARTS = 2.5  # so many times as many starts: these instances take long to prove
+_LONG_STARTS = 1.5  # so many times as many starts, and crossings of their plans: these take long to prove
 _POLLS = 4  # times that each start reads the clock
 _DETOUR = 0.01  # of the median leg; keeps the ratio finite for a POI that costs no detour
 

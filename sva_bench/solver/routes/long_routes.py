@@ -1,4 +1,4 @@
-"""A good plan quickly where fuel can't bind: annealing from several starts; no proof.
+"""A good plan quickly where fuel can't bind: annealing from several starts, then near what their plans share; no proof.
 
 Deterministic: it counts rounds, and reads the clock only to stop early.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +20,10 @@ from sva_bench.solver.routes.fronts import LegTables
 from sva_bench.solver.routes.packing import Route
 from sva_bench.solver.routes.plans import VisitOrders, as_arrays, as_orders
 
-ROUNDS = 10_000
-"""Rounds of a start."""
+ROUNDS = 2_500
+"""Rounds of a start, and of each part of a crossing."""
+CROSSINGS = 3
+"""Crossings for each start."""
 GUIDED_ROUNDS = 5_000
 """Rounds over the allowed pairs, and as many over all."""
 
@@ -29,6 +31,8 @@ _FEW = 60  # sites below which there are fewer rounds
 _HOT, _COLD = 0.02, 0.0005  # loss that is accepted at first and in the end, relative to a typical value
 _TYPICAL = 0.7  # value of a plan, relative to that of all visits
 _AGAIN = 1 / 3  # of the heat, where a plan is improved
+_ELITE = 4  # plans that are crossed, the best with different visits ...
+_PARENTS = 3  # ... so many of them at a time
 _PRICE = 0.05  # what a second of a route costs, in mean rewards of a second
 _DETOUR = 0.006  # of the median leg; keeps the ratio finite for a POI that costs no detour
 _POOL = 20_000  # routes kept
@@ -129,6 +133,10 @@ def search_long(
 ) -> tuple[VisitOrders, tuple[Route, ...]]:
     """A plan worth at least as much as the one it starts from, and routes of good plans, each with its vehicle class.
 
+    After short starts it crosses the best plans: it anneals over the pairs of vehicle and POI of some of them, then
+    over all pairs from there. Which vehicle serves which area decides the value of large plans; annealing alone keeps
+    the areas of its first rounds, and crossing chooses among those of several starts.
+
     Args:
         tables: The legs of all vehicle classes.
         weights: Reward of a visit by vehicle m to site j, shape (M, n).
@@ -144,11 +152,19 @@ def search_long(
     run = _Run(tables, weights, start, stop, offer)
     n = len(run.tours.sites)
     rounds = 1 + int(ROUNDS * min(1.0, n / _FEW))
+    plans: list[VisitOrders] = []
     for number in range(starts if n > 1 else 0):
         if number and run.is_over():
             break
         rng = np.random.default_rng((seed, number))
-        run.anneal(rng, start if number == 0 else tuple(() for _ in start), rounds, 1.0, weights > 0)
+        plans.append(run.anneal(rng, start if number == 0 else tuple(() for _ in start), rounds, 1.0, weights > 0))
+    rng = np.random.default_rng((seed, starts))
+    for _ in range(CROSSINGS * starts):
+        elite = run.elite(plans)
+        if run.is_over() or len(elite) < 2:
+            break
+        parents = [elite[k] for k in rng.permutation(len(elite))[:_PARENTS]]
+        plans = [*elite, run.anneal_near(rng, _pairs(weights.shape, parents), rounds)]
     return run.best, run.routes()
 
 
@@ -178,10 +194,17 @@ def guided(
     run = _Run(tables, weights, start, stop)
     if len(run.tours.sites) > 1:
         rng = np.random.default_rng(seed)
-        near = run.anneal(rng, tuple(() for _ in start), rounds, 1.0, allowed & (weights > 0))
-        if onward and not run.is_over():
-            run.anneal(rng, near, rounds, _AGAIN, weights > 0)
+        run.anneal_near(rng, allowed, rounds, onward=onward)
     return run.best
+
+
+def _pairs(shape: tuple[int, ...], plans: Sequence[VisitOrders]) -> BoolArray:
+    """The pairs of vehicle and POI of some plans, shape (M, n)."""
+    pairs: BoolArray = np.zeros(shape, dtype=np.bool_)
+    for orders in plans:
+        for m, order in enumerate(orders):
+            pairs[m, list(order)] = True
+    return pairs
 
 
 class _Run:
@@ -235,6 +258,27 @@ class _Run:
             if self.is_over():
                 break
         return found
+
+    def anneal_near(self, rng: np.random.Generator, allowed: BoolArray, rounds: int, *, onward: bool = True,
+                    ) -> VisitOrders:
+        """The best plan of an annealing over some pairs, from no visits, and of one over all pairs from there.
+
+        Args:
+            rng: Random numbers.
+            allowed: Whether vehicle m may visit site j, shape (M, n).
+            rounds: Rounds of each part.
+            onward: Whether to go on over all pairs.
+        """
+        earns = self._weights > 0
+        near = self.anneal(rng, tuple(() for _ in self._weights), rounds, 1.0, allowed & earns)
+        if onward and not self.is_over():
+            near = max(near, self.anneal(rng, near, rounds, _AGAIN, earns), key=self.worth)
+        return near
+
+    def elite(self, plans: Sequence[VisitOrders]) -> list[VisitOrders]:
+        """The best of some plans that differ in their visits, by value."""
+        different = {tuple(frozenset(order) for order in orders): orders for orders in plans}
+        return sorted(different.values(), key=self.worth)[-_ELITE:]
 
     def routes(self) -> tuple[Route, ...]:
         """Routes of good plans, each with its vehicle class."""
