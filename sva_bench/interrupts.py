@@ -177,10 +177,8 @@ def _on_ctrl_c(signum: int, frame: FrameType | None) -> None:
 
 def _swallowed(frame: FrameType | None) -> bool:
     """Whether an exception raised here would be swallowed: in a callback of llvmlite, or in ``__del__``."""
-    if frame is not None and "llvmlite" in frame.f_code.co_filename:
-        return True
-    while frame is not None:
-        if frame.f_code.co_name == "__del__":
+    while frame is not None:  # a SIGTERM that came as Ctrl-C has its own handler's frame in front
+        if "llvmlite" in frame.f_code.co_filename or frame.f_code.co_name == "__del__":
             return True
         frame = frame.f_back
     return False

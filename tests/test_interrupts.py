@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import os
+import runpy
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from threading import Thread
 
 import pytest
@@ -160,6 +162,17 @@ def test_what_a_library_has_swallowed_is_raised_again_soon() -> None:
         with contextlib.suppress(KeyboardInterrupt):
             press()
         wait_for_ctrl_c()
+
+
+def test_it_is_not_raised_within_a_callback_of_llvmlite_which_would_print_it(tmp_path: Path) -> None:
+    # Also where a SIGTERM is sent on as Ctrl-C, so that its handler's frame lies between.
+    module = tmp_path / "llvmlite_callback.py"
+    module.write_text("def callback(press):\n    press()\n    return 'went on'\n", encoding="utf-8")
+    callback, said = runpy.run_path(str(module))["callback"], []
+    with pytest.raises(KeyboardInterrupt), as_ctrl_c():  # noqa: PT012
+        said.append(callback(press))
+        wait_for_ctrl_c()
+    assert said == ["went on"]
 
 
 def test_an_error_that_a_library_made_of_it_is_ctrl_c_all_the_same() -> None:
