@@ -56,6 +56,17 @@ class About:
         return head + results_table(traces)
 
 
+def legend(*, believed: bool, lost: bool, forgone: bool, touched: bool) -> str:
+    """What the marks on the map mean, as Markdown; those of what didn't happen are left out."""
+    said = ["yellow disc: POI, the larger the more it is worth, in the colour of the robot that collected it",
+            "green: station", "black: base", "dashes: planned path", "line: driven path"]
+    said += ["ring: where a robot believes to be"] if believed else []
+    said += ["red cross: lost robot"] if lost else []
+    said += ["cross in a robot's colour: POI that it left"] if forgone else []
+    said += ["red dot: a hull touched something"] if touched else []
+    return f"*Marks: {'; '.join(said)}.*"
+
+
 def results_table(traces: Sequence[Trace]) -> str:
     """How each robot ended, as a Markdown table."""
     rows = ["| robot | end | at | collected |", "| --- | --- | --- | --- |"]

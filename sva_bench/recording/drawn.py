@@ -32,6 +32,7 @@ _BAR_M, _GATE_UI = 0.12, 4.0  # length of a gate's dashes and of their gaps, and
 _FORGONE_M = 0.3  # half the width of crosses over POIs
 _WIDEST = 1.35  # radius of the POI that is worth most, in half widths of a station
 _INSET = 0.08  # share of the floor's width by which words stand beside what they are about
+_WITHIN = 0.02  # by what share of its size a hull is smaller than one that comes before it in the same place
 _NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
 
 
@@ -134,7 +135,16 @@ def _write_robot(pen: Pen, robot: RobotView) -> None:
     # Place and heading apart: the name goes where the robot goes, but stays north of it.
     pen.column(here, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.pose[:, :2], 0.0)))
     pen.column(f"{here}/hull", robot.time_s, rr.Transform3D.columns(quaternion=_about_z(robot.pose[:, 2])))
-    pen.names(f"{here}/name", [robot.name], np.array([[0.0, r + _NAME_M, height]]))
+    name = np.array([[0.0, r + _NAME_M, height]])
+    if robot.rank:
+        raised = robot.raised
+        pen.names(f"{here}/name", [robot.name])
+        pen.column(f"{here}/name", raised.time_s, rr.Points3D.columns(
+            positions=(name + np.outer(raised.value, [0.0, 1.0, 0.0])).astype(np.float32)))
+        # Else of hulls in one place now this and now that one would be seen, in patches.
+        pen.constant(f"{here}/hull/body", rr.Transform3D.from_fields(scale=[1.0 - _WITHIN * min(robot.rank, 9)] * 3))
+    else:
+        pen.names(f"{here}/name", [robot.name], name)
     _write_hull(pen, f"{here}/hull/body", robot)
     # A white bar on top, from the centre to the front.
     pen.constant(f"{here}/hull/heading", rr.Boxes3D(
@@ -203,11 +213,10 @@ def _write_lost(pen: Pen, lost: Lost, solids: Obstacles) -> None:
     # Beside it, where no name of a site or robot stands, and towards the middle of the floor, where the view ends last.
     x0, _, x1, _ = solids.bounds_m.tolist()
     aside = (r + _INSET * (x1 - x0)) * (1 if lost.at_m[0] < (x0 + x1) / 2 else -1)
-    at = lost.at_m[None] + [aside, 0.0]
+    at = lost.at_m[None] + [aside, -lost.below_m]
     pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
-        positions=_deep(at, _LOST_M), colors=[pale(ALARM)], labels=[lost.what]))  # light: names have dark shields
-    pen.constant(f"{entity}/what", rr.Points3D.from_fields(
-        radii=rr.Radius.ui_points(0.0), show_labels=True))
+        positions=_deep(at, _LOST_M), labels=[lost.what]))
+    pen.names(f"{entity}/what")
 
 
 def _write_floors(pen: Pen, floors: Sequence[Floor]) -> None:
@@ -241,8 +250,7 @@ def _write_touched(pen: Pen, touched: Touched) -> None:
     named = [k for k, what in enumerate(touched.what) if what]
     pen.column(f"{entity}/what", touched.time_s[named], rr.Points3D.columns(
         positions=_deep(touched.at_m[named], _LOST_M), labels=[touched.what[k] for k in named]))
-    pen.constant(f"{entity}/what", rr.Points3D.from_fields(
-        colors=[ALARM], radii=rr.Radius.ui_points(0.0), show_labels=True))
+    pen.names(f"{entity}/what")
 
 
 def _write_waiting(pen: Pen, waiting: Sequence[Waiting]) -> None:
@@ -250,11 +258,14 @@ def _write_waiting(pen: Pen, waiting: Sequence[Waiting]) -> None:
     for robot in dict.fromkeys(wait.robot for wait in waiting):
         mine, entity = [wait for wait in waiting if wait.robot == robot], f"world/waits/{robot}"
         times = [time for wait in mine for time in (wait.since_s, wait.until_s)]
+        at = _deep(np.array([wait.at_m for wait in mine]), _LOST_M)
         pen.column(entity, times, rr.Points3D.columns(
-            positions=_deep(np.array([wait.at_m for wait in mine]), _LOST_M), labels=[
-                f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine],
-            colors=[ORANGE] * len(mine)).partition([1, 0] * len(mine)))
-        pen.constant(entity, rr.Points3D.from_fields(radii=rr.Radius.ui_points(_MARK_UI), show_labels=True))
+            positions=at, colors=[ORANGE] * len(mine)).partition([1, 0] * len(mine)))
+        pen.constant(entity, rr.Points3D.from_fields(radii=rr.Radius.ui_points(_MARK_UI)))
+        pen.column(f"{entity}/what", times, rr.Points3D.columns(positions=at, labels=[
+            f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine]).partition(
+                [1, 0] * len(mine)))
+        pen.names(f"{entity}/what")
 
 
 def _write_change(pen: Pen, change: Change) -> None:

@@ -40,10 +40,17 @@ class Pen:
         """Write what an entity is all the time."""
         self.stream.log(f"{self.below}{entity}", *shapes, static=True, strict=True)
 
-    def names(self, entity: str, names: Sequence[str], at_m: NDArray[np.floating[Any]]) -> None:
-        """Names, each just below its point; labels of solids would have the solid's colour, and be hard to read."""
-        self.constant(entity, rr.Points3D(
-            at_m, radii=rr.Radius.ui_points(0.0), colors=[_NAMES], labels=names, show_labels=True))
+    def names(self, entity: str, names: Sequence[str] | None = None, at_m: NDArray[np.floating[Any]] | None = None
+              ) -> None:
+        """Names, each just below its point; labels of solids would have the solid's colour, and be hard to read.
+
+        Args:
+            entity: Its path.
+            names: The names; ``None`` = they are written as a column.
+            at_m: Their points; ``None`` = likewise.
+        """
+        self.constant(entity, rr.Points3D.from_fields(
+            positions=at_m, radii=rr.Radius.ui_points(0.0), colors=[_NAMES], labels=names, show_labels=True))
 
 
 def part(name: str) -> str:

@@ -155,7 +155,7 @@ def test_who_was_lost_is_marked_where_it_stands_and_in_its_lane_with_who_learned
     traces, news = mission_with_news()
     story = story_of(WORLD, traces, "news", news)
     ((name, when, what),) = [(lost.robot, lost.time_s, lost.what) for lost in story.lost]
-    assert (name, when, what) == ("uv1", 0.0, "uv1 failed, 0 s")
+    assert (name, when, what) == ("uv1", 0.0, "uv1 failed at 0 s")
     assert_array_equal(story.lost[0].at_m, [1, 1])
     assert [(lane.robot, lane.height, lane.lost_s.tolist(), lane.learned_s.tolist()) for lane in story.lanes] == [
         ("uv1", 0, [0], []), ("uv2", -1, [], [4]), ("uv3", -2, [], [4])]
