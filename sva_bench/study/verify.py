@@ -200,8 +200,8 @@ def _trials(folder: Path, content: Content, costs: Mapping[str, FuelCosts], samp
         progress("playing trials again", number, len(executed))
         key = first.scenario or "", first.planner or "", first.policy, first.news or "never"
         for trial in _spread(last_trial(outcomes, key) + 1, sample):
-            for case, history in cases_of(folder, content, replace(first, trial=trial)):
-                again = play_again(content, costs, case, trial, history, None, executor)
+            for one in cases_of(folder, content, replace(first, trial=trial)):
+                again = play_again(content, costs, one, None, executor)
                 for there, here in zip(rows_of_trial(outcomes, key, trial), again.rows, strict=True):
                     _check_row(key, trial, there, here)
                 played += 1
