@@ -11,7 +11,7 @@ from rich.markup import escape
 from sva_bench.choices import NEWS, POLICY_NAMES, RECORDED_WORDS
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import TRIAL_METAVAR, AsJson, Verbose, WorkerCount
-from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.terminal import messages, print_hanging, print_json, progress_bars, set_up_logging
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder
 from sva_bench.study.libraries import PRELOAD, load_libraries
@@ -66,10 +66,10 @@ def replay(
         for one in found:
             for row in one.rows:
                 which = f"trial {row['trial']}, " if choice.kind != "trial" else ""
-                results().print(f"{row['scenario']}, {row['planner']}, {which}{row['robot']}: {row['end']} at "
-                                f"{row['end_time_s']:.1f} s, value {row['value']:g}", highlight=False, markup=False)
+                print_hanging(f"{row['scenario']}, {row['planner']}, {which}{row['robot']}: {row['end']} at "
+                              f"{row['end_time_s']:.1f} s, value {row['value']:g}")
             for line in one.told():
-                results().print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
+                print_hanging(line.strip(), " " * (2 + len(line) - len(line.lstrip())))
     for one in found:
         assert one.recording is not None
         messages.print(f"recorded in [bold]{escape(str(one.recording))}[/bold]", highlight=False, soft_wrap=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached
+from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached, unused_told
 from sva_bench.analysis.summaries import ComparisonSummary, Reach
 from sva_bench.cli.tables import print_summary
 from sva_bench.study.compare import execute_plans
@@ -85,6 +85,34 @@ def test_pois_that_no_robot_reaches_are_named(tmp_path: Path, capsys: pytest.Cap
         assert f"No robot reaches {' and '.join(missed)}." in text
 
 
+def test_pois_at_which_a_robot_earns_nothing_are_worth_no_word(tmp_path: Path) -> None:
+    earned = {"uv1": {"p1": 1.0, "p2": 0.0}, "uv2": {"p1": 1.0, "p3": 2.0}}
+    both = {"uv1": ["p2", "p3"], "uv2": ["p2", "p3"]}
+    found = reached(both, earned, ["p1", "p2", "p3"])
+    assert found == Reach(nothing=False, robots=(), pois=("p3",), missed={"uv2": ("p3",)})
+    assert beyond_reach(found)[0].startswith("uv2 does not reach p3")
+    # In a run: the remotest POIs, which both robots miss in 24 s, are nothing to uv1.
+    text = SMALL.replace("mission_limit_s: 120", "mission_limit_s: 24")
+    missed = run_of(tmp_path, text).summary.reach.missed["uv1"]
+    quiet = re.sub(rf"{missed[0]}: \d+", f"{missed[0]}: 0", text, count=1)
+    assert run_of(tmp_path, quiet).summary.reach.missed.get("uv1", ()) == missed[1:]
+
+
+def test_a_robot_that_no_plan_uses_is_pointed_out_and_no_other(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    idle = re.sub(r"(?s)(  uv2:.*?)incentives: {.*?}", r"\1incentives: {}", SMALL)
+    done = run_of(tmp_path, idle)
+    assert done.unused == ("uv2",)
+    capsys.readouterr()
+    print_summary(done.summary, unused=done.unused)
+    assert "uv2 stays home in every plan." in capsys.readouterr().out
+    assert run_of(tmp_path, SMALL).unused == ()
+    # One that reaches nothing is said to stay home already.
+    unable = run_of(tmp_path, SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 1", 1))
+    assert unable.unused == ("uv1",)
+    assert unused_told(unable.unused, unable.summary) == []
+
+
 def test_where_all_pois_are_reachable_there_is_no_warning(tmp_path: Path) -> None:
     done = run_of(tmp_path, SMALL)
     assert done.summary.reach == Reach(nothing=False, robots=(), pois=(), missed={})
@@ -93,7 +121,8 @@ def test_where_all_pois_are_reachable_there_is_no_warning(tmp_path: Path) -> Non
 
 def test_many_pois_are_counted_not_listed() -> None:
     pois = [f"p{k}" for k in range(50)]
-    said = beyond_reach(reached({"uv1": pois[:40]}, ["uv1", "uv2"], pois))
+    earned = dict.fromkeys(pois, 1.0)
+    said = beyond_reach(reached({"uv1": pois[:40]}, {"uv1": earned, "uv2": earned}, pois))
     assert said == [f"uv1 reaches none of {', '.join(pois[:20])} and 20 more within its fuel and limit, and will never "
                     "be sent there."]
 
