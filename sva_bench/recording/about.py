@@ -58,11 +58,11 @@ class About:
 
 def legend(*, believed: bool, lost: bool, forgone: bool, touched: bool) -> str:
     """What the marks on the map mean, as Markdown; those of what didn't happen are left out."""
-    said = ["yellow disc: POI, the larger the more it is worth, in the colour of the robot that collected it",
-            "green: station", "black: base", "dashes: planned path", "line: driven path"]
+    said = ["yellow: POI, larger if worth more; in a robot's colour: collected by it", "green: station", "black: base",
+            "dashes: planned", "line: driven"]
     said += ["ring: where a robot believes to be"] if believed else []
     said += ["red cross: lost robot"] if lost else []
-    said += ["cross in a robot's colour: POI that it left"] if forgone else []
+    said += ["other cross: POI left by the robot of its colour"] if forgone else []
     said += ["red dot: a hull touched something"] if touched else []
     return f"*Marks: {'; '.join(said)}.*"
 

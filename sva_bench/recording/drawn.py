@@ -29,11 +29,10 @@ _ORDERS_M, _LOST_M = 0.045, 0.6  # of changed orders above those, and of what ma
 _NEW_UI, _CROSS_UI, _MARK_UI = 3.5, 3.5, 6.0  # widths of new orders and crosses, and size of marks
 _PATCH_M, _GATE_M, _RING_M = 0.01, 0.1, 0.02  # thickness of floors' plates, height of gates, and of rings above hulls
 _BAR_M, _GATE_UI = 0.12, 4.0  # length of a gate's dashes and of their gaps, and width
+_NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
 _FORGONE_M = 0.3  # half the width of crosses over POIs
 _WIDEST = 1.35  # radius of the POI that is worth most, in half widths of a station
-_INSET = 0.08  # share of the floor's width by which words stand beside what they are about
 _WITHIN = 0.02  # by what share of its size a hull is smaller than one that comes before it in the same place
-_NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
 
 
 def write_map(pen: Pen, story: Story) -> None:
@@ -41,8 +40,9 @@ def write_map(pen: Pen, story: Story) -> None:
     write_ground(pen, story.solids, story.marks)
     for robot in story.views:
         _write_robot(pen, robot)
+    by_name = {robot.name: robot for robot in story.views}
     for lost in story.lost:
-        _write_lost(pen, lost, story.solids)
+        _write_lost(pen, lost, by_name[lost.robot])
     for forgone in story.forgone:
         _write_forgone(pen, forgone)
     _write_floors(pen, story.floors)
@@ -135,16 +135,10 @@ def _write_robot(pen: Pen, robot: RobotView) -> None:
     # Place and heading apart: the name goes where the robot goes, but stays north of it.
     pen.column(here, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.pose[:, :2], 0.0)))
     pen.column(f"{here}/hull", robot.time_s, rr.Transform3D.columns(quaternion=_about_z(robot.pose[:, 2])))
-    name = np.array([[0.0, r + _NAME_M, height]])
+    _write_name(pen, f"{here}/name", robot, np.array([0.0, r + _NAME_M, height]))
     if robot.rank:
-        raised = robot.raised
-        pen.names(f"{here}/name", [robot.name])
-        pen.column(f"{here}/name", raised.time_s, rr.Points3D.columns(
-            positions=(name + np.outer(raised.value, [0.0, 1.0, 0.0])).astype(np.float32)))
         # Else of hulls in one place now this and now that one would be seen, in patches.
         pen.constant(f"{here}/hull/body", rr.Transform3D.from_fields(scale=[1.0 - _WITHIN * min(robot.rank, 9)] * 3))
-    else:
-        pen.names(f"{here}/name", [robot.name], name)
     _write_hull(pen, f"{here}/hull/body", robot)
     # A white bar on top, from the centre to the front.
     pen.constant(f"{here}/hull/heading", rr.Boxes3D(
@@ -164,6 +158,16 @@ def _write_robot(pen: Pen, robot: RobotView) -> None:
         pen.constant(entity, rr.LineStrips3D.from_fields(
             colors=[robot.color], radii=rr.Radius.ui_points(1.75)))
         pen.column(entity, robot.trail_s, rr.LineStrips3D.columns(strips=_deep(robot.trail, _DRIVEN_M)))
+
+
+def _write_name(pen: Pen, entity: str, robot: RobotView, at_m: FloatArray) -> None:
+    """The name of a robot above its hull, raised where others stand in the same place; gone once it is lost."""
+    raised, gone_s = robot.raised, robot.disabled_s
+    shown = raised.time_s < (math.inf if gone_s is None else gone_s)
+    places = (at_m + np.outer(raised.value[shown], [0.0, 1.0, 0.0])).astype(np.float32)
+    pen.names(entity, [robot.name])
+    pen.column(entity, [*raised.time_s[shown], *([] if gone_s is None else [gone_s])], rr.Points3D.columns(
+        positions=places).partition([1] * len(places) + [0] * (gone_s is not None)))
 
 
 def _write_hull(pen: Pen, entity: str, robot: RobotView) -> None:
@@ -203,19 +207,16 @@ def _write_forgone(pen: Pen, forgone: Forgone) -> None:
     pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_NEW_UI)))
 
 
-def _write_lost(pen: Pen, lost: Lost, solids: Obstacles) -> None:
-    """A red cross where a robot was lost, from then on, larger than the robot, and what happened."""
+def _write_lost(pen: Pen, lost: Lost, robot: RobotView) -> None:
+    """A red cross where a robot was lost, from then on, larger than it, and what happened, in the place of its name."""
     entity, r = f"world/lost/{lost.robot}", 2.2 * lost.radius_m
     cross = np.array([[[-r, -r], [r, r]], [[-r, r], [r, -r]]]) + lost.at_m
     pen.column(entity, [lost.time_s], rr.LineStrips3D.columns(
         strips=_deep(cross, _LOST_M), colors=[ALARM] * 2).partition([2]))
     pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_CROSS_UI)))
-    # Beside it, where no name of a site or robot stands, and towards the middle of the floor, where the view ends last.
-    x0, _, x1, _ = solids.bounds_m.tolist()
-    aside = (r + _INSET * (x1 - x0)) * (1 if lost.at_m[0] < (x0 + x1) / 2 else -1)
-    at = lost.at_m[None] + [aside, -lost.below_m]
+    at = lost.at_m + np.array([0.0, robot.radius_m + _NAME_M + float(robot.raised.value[-1])])
     pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
-        positions=_deep(at, _LOST_M), labels=[lost.what]))
+        positions=_deep(at[None], _LOST_M), labels=[lost.what]))
     pen.names(f"{entity}/what")
 
 

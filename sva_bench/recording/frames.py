@@ -131,7 +131,7 @@ class Frames:
 
     def _sites(self, draw: ImageDraw.ImageDraw, plan: ShownPlan, place: _Place, time_s: float) -> None:
         for sites in plan.sites:
-            colors = sites.colors.at(time_s)
+            colors = sites.colors.at(time_s) or []
             for name, (x, y), half, color in zip(sites.names, sites.at_m.tolist(), sites.half_m.tolist(), colors,
                                                  strict=True):
                 px, py = place.at(x, y)
@@ -147,7 +147,7 @@ class Frames:
         """A row for each robot: its colour, what it does, what fuel it has left, and what it collected."""
         for number, robot in enumerate(plan.robots):
             y = self._rows_at + number * _ROW_PX
-            state = (robot.state.at(time_s) or [""])[0]
+            state = robot.state.at(time_s) or ""
             gone = robot.lost is not None and time_s >= robot.lost[0]
             _disc(draw, ((left + 8) * _OVER, (y + 9) * _OVER), 6 * _OVER, robot.color)
             self._text(draw, left + 22, y, robot.name, 14)

@@ -59,7 +59,7 @@ def layout_of_pair(stories: Mapping[str, Story]) -> rrb.Blueprint:
     chart = rrb.TimeSeriesView(origin="compared", name="Incentive collected by all robots", axis_x=axis,
                                axis_y=_from_zero(most), plot_legend=rrb.Corner2D.LeftTop)
     charts = rrb.Horizontal(told[0], chart, *told[1:])
-    return _whole(rrb.Vertical(maps, states, charts, row_shares=[10, 1.6 * lanes, 6]), longest)
+    return _whole(rrb.Vertical(maps, states, charts, row_shares=[10, 1.6 * lanes, 7]), longest)
 
 
 def layout_of_drives(title: str, kinds: Sequence[str], eye_m: Sequence[float], target_m: Sequence[float]

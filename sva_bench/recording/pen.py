@@ -29,14 +29,15 @@ class Pen:
     stream: rr.RecordingStream
     below: str = ""
 
-    def column(self, entity: str, time_s: Iterable[float] | FloatArray, columns: Any) -> None:
+    def column(self, entity: str, time_s: Iterable[float] | FloatArray, columns: Iterable[rr.ComponentColumn]
+               ) -> None:
         """Write what an entity is at some times [s]."""
         # Rounded here: rerun cuts off, and 0.29 s would become 0.289999999 s.
         nanoseconds = np.round(np.asarray(time_s, dtype=np.float64) * 1e9).astype("timedelta64[ns]")
         self.stream.send_columns(f"{self.below}{entity}", [rr.TimeColumn(TIMELINE, duration=nanoseconds)], columns,
                                  strict=True)
 
-    def constant(self, entity: str, *shapes: Any) -> None:
+    def constant(self, entity: str, *shapes: rr.AsComponents) -> None:
         """Write what an entity is all the time."""
         self.stream.log(f"{self.below}{entity}", *shapes, static=True, strict=True)
 

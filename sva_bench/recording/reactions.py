@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from sva_bench.choices import End
 from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.recording.colors import Color
-from sva_bench.robot.model import RobotModel
 from sva_bench.world.model import Site
 
 _FAULTS: Mapping[str, str] = {
@@ -23,21 +22,13 @@ LOST: Mapping[End, str] = {"failed": "failed", "out_of_fuel": "out of fuel", "st
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lost:
-    """A robot that failed, ran out of fuel or got stuck.
-
-    Attributes:
-        robot, radius_m: The robot and its radius.
-        time_s, at_m: When [s] and where [m], shape (2,).
-        what: What happened.
-        below_m: How far these words are below their usual place, so that they are seen below those of others there.
-    """
+    """A robot that failed, ran out of fuel or got stuck: when [s], where [m], shape (2,), and what happened."""
 
     robot: str
     radius_m: float
     time_s: float
     at_m: FloatArray
     what: str
-    below_m: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "at_m", frozen(self.at_m, (2,)))
@@ -109,18 +100,8 @@ def forgone_of(pois: Sequence[Site], traces: Sequence[Trace], colors: Mapping[st
     return tuple(found)
 
 
-def lost_of(traces: Sequence[Trace], models: Sequence[RobotModel], step_m: float) -> tuple[Lost, ...]:
-    """Where robots were lost; what is said of several in one place stands one below the other, by a step [m]."""
-    found: list[Lost] = []
-    for trace, model in zip(traces, models, strict=True):
-        if trace.outcome.end in LOST:
-            one = _lost(trace, model.radius_m)
-            here = sum(float(np.hypot(*(one.at_m - other.at_m))) < one.radius_m for other in found)
-            found.append(replace(one, below_m=here * step_m))
-    return tuple(found)
-
-
-def _lost(trace: Trace, radius_m: float) -> Lost:
+def lost_of(trace: Trace, radius_m: float) -> Lost:
+    """Where a robot was lost."""
     outcome, robot = trace.outcome, trace.orders.robot
     held = f" ({held_told(outcome.events[-1].what)})" if outcome.events and outcome.events[-1].what else ""
     return Lost(robot=robot, radius_m=radius_m, time_s=outcome.end_time_s, at_m=trace.pose[-1, :2],

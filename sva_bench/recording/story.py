@@ -225,15 +225,13 @@ def story_of(
     duration_s = max([*(heard.time_s for heard in news), *(max(float(trace.time_s[-1]), trace.outcome.end_time_s)
                                                            for trace in traces)])
     shown_s = max(duration_s, _LEAST_S)
-    models = [world.robots[known[name]].model for name in (trace.orders.robot for trace in traces)]
-    ranks = ranks_of([trace.pose[0, :2] for trace in traces], [trace.outcome.end in LOST for trace in traces],
-                     min(model.radius_m for model in models))
+    models = [world.robots[known[trace.orders.robot]].model for trace in traces]
     eye, target = _eye(world.obstacles.bounds_m)
     step_m = _NAME_SHARE * 2 * math.tan(_VIEW_RAD / 2) * math.dist(eye, target)
-    views = tuple(_robot_view(trace, model, colors[trace.orders.robot], shown_s, rank, step_m)
-                  for trace, model, rank in zip(traces, models, ranks, strict=True))
+    views = _robot_views(traces, models, colors, shown_s, step_m)
     gains = [_gains(trace) for trace in traces]
-    lost = lost_of(traces, models, step_m)
+    lost = tuple(lost_of(trace, view.radius_m) for trace, view in zip(traces, views, strict=True)
+                 if view.disabled_s is not None)
     forgone, touched = forgone_of(world.pois, traces, colors, routes), touched_of(traces)
     told = results_table(traces) if about is None else about.text(world.name, traces)
     marks = legend(believed=any(len(view.believed) for view in views), lost=bool(lost), forgone=bool(forgone),
@@ -333,6 +331,15 @@ def _marks(world: World, traces: Sequence[Trace], colors: dict[str, Color], news
 def _size(worth: float, most: float) -> float:
     """Factor on the radius of a POI: its area goes by what it is worth, down to one that is still seen."""
     return max(math.sqrt(worth / most), _SMALLEST) if most > 0 else 1.0
+
+
+def _robot_views(traces: Sequence[Trace], models: Sequence[RobotModel], colors: Mapping[str, Color], duration_s: float,
+                 step_m: float) -> tuple[RobotView, ...]:
+    """The robots; names of those in one place are above each other, by a step [m]."""
+    ranks = ranks_of([trace.pose[0, :2] for trace in traces], [trace.outcome.end in LOST for trace in traces],
+                     min(model.radius_m for model in models))
+    return tuple(_robot_view(trace, model, colors[trace.orders.robot], duration_s, rank, step_m)
+                 for trace, model, rank in zip(traces, models, ranks, strict=True))
 
 
 def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float, rank: int, step_m: float

@@ -101,8 +101,13 @@ def test_robots_that_never_leave_are_recorded(tmp_path: Path) -> None:
 
 def test_names_of_robots_in_one_place_are_seen_above_each_other_until_they_part(tour: Path) -> None:
     # uv2 fails and comes first; uv1 is two radii away from the base from 2 x 0.177 s on, until as long before 14 s.
-    assert not len(rows(tour, "world/robots/uv2/name", "Points3D:positions")[0])
-    ((usual,),) = constants(tour, "world/robots/uv2/name", "Points3D:positions")
+    times, places = rows(tour, "world/robots/uv2/name", "Points3D:positions")
+    assert_allclose(times, [0, 0.4, 6], atol=0.06)
+    assert places[-1] == []  # lost: from then on it is said what happened
+    ((usual,), (away,), _) = places
+    assert_allclose(usual, away)
+    ((said,),) = rows(tour, "world/lost/uv2/what", "Points3D:positions")[1]
+    assert_allclose(said[:2], [5 + usual[0], 1 + usual[1]], atol=1e-6)
     heights = {}
     for robot, changes in (("uv1", [0, 0.4, 13.7]), ("uv3", [0])):
         times, places = rows(tour, f"world/robots/{robot}/name", "Points3D:positions")
@@ -128,7 +133,7 @@ def test_a_recording_says_what_its_marks_mean_and_leaves_out_what_is_not_there(t
     record(quiet, WORLD, [trace("uv1")], title="quiet")
     for path, lost in ((told, True), (quiet, False)):
         ((text,),) = constants(path, "about", "TextDocument:text")
-        assert "yellow disc: POI" in text
+        assert "yellow: POI" in text
         assert ("red cross: lost robot" in text) is lost
         assert "red dot" not in text
 

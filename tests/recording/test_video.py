@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image, ImageDraw
 
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.palette import ALARM, GREEN, ROBOTS, YELLOW
 from sva_bench.recording.about import About
 from sva_bench.recording.frames import Frames
 from sva_bench.recording.read_back import Shown, read_recording
@@ -140,6 +141,17 @@ def test_the_legend_fits_whatever_the_width(tour: Path) -> None:
     assert (pixels[:, -10:].min() > 200), "nothing is cut at the right"
     red = (np.abs(pixels - [208, 0, 0]).sum(axis=-1) < 60)
     assert red[-100:].any(), "the cross of lost robots is in the legend"
+
+
+def test_a_gif_has_the_colours_that_mean_something_however_small_what_they_paint_is(tmp_path: Path) -> None:
+    solids = replace(WORLD.obstacles, bounds_m=np.array([-200.0, -200.0, 200.0, 200.0]))
+    path = tmp_path / "large.rrd"
+    record(path, replace(WORLD, obstacles=solids), TRACES, title="large")
+    with Image.open(io.BytesIO(video_of(path, ".gif", quiet))) as video:
+        video.seek(video.n_frames - 1)  # type: ignore[attr-defined]
+        last = np.asarray(video.convert("RGB")).astype(int)
+    for color in (ALARM, GREEN, YELLOW, *ROBOTS[:3]):
+        assert np.abs(last - color).sum(axis=-1).min() < 12, color
 
 
 @pytest.mark.long
