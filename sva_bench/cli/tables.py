@@ -91,17 +91,17 @@ def print_summary(
 
 
 _FAIL: Mapping[FailureProcess, str] = {
-    "mission": "for whole missions", "per_leg": "before any of their POIs", "hazard": "at any time while they drive"}
+    "mission": "for a whole mission", "per_leg": "before each POI", "hazard": "at any time while driving"}
 
 
 def processes_told(summary: AnySummary) -> str:
     """When robots fail, as plans expect it and in execution; what given plans expect is not known."""
     planned, executed = summary.failure.plan, summary.failure.execute
     if isinstance(summary, ComparisonSummary):
-        return f"Robots fail {_FAIL[executed]}."
+        return f"Robots may fail {_FAIL[executed]}."
     if planned == executed:
-        return f"Robots fail {_FAIL[executed]}, as plans expect it."
-    return f"Plans expect robots to fail {_FAIL[planned]}; in execution they fail {_FAIL[executed]}."
+        return f"Robots may fail {_FAIL[executed]}, as plans expect it."
+    return f"Plans expect that robots may fail {_FAIL[planned]}; in execution they may fail {_FAIL[executed]}."
 
 
 def _print_plans(summary: AnySummary, robots: Sequence[str], console: Console, *, wide: bool) -> None:

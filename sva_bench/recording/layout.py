@@ -36,6 +36,7 @@ def layout_of(story: Story) -> rrb.Blueprint:
         right.append(rrb.TimeSeriesView(
             origin="news", name="Who was lost, and who learned of it when", axis_x=axis,
             axis_y=rrb.ScalarAxis(range=(-len(story.views) + 0.4, 0.6)), plot_legend=rrb.Corner2D.RightTop))
+        shares[0] += 1  # there is more to say of the marks
         shares.append(2)
     right.append(_log("events", "Events"))
     left = rrb.Vertical(_map("", story), _states("states", axis), row_shares=[10, _lanes_share(len(story.views))])

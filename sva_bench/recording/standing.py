@@ -1,4 +1,4 @@
-"""Robots that stand in one place, as at the base: in which order they are seen, and since when they stand there."""
+"""Robots that stand together, as at the base: which are seen, in what rows names are, and since when they stand."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from sva_bench.arrays import FloatArray
+
+_MOST_ROWS = 12  # of names; those of more robots lie on each other
 
 
 def ranks_of(at_m: Sequence[FloatArray], first: Sequence[bool], near_m: float) -> list[int]:
@@ -22,6 +24,28 @@ def ranks_of(at_m: Sequence[FloatArray], first: Sequence[bool], near_m: float) -
     for number, k in enumerate(order):
         ranks[k] = sum(float(np.hypot(*(at_m[k] - at_m[other]))) < near_m for other in order[:number])
     return ranks
+
+
+def raised_by(at_m: Sequence[FloatArray], first: Sequence[bool], step_m: float) -> list[float]:
+    """How far each robot's name is raised where it begins, so that it covers none of those before it [m].
+
+    Args:
+        at_m: Where each begins, shape (2,).
+        first: Which come before the others.
+        step_m: How high names are, which are about as wide as twice that.
+    """
+    order = sorted(range(len(at_m)), key=lambda k: (not first[k], k))
+    raised = [0.0] * len(at_m)
+    rows: list[FloatArray] = []
+    for k in order:
+        for steps in range(_MOST_ROWS):
+            place = at_m[k] + np.array([0.0, steps * step_m])
+            apart = [np.abs(other - place) for other in rows]
+            if not any(dx < 2 * step_m and dy < 0.99 * step_m for dx, dy in apart):
+                raised[k] = steps * step_m
+                rows.append(place)
+                break
+    return raised
 
 
 def standing(time_s: FloatArray, pose: FloatArray, near_m: float) -> tuple[FloatArray, FloatArray]:

@@ -29,7 +29,7 @@ from sva_bench.recording.meetings import (
     waiting_of,
 )
 from sva_bench.recording.reactions import LOST, Change, Forgone, Lane, Lost, changes_of, forgone_of, lanes_of, lost_of
-from sva_bench.recording.standing import ranks_of, standing
+from sva_bench.recording.standing import raised_by, ranks_of, standing
 from sva_bench.recording.states import StateLane, speed_of, state_lanes_of
 from sva_bench.robot.body import Solid
 from sva_bench.robot.model import RobotModel
@@ -46,7 +46,6 @@ _MARGIN = 0.07  # of the view, left free at its edges
 _SMALLEST = 0.45  # radius of a POI that is worth little, in those of the one that is worth most
 _LEAST_S = 10.0  # lines go on so long at least: of a mission that ends as it begins, too, something is seen
 _NAME_SHARE = 0.055  # height of a name, in that of the view
-_MOST_NAMES = 6  # above each other
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -233,13 +232,14 @@ def story_of(
     lost = tuple(lost_of(trace, view.radius_m) for trace, view in zip(traces, views, strict=True)
                  if view.disabled_s is not None)
     forgone, touched = forgone_of(world.pois, traces, colors, routes), touched_of(traces)
+    changes = changes_of(news, colors)
     told = results_table(traces) if about is None else about.text(world.name, traces)
-    marks = legend(believed=any(len(view.believed) for view in views), lost=bool(lost), forgone=bool(forgone),
-                   touched=bool(touched))
+    marks = legend(changed=bool(changes), believed=any(len(view.believed) for view in views), lost=bool(lost),
+                   forgone=bool(forgone), touched=bool(touched))
     return Story(
         title=title, world=world.name, duration_s=duration_s, solids=world.obstacles.walled(_WALL_M),
         marks=_marks(world, traces, colors, news), views=views, lost=lost,
-        forgone=forgone, changes=changes_of(news, colors),
+        forgone=forgone, changes=changes,
         lanes=lanes_of(traces, news, colors), touched=touched, waiting=waiting_of(traces),
         gates=gates_of(world.passages, traces), floors=floors_of(world.obstacles.floors),
         total=_staircase(np.concatenate(gains), shown_s),
@@ -335,14 +335,15 @@ def _size(worth: float, most: float) -> float:
 
 def _robot_views(traces: Sequence[Trace], models: Sequence[RobotModel], colors: Mapping[str, Color], duration_s: float,
                  step_m: float) -> tuple[RobotView, ...]:
-    """The robots; names of those in one place are above each other, by a step [m]."""
-    ranks = ranks_of([trace.pose[0, :2] for trace in traces], [trace.outcome.end in LOST for trace in traces],
-                     min(model.radius_m for model in models))
-    return tuple(_robot_view(trace, model, colors[trace.orders.robot], duration_s, rank, step_m)
-                 for trace, model, rank in zip(traces, models, ranks, strict=True))
+    """The robots; names of those that stand together are in rows, which are a step [m] high."""
+    begins, lost = [trace.pose[0, :2] for trace in traces], [trace.outcome.end in LOST for trace in traces]
+    ranks = ranks_of(begins, lost, min(model.radius_m for model in models))
+    return tuple(_robot_view(trace, model, colors[trace.orders.robot], duration_s, rank, raised)
+                 for trace, model, rank, raised in zip(traces, models, ranks, raised_by(begins, lost, step_m),
+                                                       strict=True))
 
 
-def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float, rank: int, step_m: float
+def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float, rank: int, raised_m: float
                 ) -> RobotView:
     outcome, time, pose = trace.outcome, trace.time_s, trace.pose
     # The first pose at or after each step, and the last pose: the trail is as long as the drive.
@@ -353,7 +354,7 @@ def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float
     fuel = None
     if math.isfinite(trace.orders.fuel_capacity_s):
         when, left = time, trace.fuel_s
-        if when[-1] < duration_s:
+        if when[-1] < duration_s and outcome.end not in LOST:  # what a lost robot has left is nobody's
             when, left = np.append(when, duration_s), np.append(left, left[-1])
         kept = corners(when, left)
         fuel = Series(time_s=when[kept], value=left[kept])
@@ -363,7 +364,7 @@ def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float
         disabled_s=outcome.end_time_s if outcome.end in LOST else None,
         planned=dashes(trace.planned, _DASH_M, _GAP_M), trail_s=time[at[1:]][moved], trail=pieces, fuel=fuel,
         collected=_staircase(_gains(trace), duration_s), speed=_speed(trace, duration_s), rank=rank,
-        raised=Series(time_s=since_s, value=stands * (rank % _MOST_NAMES) * step_m), believed=trace.believed)
+        raised=Series(time_s=since_s, value=stands * raised_m), believed=trace.believed)
 
 
 def _speed(trace: Trace, duration_s: float) -> Series:

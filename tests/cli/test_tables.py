@@ -36,10 +36,10 @@ def test_robots_that_do_not_fit_are_left_out_of_the_table_and_it_is_said(capsys:
 
 
 @pytest.mark.parametrize(("planned", "executed", "said"), [
-    ("mission", "mission", "Robots fail for whole missions, as plans expect it."),
-    ("mission", "per_leg", "Plans expect robots to fail for whole missions; in execution they fail before any of their "
-                           "POIs."),
-    ("hazard", "hazard", "Robots fail at any time while they drive, as plans expect it."),
+    ("mission", "mission", "Robots may fail for a whole mission, as plans expect it."),
+    ("mission", "per_leg", "Plans expect that robots may fail for a whole mission; in execution they may fail before "
+                           "each POI."),
+    ("hazard", "hazard", "Robots may fail at any time while driving, as plans expect it."),
 ])
 def test_when_robots_fail_is_said_in_words(planned: FailureProcess, executed: FailureProcess, said: str) -> None:
     found = summary((10.0, 20.0), 900.0)

@@ -81,6 +81,7 @@ def test_series_hold_fuel_and_incentive(tour: Path) -> None:
     assert_array_equal(np.array(values)[:, 0], [0, 30, 60, 72.5, 72.5])
     times, values = rows(tour, "fuel/uv1", "Scalars:scalars")
     assert_allclose(np.column_stack([times, np.array(values)[:, 0]]), [[0, 20], [4, 16], [6, 20], [14, 12]], atol=1e-9)
+    assert rows(tour, "fuel/uv2", "Scalars:scalars")[0][-1] == 6  # it failed
     assert not len(rows(tour, "fuel/uv3", "Scalars:scalars")[0])  # no limit
 
 
