@@ -29,7 +29,7 @@ def recordings_for(folder: Path, scenario: str | None, planner: str | None, choi
     Args:
         folder: The run folder.
         scenario, planner: What is wanted; ``None`` = any. Two plans side by side are no planner's.
-        choice: Of which trial; ``None`` = of any.
+        choice: Of which trial; ``None`` = of any. One that was not recorded has none.
 
     Raises:
         BadInput: If this is no run folder, or the run has no such scenario, plan or recording.
@@ -62,13 +62,17 @@ def recordings_for(folder: Path, scenario: str | None, planner: str | None, choi
         if scenario in (None, key[0]) and (planner is None or planner == key[1]):
             rank = -1 if key[1] is None else planners.index(key[1])
             found.append(((order.index(key[0]), rank, path.stem not in stems, path.stem), path))
-    if not found:
-        asked = " ".join(f"{option} {wanted}" for option, wanted in (
-            ("--scenario", scenario), ("--planner", planner), ("--trial", choice)) if wanted is not None)
-        first = "" if scenario is not None or len(names) == 1 else f"--scenario {order[0]} "
-        how = "replay' records any trial" if choice is None else f"replay {folder} {first}{asked}' records it"
-        raise BadInput(f"{folder}: no recording is of {asked}; 'sva-bench {how}")
+    if not found and choice is None:
+        raise BadInput(f"{folder}: no recording is of "
+                       + " and ".join(f"{option} {wanted}" for option, wanted in (
+                           ("--scenario", scenario), ("--planner", planner)) if wanted is not None)
+                       + "; 'sva-bench replay' records any trial")
     return tuple(path for _, path in sorted(found))
+
+
+def most_telling(folder: Path) -> str:
+    """The scenario of a run in which plans differ most."""
+    return _telling(read_summary(folder))[0]
 
 
 def _telling(summary: AnySummary) -> list[str]:

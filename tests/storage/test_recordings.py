@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
-from sva_bench.storage.recordings import recordings_for
+from sva_bench.storage.recordings import most_telling, recordings_for
 from sva_bench.storage.trial_choice import choice_of, nearest_to_median
 from tests.worlds_for_tests import SMALL
 
@@ -67,10 +68,18 @@ def test_the_trial_that_the_manifest_names_is_found_by_its_number(run: Path) -> 
     assert [path.stem for path in found] == ["S+compare", "S-stochastic", "S-deterministic"]
 
 
-def test_a_trial_without_a_recording_says_the_command_that_makes_it(run: Path) -> None:
-    with pytest.raises(BadInput) as error:
-        recordings_for(run, None, "stochastic", choice_of("median"))
-    assert f"'sva-bench replay {run} --scenario S --planner stochastic --trial median' records it" in str(error.value)
+def test_a_trial_that_was_not_recorded_is_played_again_to_be_seen(run: Path, tmp_path: Path) -> None:
+    assert recordings_for(run, None, "stochastic", choice_of("median")) == ()
+    video = tmp_path / "median.gif"
+    before = set((run / "recordings").iterdir())
+    for _ in range(2):  # the second time it is there
+        assert run_command_line(["view", str(run), "--planner", "stochastic", "--trial", "median", "--video",
+                                 str(video)]) == 0
+        assert video.stat().st_size > 1000
+        (new,) = set((run / "recordings").iterdir()) - before
+        assert new.stem == f"{most_telling(run)}-stochastic+median"
+    new.unlink()
+    assert run_command_line(["view", str(run), "--scenario", "S", "--trial", "99", "--video", str(video)]) == 2
 
 
 @pytest.mark.parametrize(("word", "said"), [
