@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Reach
@@ -11,26 +11,26 @@ _NOTHING = "no robot reaches any POI: give them more fuel or time"
 _NAMED = 20  # POIs or maps that a sentence names
 
 
-def reached(missed: Mapping[str, Sequence[str]], robots: Mapping[str, Mapping[str, float]], pois: Sequence[str]
-            ) -> Reach:
+def reached(
+    missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Sequence[str],
+    earning: Mapping[str, Collection[str]] | None = None,
+) -> Reach:
     """The section ``reach`` of ``summary.json``.
-
-    A robot that earns nothing at a POI has no business there, so that it doesn't reach it is worth no word.
 
     Args:
         missed: POIs that each robot cannot visit and return from, by robot; robots that miss none may be left out.
-        robots: All robots, with what each earns at which POIs.
+        robots: All robots.
         pois: All POIs.
+        earning: POIs at which each robot earns something, by robot; ``None`` = all. Nobody is missed at the others.
     """
-    at_home = [robot for robot in robots if len(missed.get(robot, ())) == len(pois)]
-    missing = {robot: tuple(poi for poi in missed.get(robot, ()) if robot in at_home or earned.get(poi, 0.0) > 0)
-               for robot, earned in robots.items()}
-    nothing = len(at_home) == len(robots)
+    wanted = {robot: set(pois) if earning is None else set(earning.get(robot, ())) for robot in robots}
+    told = {robot: tuple(poi for poi in missed.get(robot, ()) if poi in wanted[robot]) for robot in robots}
     return Reach(
-        nothing=nothing, robots=tuple(at_home),
+        nothing=all(len(missed.get(robot, ())) == len(pois) for robot in robots),
+        robots=tuple(robot for robot in robots if len(missed.get(robot, ())) == len(pois)),
         pois=tuple(poi for poi in pois if all(poi in missed.get(robot, ()) for robot in robots)
-                   and (nothing or any(earned.get(poi, 0.0) > 0 for earned in robots.values()))),
-        missed={robot: pois for robot, pois in missing.items() if pois})
+                   and any(poi in wanted[robot] for robot in robots)),
+        missed={robot: found for robot, found in told.items() if found})
 
 
 def why_nothing(reach: Reach) -> str:

@@ -71,7 +71,7 @@ def asked_of(words: Sequence[str], grid: Grid, what: str = "--compare ") -> tupl
     Raises:
         BadInput: If a key is not varied in the grid or is asked for twice, or has no such value.
     """
-    varied, given = values_of(grid), "--set" if what else "set:"
+    varied = values_of(grid)
     found: list[Asked] = []
     for word in words:
         key = next((name for name in varied if word == name or word.startswith(f"{name}=")), None)
@@ -79,11 +79,11 @@ def asked_of(words: Sequence[str], grid: Grid, what: str = "--compare ") -> tupl
             name = word.partition("=")[0]
             raise BadInput(f"{what}{word}: " + (
                 f"{name} is not varied in this batch; {nearest(name, list(varied))}" if varied else
-                f"nothing is varied in this batch; give values by {given} KEY=V1,V2"))
+                f"nothing is varied in this batch; give values by {_given(what)} KEY=V1,V2"))
         values = varied[key]
         if len(values) < 2:
             raise BadInput(f"{what}{word}: {key} has one value only, {shown_value(values[0])}; give others by "
-                           f"{given} {key}=V1,V2")
+                           f"{_given(what)} {key}=V1,V2")
         if any(other.key == key for other in found):
             raise BadInput(f"{what}{key}: asked for twice; give it once")
         told = word[len(key) + 1:] if len(word) > len(key) else None
@@ -94,6 +94,11 @@ def asked_of(words: Sequence[str], grid: Grid, what: str = "--compare ") -> tupl
                            f"{', '.join(map(shown_value, values))}")
         found.append(Asked(key=key, reference=reference))
     return tuple(found)
+
+
+def _given(what: str) -> str:
+    """How values are given where comparisons are asked for: by an option, or in a file."""
+    return "--set" if what else "set:"
 
 
 def _among(values: Sequence[str], told: str) -> str | None:
