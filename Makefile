@@ -11,10 +11,13 @@ BIN := $(VENV)/bin
 LOCK := requirements-$(VERSION).lock
 STAMP := $(VENV)/lib/python$(VERSION)/.installed
 
-.PHONY: run test test-long lint docs setup lock bench clean bench-solver bench-paper
+.PHONY: run help test test-long lint docs setup lock bench clean bench-solver bench-paper
 
 run: setup  ## plan, execute and measure the four-rooms mission
 	$(BIN)/sva-bench run worlds/four-rooms.yaml
+
+help:  ## these lines
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
 
 test: setup  ## the default test suite
 	$(BIN)/python -m pytest -n 2
@@ -22,7 +25,7 @@ test: setup  ## the default test suite
 test-long: setup  ## everything, sweeps included
 	$(BIN)/python -m pytest -n 2 -m "long or not long"
 
-lint: setup
+lint: setup  ## ruff and mypy
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
@@ -30,7 +33,7 @@ lint: setup
 docs: setup  ## the pages of docs/ as a site, in site/; a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
-setup: $(STAMP)
+setup: $(STAMP)  ## the environment in .venv, and the compiled solver: three to five minutes, once
 
 $(STAMP): $(LOCK) pyproject.toml
 	$(PYTHON) -m venv $(if $(wildcard $(VENV)/lib/python$(VERSION)),,--clear) $(VENV)
@@ -50,7 +53,7 @@ lock:  ## pin the dependencies anew, for one Python: make lock PYTHON=python3.13
 	  --output-file $(LOCK) pyproject.toml
 	rm -r $(VENV)-lock
 
-clean:
+clean:  ## remove environments and caches
 	rm -rf .venv .venv-* .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 bench-solver: setup  ## the speed that the solver promises, by class: takes an hour

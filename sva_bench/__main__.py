@@ -77,10 +77,11 @@ def run_command_line(arguments: Sequence[str]) -> int:
     except TyperException as error:  # bad usage: knows how to show itself, with a hint at --help
         from pydantic import ValidationError  # --help should not wait for it
 
-        from sva_bench.files.complaints import of_an_option
+        from sva_bench.files.complaints import of_a_choice, of_an_option
 
         if isinstance(error.__cause__, ValidationError):
             error.message = of_an_option(error.__cause__)
+        error.message = of_a_choice(error.message)
         error.message = printable(error.message)
         getattr(error, "show", error.format_message)()
         return error.exit_code

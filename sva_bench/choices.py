@@ -85,6 +85,8 @@ RECORDED_WORDS: Mapping[str, str] = {
 RobotState = Literal["at the base", "driving", "waiting", "at a POI", "refuelling", "failed", "out of fuel", "stuck",
                      "home", "home late"]
 """What a recorded robot is doing."""
+FilmMark = Literal["disc", "cross", "line", "dash", "square", "diamond"]
+"""Shapes in the legend of a film."""
 
 # Execution
 Fidelity = Literal["kinematic", "rollout", "physics"]

@@ -172,6 +172,13 @@ def test_every_command_in_the_text_of_a_page_is_one() -> None:
             assert command in known, f"{page.name}: sva-bench {command}"
 
 
+def test_make_help_lists_every_target_with_a_comment() -> None:
+    said = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    listed = dict(re.findall(r"^make ([a-z-]+) +(.+)$", said, re.MULTILINE))
+    phony = re.findall(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(listed) == set(" ".join(phony).split())
+
+
 def test_targets_of_make_that_are_named_are_there() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     named = "".join(page.read_text(encoding="utf-8") for page in PAGES)

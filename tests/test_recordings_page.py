@@ -61,7 +61,8 @@ def test_the_entities_that_are_listed_are_there_and_no_others(run: Path) -> None
 def test_its_commands_are_understood(command: str, run: Path, tmp_path: Path) -> None:
     here = {"S3": "half", "runs/recorded/four-rooms-*": str(run)}
     words = [here.get(word, word) for word in shlex.split(command)]
-    words = ["3" if before == "--trial" else word for before, word in zip(["", *words], words, strict=False)]
+    words = ["3" if before == "--trial" and word.isdigit() else word
+             for before, word in zip(["", *words], words, strict=False)]
     if "--web" in words or (words[0] == "view" and not {"--video", "--screenshot"} & set(words)):
         words = [*words, "--scenario", "nobody's"]  # it would go on until it is ended
     done = sva_bench(*words, cwd=tmp_path)

@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 
 from sva_bench.analysis.results import Amount, Share
 from sva_bench.choices import Best
-from sva_bench.errors import BadInput
+from sva_bench.errors import BadInput, closest
+from sva_bench.files.complaints import hint_of_per_cent
 from sva_bench.files.fields import Probability
 from sva_bench.files.records import Record
 
@@ -130,7 +131,9 @@ def target_of(text: str, what: str = "--calibrate ") -> Target:
         share = math.nan
     if not LEAST_SHARE <= share <= GREATEST_SHARE:
         raise BadInput(f"{what}{word[:60]}: expected the share of missions that may go wrong, from "
-                       f"{100 * LEAST_SHARE:g}% to {100 * GREATEST_SHARE:g}%, such as 1%, or the word best")
+                       f"{100 * LEAST_SHARE:g}% to {100 * GREATEST_SHARE:g}%, such as 1%, or the word best"
+                       + hint_of_per_cent(word)
+                       + ("; did you mean 'best'?" if closest(word, ["best"]) else ""))
     return share
 
 

@@ -10,6 +10,7 @@ from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.summaries import ReachedPrecision, Summary
 from sva_bench.errors import BadInput
+from sva_bench.files.complaints import hint_of_per_cent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +111,8 @@ def precision_of(text: str, max_trials: int, trials: int, rollouts: int, *, anyt
     except ValueError:
         pct = math.nan
     if not (math.isfinite(pct) and pct > 0):
-        raise BadInput(f"--precision {text}: expected per cent of the stochastic plan's mean, such as 1%")
+        raise BadInput(f"--precision {text}: expected per cent of the stochastic plan's mean, such as 1%"
+                       f"{hint_of_per_cent(figure)}")
     if max_trials < trials:
         raise BadInput(f"--max-trials {max_trials} is less than --trials {trials}, with which a run begins")
     if min(trials, rollouts) < 2:

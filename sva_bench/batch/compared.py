@@ -28,6 +28,7 @@ from sva_bench.batch.folder import shard_path
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.map_samples import over
 from sva_bench.batch.shards import Note, read_note, unit_of
+from sva_bench.batch.sweep import Sweep
 from sva_bench.errors import BadInput, nearest
 from sva_bench.storage.tables import SHARDS, pieces_of
 
@@ -42,10 +43,30 @@ class Asked:
     reference: str
 
 
-def asked_of(words: Sequence[str], grid: Grid) -> tuple[Asked, ...]:
+def asked_by(sweep: Sweep, grid: Grid) -> tuple[Asked, ...]:
+    """The comparisons that a sweep asks for, by its options or in its file.
+
+    Raises:
+        BadFile: If one of the file is wrong, as for ``asked_of``.
+        BadInput: If one of the options is.
+    """
+    if sweep.file is None or "compare" in sweep.from_options:
+        return asked_of(sweep.compare, grid)
+    try:
+        return asked_of(sweep.compare, grid, "")
+    except BadInput as error:
+        raise sweep.file.error(("compare",), str(error)) from None
+
+
+def asked_of(words: Sequence[str], grid: Grid, what: str = "--compare ") -> tuple[Asked, ...]:
     """The comparisons of options such as ``robots.uv2.fuel_capacity_s=300``.
 
     Without a reference it is the value that the world files have, if it is among those of the key, else the first.
+
+    Args:
+        words: Keys, each with its reference if that is said.
+        grid: What is run.
+        what: What messages begin with.
 
     Raises:
         BadInput: If a key is not varied in the grid or is asked for twice, or has no such value.
@@ -56,23 +77,28 @@ def asked_of(words: Sequence[str], grid: Grid) -> tuple[Asked, ...]:
         key = next((name for name in varied if word == name or word.startswith(f"{name}=")), None)
         if key is None:
             name = word.partition("=")[0]
-            raise BadInput(f"--compare {word}: " + (
+            raise BadInput(f"{what}{word}: " + (
                 f"{name} is not varied in this batch; {nearest(name, list(varied))}" if varied else
-                "nothing is varied in this batch; give values by --set KEY=V1,V2"))
+                f"nothing is varied in this batch; give values by {_given(what)} KEY=V1,V2"))
         values = varied[key]
         if len(values) < 2:
-            raise BadInput(f"--compare {word}: {key} has one value only, {shown_value(values[0])}; give others by "
-                           f"--set {key}=V1,V2")
+            raise BadInput(f"{what}{word}: {key} has one value only, {shown_value(values[0])}; give others by "
+                           f"{_given(what)} {key}=V1,V2")
         if any(other.key == key for other in found):
-            raise BadInput(f"--compare {key}: asked for twice; give it once")
+            raise BadInput(f"{what}{key}: asked for twice; give it once")
         told = word[len(key) + 1:] if len(word) > len(key) else None
         usual = grid.own.get(key, '"x1"' if '"x1"' in values else values[0])
         reference = usual if told is None else _among(values, told)
         if reference is None:
-            raise BadInput(f"--compare {word}: {key} has no such value in this batch; take one of "
+            raise BadInput(f"{what}{word}: {key} has no such value in this batch; take one of "
                            f"{', '.join(map(shown_value, values))}")
         found.append(Asked(key=key, reference=reference))
     return tuple(found)
+
+
+def _given(what: str) -> str:
+    """How values are given where comparisons are asked for: by an option, or in a file."""
+    return "--set" if what else "set:"
 
 
 def _among(values: Sequence[str], told: str) -> str | None:

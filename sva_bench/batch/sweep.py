@@ -59,6 +59,7 @@ class Sweep:
         policies, news, anticipate, calibrate, evpi: As for ``Options``.
         time_limit_s, gap: When a solve may stop.
         vary: Values by dotted key of a world file.
+        compare: Varied keys whose values are compared, each with its reference if that is said.
         file: The sweep file that the settings are from, if any.
         from_options: Names of the settings given on the command line.
     """
@@ -84,6 +85,7 @@ class Sweep:
     time_limit_s: float | None = None
     gap: float | None = None
     vary: Mapping[str, Sequence[Any]] | None = None
+    compare: tuple[str, ...] = ()
     file: Document | None = None
     from_options: frozenset[str] = frozenset()
 
@@ -117,6 +119,7 @@ class _SweepFile(Section):
     time_limit_s: Number | None = Field(default=None, ge=0)
     gap: Number | None = Field(default=None, ge=0)
     set: dict[str, list[Any]] | None = None
+    compare: Annotated[list[str], Field(min_length=1)] | str | None = None
 
 
 def sweep_of(paths: Sequence[Path], from_options: Sweep) -> Sweep:
@@ -156,7 +159,7 @@ def _from_file(document: Document) -> Sweep:
         plan_failure=file.plan_failure, execute_failure=file.execute_failure, interaction=file.interaction,
         departures=file.departures, policies=policies, news=news, anticipate=file.anticipate, evpi=file.evpi,
         calibrate=targets[0] if targets else None, time_limit_s=file.time_limit_s, gap=file.gap, vary=file.set,
-        file=document)
+        compare=(file.compare,) if isinstance(file.compare, str) else tuple(file.compare or ()), file=document)
 
 
 def _words_at(

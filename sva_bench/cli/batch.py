@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
@@ -48,6 +48,7 @@ from sva_bench.study.libraries import load_libraries
 from sva_bench.study.reacting import news_of, policies_of
 
 if TYPE_CHECKING:
+    from sva_bench.batch.compared import Asked
     from sva_bench.batch.grid import Grid
     from sva_bench.workers.engine import Engine
 
@@ -130,7 +131,7 @@ def over(
     with loading():
         from sva_bench.analysis.calibration import target_of
         from sva_bench.batch.cache import default_folder
-        from sva_bench.batch.compared import asked_of
+        from sva_bench.batch.compared import asked_by
         from sva_bench.batch.grid import batch_name
         from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_of, varied
 
@@ -148,16 +149,16 @@ def over(
         anticipate=anticipate or None, calibrate=None if calibrate is None else target_of(calibrate),
         evpi=evpi or None,
         time_limit_s=time_limit, gap=gap,
-        vary=varied(vary) if vary else None, unit_trials=unit_trials))
+        vary=varied(vary) if vary else None, compare=tuple(compare or ()), unit_trials=unit_trials))
     with progress_bars() as progress:
         grid = grid_of(sweep, progress)
-    asked_of(compare or (), grid)  # what is wrong with it is said before hours of work
+    asked = asked_by(sweep, grid)  # what is wrong with it is said before hours of work
     folder = out or Path("runs") / batch_name(grid.settings())
     if dry_run:
         _list(grid, folder, cache, as_json, wide=wide)
         return
     _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=resume,
-         compare=compare, wide=wide)
+         asked=asked, wide=wide)
 
 
 @batch_app.command(cls=PlainCommand)
@@ -178,13 +179,14 @@ def retry(
     set_up_logging(verbose)
     load_libraries()
     with loading():
+        from sva_bench.batch.compared import asked_of
         from sva_bench.batch.folder import settings_in
         from sva_bench.batch.grid import grid_of
 
     _existing(folder)
     grid = grid_of(*settings_in(folder))
     _run(grid, folder, workers, dask, unit_time_limit, memory_mb, cache, as_json, as_csv, resume=True, again=True,
-         compare=compare, wide=wide)
+         asked=asked_of(compare or (), grid), wide=wide)
 
 
 @batch_app.command(cls=PlainCommand)
@@ -251,11 +253,10 @@ def _existing(folder: Path) -> None:
 def _run(
     grid: Grid, folder: Path, workers: int | None, dask: str | None, unit_time_limit_s: float, memory_mb: int,
     cache: Path | None, as_json: bool, as_csv: bool, *, resume: bool, again: bool = False,
-    compare: list[str] | None = None, wide: bool = False,
+    asked: Sequence[Asked] = (), wide: bool = False,
 ) -> None:
     with loading():
         from sva_bench.batch.cache import Cache, default_folder
-        from sva_bench.batch.compared import asked_of
         from sva_bench.batch.folder import units_in
         from sva_bench.batch.run import run_batch
         from sva_bench.batch.tables import write_tables
@@ -267,7 +268,6 @@ def _run(
 
     if dask is not None and workers is not None:
         raise BadInput("--dask and --workers don't go together: the cluster has its own workers")
-    asked = asked_of(compare or (), grid)
     caps = Caps(time_s=unit_time_limit_s, memory_mb=memory_mb, preload="sva_bench.batch.jobs")
 
     @contextmanager

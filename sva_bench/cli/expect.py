@@ -9,7 +9,7 @@ import typer
 
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import AsJson
-from sva_bench.cli.terminal import print_json, refuse_closed_output, results
+from sva_bench.cli.terminal import print_hanging, print_json, refuse_closed_output
 from sva_bench.errors import ExitCode
 from sva_bench.files.outputs import check_output, write_result
 
@@ -45,7 +45,6 @@ def expect(
                     "expectations": [one.as_dict() for one in judged]})
     else:
         for one in judged:
-            results().print(f"{'ok     ' if one.met else 'NOT MET'} {one.said()}", highlight=False, markup=False,
-                            soft_wrap=True)
+            print_hanging(one.said(), "ok      " if one.met else "NOT MET ")
     if not all(one.met for one in judged):
         raise typer.Exit(ExitCode.EXPECTATION_NOT_MET)

@@ -10,11 +10,10 @@ import typer
 
 from sva_bench.choices import EXPORT_FORMATS, TRIAL_FORMATS, AnyFormat, ExportFormat, TrialFormat
 from sva_bench.cli.loading import loading
-from sva_bench.cli.options import InteractionOption, Verbose, WorkerCount
+from sva_bench.cli.options import TRIAL_METAVAR, InteractionOption, Verbose, WorkerCount
 from sva_bench.cli.terminal import progress_bars, set_up_logging
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_result
-from sva_bench.study.bounds import MOST_TRIALS
 from sva_bench.study.libraries import PRELOAD, load_libraries
 from sva_bench.study.reacting import news_of, policies_of
 from sva_bench.workers.pool import local_workers
@@ -34,8 +33,8 @@ def export(
     robot: Annotated[str | None, typer.Option(help="Of a plan: only this robot's route.",
                                               show_default="all that leave")] = None,
     interaction: InteractionOption = None,
-    trial: Annotated[int | None, typer.Option(min=0, max=MOST_TRIALS, help=f"{_OF_TRIALS}its number, as in "
-                                              "outcomes.parquet.", show_default=False)] = None,
+    trial: Annotated[str | None, typer.Option(metavar=TRIAL_METAVAR, help=f"{_OF_TRIALS}its number, as in "
+                                              "outcomes.parquet, or which one.", show_default=False)] = None,
     scenario: Annotated[str | None, typer.Option(help=f"{_OF_TRIALS}the scenario.", show_default="the only one")
                         ] = None,
     planner: Annotated[str | None, typer.Option(help=f"{_OF_TRIALS}whose plan.", show_default="stochastic")] = None,
@@ -60,10 +59,12 @@ def export(
         check_output(output)
         load_libraries()
         with loading():
+            from sva_bench.storage.trial_choice import choice_of
             from sva_bench.study.replay import Wanted
             from sva_bench.study.trial_exports import TRIAL_EXPORTS, export_trial
 
-        wanted = Wanted(scenario=scenario, trial=trial, planner=planner, policy=policies[0],
+        choice = choice_of(trial)
+        wanted = Wanted(scenario=scenario, trial=choice.trial, kind=choice.kind, planner=planner, policy=policies[0],
                         news=heard[0] if heard else None)
         kind: TrialFormat = next(name for name in TRIAL_EXPORTS if name == to)
         with progress_bars() as progress, local_workers(workers, PRELOAD) as executor:

@@ -29,7 +29,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "expect": ('sva-bench expect runs/four-rooms-seed0-1a2b3c4d "S3.vss.executed_pct >= 5"',),
     "export": ("sva-bench export plan.json --world worlds/four-rooms.yaml --to nav2 -o way.yaml",),
     "view": ("sva-bench view runs/four-rooms-seed0-1a2b3c4d --scenario S3",
-             "sva-bench view runs/four-rooms-seed0-1a2b3c4d/recordings/S3-stochastic+worst.rrd --video worst.gif"),
+             "sva-bench view runs/four-rooms-seed0-1a2b3c4d --scenario S3 --trial worst --video worst.gif"),
     "report": ("sva-bench report runs/four-rooms-seed0-1a2b3c4d --csv",
                "sva-bench report runs/sweep --compare robots.uv2.fuel_capacity_s=50"),
     "replay": ("sva-bench replay runs/four-rooms-seed0-1a2b3c4d --scenario S3 --trial 17",),

@@ -24,6 +24,7 @@ from sva_bench.cli.options import (
 )
 from sva_bench.cli.terminal import (
     messages,
+    print_hanging,
     print_json,
     progress_bars,
     refuse_closed_output,
@@ -262,7 +263,7 @@ def copy_example(
         refuse_closed_output()
         width = max(map(len, example_names()))
         for each in example_names():
-            typer.echo(f"{each:{width}}  {example_title(each)}")
+            print_hanging(example_title(each), f"{each:{width}}  ")
             for plan in example_plans(each):
                 typer.echo(f"{'':{width}}  {plan}")
         return

@@ -66,6 +66,7 @@ RecordWords = Annotated[list[str] | None, typer.Option(
     "--record", metavar="[SCENARIO:]TRIAL", help="Record more than a typical trial of each plan: a trial's number, "
     + ", ".join(f"{name} ({said})" for name, said in RECORDED_WORDS.items()) + "; several with commas between them, or "
     "given again.", show_default=False)]
+TRIAL_METAVAR = "|".join(["N", *RECORDED_WORDS])
 Rollouts = Annotated[int, typer.Option(min=1, max=MOST_ROLLOUTS,
                                        help="Noise draws; trial t has number t mod ROLLOUTS.")]
 FidelityOption = Annotated[Fidelity, typer.Option(

@@ -24,6 +24,7 @@ from sva_bench.cli.options import (
 )
 from sva_bench.cli.terminal import (
     messages,
+    print_hanging,
     print_json,
     progress_bars,
     refuse_closed_output,
@@ -157,7 +158,7 @@ def certify(
         verdict = f"feasible, expected value {certificate.expected:.6g}" if certificate.feasible else "infeasible"
         console.print(verdict, highlight=False)
         for reason in certificate.reasons:
-            console.print(f"  {reason}", highlight=False, markup=False)
+            print_hanging(reason, "  ")
     if not certificate.feasible:
         raise typer.Exit(ExitCode.INFEASIBLE_PLAN)
 

@@ -8,13 +8,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from sva_bench.choices import NEWS, POLICY_NAMES
+from sva_bench.choices import NEWS, POLICY_NAMES, RECORDED_WORDS
 from sva_bench.cli.loading import loading
-from sva_bench.cli.options import AsJson, Verbose, WorkerCount
-from sva_bench.cli.terminal import messages, print_json, progress_bars, results, set_up_logging
+from sva_bench.cli.options import TRIAL_METAVAR, AsJson, Verbose, WorkerCount
+from sva_bench.cli.terminal import messages, print_hanging, print_json, progress_bars, set_up_logging
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder
-from sva_bench.study.bounds import MOST_TRIALS
 from sva_bench.study.libraries import PRELOAD, load_libraries
 from sva_bench.study.reacting import news_of, policies_of
 from sva_bench.workers.pool import local_workers
@@ -22,8 +21,10 @@ from sva_bench.workers.pool import local_workers
 
 def replay(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)],
-    trial: Annotated[int, typer.Option(min=0, max=MOST_TRIALS, help="Number of the trial, or of the history, as in "
-                                       "outcomes.parquet.", show_default=False)],
+    trial: Annotated[str, typer.Option(metavar=TRIAL_METAVAR, help="Number of the trial, or of the history, as in "
+                                       "outcomes.parquet; or "
+                                       + ", ".join(f"{name} ({said})" for name, said in RECORDED_WORDS.items())
+                                       + ", each plan's own.", show_default=False)],
     scenario: Annotated[str | None, typer.Option(help="The scenario.", show_default="the only one")] = None,
     planner: Annotated[str | None, typer.Option(help="Whose plan.", show_default="each")] = None,
     policy: Annotated[str, typer.Option(
@@ -49,10 +50,12 @@ def replay(
     load_libraries()
     with loading():
         from sva_bench.recording.viewer import view as open_viewer
+        from sva_bench.storage.trial_choice import choice_of
         from sva_bench.study.replay import Wanted
         from sva_bench.study.replay import replay as play_again
 
-    wanted = Wanted(scenario=scenario, trial=trial, planner=planner, policy=policies[0],
+    choice = choice_of(trial)
+    wanted = Wanted(scenario=scenario, trial=choice.trial, kind=choice.kind, planner=planner, policy=policies[0],
                     news=heard[0] if heard else None)
     with progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         found = play_again(folder, wanted, executor, progress)
@@ -62,10 +65,11 @@ def replay(
     else:
         for one in found:
             for row in one.rows:
-                results().print(f"{row['scenario']}, {row['planner']}, {row['robot']}: {row['end']} at "
-                                f"{row['end_time_s']:.1f} s, value {row['value']:g}", highlight=False, markup=False)
+                which = f"trial {row['trial']}, " if choice.kind != "trial" else ""
+                print_hanging(f"{row['scenario']}, {row['planner']}, {which}{row['robot']}: {row['end']} at "
+                              f"{row['end_time_s']:.1f} s, value {row['value']:g}")
             for line in one.told():
-                results().print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
+                print_hanging(line.strip(), " " * (2 + len(line) - len(line.lstrip())))
     for one in found:
         assert one.recording is not None
         messages.print(f"recorded in [bold]{escape(str(one.recording))}[/bold]", highlight=False, soft_wrap=True)

@@ -45,7 +45,7 @@ from sva_bench.study.reacting import check_reactions, news_of, policies_of, refu
 from sva_bench.workers.pool import local_workers
 
 if TYPE_CHECKING:
-    from sva_bench.analysis.summaries import AnySummary
+    from sva_bench.study.publish import Run
     from sva_bench.world.model import World
 
 """Refused: whoever looks for it here is told where it is."""
@@ -138,7 +138,7 @@ def run(
                       calibrate=target, precision=asked, record=recorded)
     with about(world), progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
         result = run_bench(loaded, options, out, executor, progress, watching(loaded) if live else None)
-    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
+    _show(result, loaded, as_json, csv=csv, wide=wide, sources=verbose)
 
 
 def execute(
@@ -206,11 +206,11 @@ def execute(
         check_plans(loaded, costs, read, named, allow_infeasible=allow_infeasible)
         with local_workers(workers, PRELOAD) as executor:
             result = execute_plans(loaded, read, options, out, executor, progress, costs)
-    _show(result.summary, result.folder, loaded, as_json, csv=csv, wide=wide, sources=verbose)
+    _show(result, loaded, as_json, csv=csv, wide=wide, sources=verbose)
 
 
-def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv: bool, wide: bool,
-          sources: bool) -> None:
+def _show(done: Run, world: World, as_json: bool, *, csv: bool, wide: bool, sources: bool) -> None:
+    summary, folder = done.summary, done.folder
     with loading():
         from sva_bench.cli.tables import print_summary
         from sva_bench.files.records import as_dict
@@ -222,7 +222,7 @@ def _show(summary: AnySummary, folder: Path, world: World, as_json: bool, *, csv
     if as_json:
         print_json(as_dict(summary))
     else:
-        print_summary(summary, wide=wide, sources=sources, world=world)
+        print_summary(summary, wide=wide, sources=sources, world=world, unused=done.unused)
         messages.print(f"written to [bold]{escape(str(folder))}[/bold]", highlight=False)
     if failed := failed_physics(summary):
         if as_json:

@@ -52,6 +52,8 @@ class Sheet:
     ends: frozenset[int] = frozenset()
 
 
+_NOUGHT = re.compile(r"(?<![\w.])-(0(?:\.0+)?)(?![\w.])")
+"""A figure that was rounded to nought from below; names have letters about it."""
 _NAME = 20
 """Letters of a name that may stand beside figures even where others are left out for it."""
 
@@ -65,7 +67,7 @@ def print_sheet(sheet: Sheet, console: Console, *, wide: bool = False, apart: bo
         wide: As wide as it comes, whatever the console's width.
         apart: Whether a line is left free above it, for it follows text; below it there always is one.
     """
-    plain = replace(sheet, rows=[[printable(cell) for cell in row] for row in sheet.rows],
+    plain = replace(sheet, rows=[[_NOUGHT.sub(r"\1", printable(cell)) for cell in row] for row in sheet.rows],
                     columns=[replace(column, heading=printable(column.heading)) for column in sheet.columns])
     laid_out, left_out = fitted(plain, 10**6 if wide else console.width)
     if not sheet.rows:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rich.console import Console
 
 from sva_bench.analysis.catalogue import statistics
 from sva_bench.analysis.plan_names import shown_name, shown_over
-from sva_bench.analysis.reach import lost_robots
+from sva_bench.analysis.reach import lost_robots, unused_told
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
+from sva_bench.choices import FailureProcess
 from sva_bench.cli.reaction_table import print_given_reactions, print_reactions
 from sva_bench.cli.sheets import Column, Sheet, fitted, print_sheet
 from sva_bench.cli.terminal import results
@@ -25,7 +26,6 @@ from sva_bench.report.wording import (
     ASSUMPTION_HEAD,
     DOUBTED_TOLD,
     answer,
-    assumed,
     assumption_rows,
     cell,
     dependent_robots,
@@ -41,7 +41,8 @@ _MOST_ROBOTS = 6
 
 
 def print_summary(
-    summary: AnySummary, *, sources: bool = False, wide: bool = False, world: World | None = None
+    summary: AnySummary, *, sources: bool = False, wide: bool = False, world: World | None = None,
+    unused: Sequence[str] = (),
 ) -> None:
     """Print a summary as a table, and what it comes to.
 
@@ -50,6 +51,7 @@ def print_summary(
         sources: Whether to say what noise and robots did to each plan, too.
         wide: Whether to show all columns, however wide that is.
         world: Its world, if at hand.
+        unused: Robots that every plan leaves at home.
     """
     console, travel = results(), summary.travel
     robots = list(summary.scenarios[0].availability)
@@ -57,8 +59,10 @@ def print_summary(
     if doubts_told(summary.scenarios):
         console.print(DOUBTED_TOLD, highlight=False)
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
-                  f"{travel.max_excess_pct:.1f} %; {assumed(summary)}.", highlight=False)
+                  f"{travel.max_excess_pct:.1f} %. {processes_told(summary)}", highlight=False)
     for said in dependent_robots(world, summary) if world else ():
+        console.print(said, highlight=False, markup=False)
+    for said in unused_told(unused, summary):
         console.print(said, highlight=False, markup=False)
     _print_unhappy(summary, console)
     if told := interaction_told(summary.scenarios):
@@ -84,6 +88,20 @@ def print_summary(
         _print_interaction(summary, console, wide=wide)
     if not summary.reproducible:
         console.print("A solve met its limit: these plans may differ on another machine.", highlight=False)
+
+
+_FAIL: Mapping[FailureProcess, str] = {
+    "mission": "for a whole mission", "per_leg": "before each POI", "hazard": "at any time while driving"}
+
+
+def processes_told(summary: AnySummary) -> str:
+    """When robots fail, as plans expect it and in execution; what given plans expect is not known."""
+    planned, executed = summary.failure.plan, summary.failure.execute
+    if isinstance(summary, ComparisonSummary):
+        return f"Robots may fail {_FAIL[executed]}."
+    if planned == executed:
+        return f"Robots may fail {_FAIL[executed]}, as plans expect it."
+    return f"Plans expect that robots may fail {_FAIL[planned]}; in execution they may fail {_FAIL[executed]}."
 
 
 def _print_plans(summary: AnySummary, robots: Sequence[str], console: Console, *, wide: bool) -> None:

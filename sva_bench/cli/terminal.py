@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -46,6 +47,15 @@ def results() -> Console:
     told = os.environ.get("COLUMNS", "")
     width = None if sys.stdout.isatty() else int(told) if told.isdecimal() and 20 <= int(told) <= 1000 else _PIPED
     return SafeConsole(width=width, markup=False)  # names may hold brackets
+
+
+def print_hanging(text: str, lead: str = "") -> None:
+    """Print a line of results; what finds no room in it goes on below, as far in as the text behind ``lead`` begins."""
+    console = results()
+    indent = " " * len(lead)
+    for line in textwrap.wrap(printable(text), console.width, initial_indent=lead, subsequent_indent=indent,
+                              break_on_hyphens=False) or [lead.rstrip()]:
+        console.print(line, highlight=False, soft_wrap=True)
 
 
 def refuse_closed_output() -> None:

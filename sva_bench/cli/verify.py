@@ -9,7 +9,7 @@ import typer
 
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import AsJson, Verbose, WorkerCount
-from sva_bench.cli.terminal import print_json, progress_bars, refuse_closed_output, results, set_up_logging
+from sva_bench.cli.terminal import print_hanging, print_json, progress_bars, refuse_closed_output, set_up_logging
 from sva_bench.errors import ExitCode
 from sva_bench.study.libraries import PRELOAD, load_libraries
 from sva_bench.workers.pool import local_workers
@@ -44,8 +44,8 @@ def verify(
         print_json(found.as_dict())
     else:
         for line in found.checked:
-            results().print(f"ok      {line}", highlight=False, markup=False, soft_wrap=True)
+            print_hanging(line, "ok      ")
         if found.difference is not None:
-            results().print(f"DIFFERS {found.difference}", highlight=False, markup=False, soft_wrap=True)
+            print_hanging(str(found.difference), "DIFFERS ")
     if found.difference is not None:
         raise typer.Exit(ExitCode.EXPECTATION_NOT_MET)

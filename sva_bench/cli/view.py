@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
 from sva_bench.cli.loading import loading
-from sva_bench.cli.options import AsCsv, CompareKeys, Verbose, Wide
+from sva_bench.cli.options import TRIAL_METAVAR, AsCsv, CompareKeys, Verbose, Wide
 from sva_bench.cli.terminal import messages, progress_bars, results, set_up_logging
 from sva_bench.errors import BadInput
-from sva_bench.files.outputs import check_output, write_result
+from sva_bench.files.outputs import check_folder, check_output, write_result
+from sva_bench.study.libraries import PRELOAD, load_libraries
+from sva_bench.workers.pool import local_workers
+
+if TYPE_CHECKING:
+    from sva_bench.storage.trial_choice import TrialChoice
 
 
 def view(
@@ -29,6 +34,8 @@ def view(
                                                  show_default="all")] = None,
     planner: Annotated[str | None, typer.Option(help="Of a run: only recordings of this planner's plan.",
                                                 show_default="all")] = None,
+    trial: Annotated[str | None, typer.Option(metavar=TRIAL_METAVAR, help="Of a run: only this trial, which is played "
+                                              "again if it isn't recorded.", show_default="all")] = None,
 ) -> None:
     """Open recordings in the Rerun viewer, or draw one.
 
@@ -39,25 +46,43 @@ def view(
     with loading():
         from sva_bench.recording.viewer import recordings_of
         from sva_bench.recording.viewer import view as open_viewer
-        from sva_bench.storage.recordings import recordings_for
+        from sva_bench.storage.recordings import most_telling, recordings_for
         from sva_bench.storage.stored_run import missing, run_folder_at
+        from sva_bench.storage.trial_choice import choice_of
 
     if recording.is_dir() and next((recording / "recordings").glob("*.rrd"), None) is None:
         raise missing(run_folder_at(recording), recording / "recordings" / "*.rrd")  # or what it is, if it is none
     for output, option in ((screenshot, "--screenshot"), (video, "--video")):
         if output is not None:
             check_output(output, recording, way_out=f"choose another place with {option}")
-    if scenario is None and planner is None and not (recording / "summary.json").is_file():
+    choice = None if trial is None else choice_of(trial)
+    if scenario is None and planner is None and choice is None and not (recording / "summary.json").is_file():
         files = recordings_of(recording)
     elif recording.is_file():
-        raise BadInput(f"{recording} is one recording: --scenario and --planner choose among those of a run folder")
+        raise BadInput(f"{recording} is one recording: --scenario, --planner and --trial choose among those of a run "
+                       "folder")
     else:
-        files = recordings_for(run_folder_at(recording), scenario, planner)
+        files = recordings_for(run_folder_at(recording), scenario, planner, choice)
+        if choice is not None and not files:
+            files = _played(recording, scenario or most_telling(recording), planner, choice)
     if video is not None:
         _draw(files[0], video)
         return
     open_viewer(files, web=web, screenshot=screenshot, at_s=at,
                 say=lambda text: messages.print(text, highlight=False, markup=False, soft_wrap=True))
+
+
+def _played(folder: Path, scenario: str, planner: str | None, choice: TrialChoice) -> tuple[Path, ...]:
+    """The recordings of a trial that the run did not record, of each plan that is asked for: it is played again."""
+    check_folder(folder / "recordings", "RUN")
+    load_libraries()
+    with loading():
+        from sva_bench.study.replay import Wanted, replay
+
+    wanted = Wanted(scenario=scenario, trial=choice.trial, kind=choice.kind, planner=planner)
+    with progress_bars() as progress, local_workers(None, PRELOAD) as executor:
+        found = replay(folder, wanted, executor, progress)
+    return tuple(one.recording for one in found if one.recording is not None)
 
 
 def _draw(recording: Path, video: Path) -> None:

@@ -44,7 +44,8 @@ def first_complaint(
     if detail["type"] == "string_pattern_mismatch":
         name = shown(detail["input"])
         return loc, f"{name} is no valid name; use up to 64 letters, digits, '_', '.', '-', the first a letter or digit"
-    message = _in_plain_words(detail)
+    told = _told_at(schema, detail["loc"])
+    message = _in_plain_words(detail) if told is None or detail["type"] not in _OF_LISTS else f"expected {told}"
     found = detail["input"]
     text = (written(loc) if written else None) or (None if found is None else str(found).lower())
     if detail["type"] == "string_type" and not isinstance(found, dict | list) and text is not None and len(text) <= 60:
@@ -55,12 +56,17 @@ def first_complaint(
         return loc, f"expected a word, and {text} without quotes is {kind}; if it is a name, write '{text}'"
     also = f", found {shown(found)}" if not isinstance(found, dict | list) and detail["type"] != "value_error" else ""
     if isinstance(found, str) and detail["type"] in ("float_type", "int_type"):
-        also = f", found the text {shown(found)}" + (": take the quotes away" if _numeric(found) else _comma(found))
+        also = f", found the text {shown(found)}" + (
+            ": take the quotes away" if _numeric(found) else _comma(found) or _of_per_cent(found, loc))
+    if detail["type"] in _BOUNDED_ABOVE:
+        also += _as_a_share(detail, str(loc[-1]) if loc else "")
+    if detail["type"] in ("too_short", "too_long") and told is not None:
+        also = f", found {counted(detail['ctx']['actual_length'], 'entry', 'entries')}"
     if detail["type"] == "literal_error" and isinstance(found, str):
         close = closest(found.lower(), re.findall("'([^']*)'", detail["ctx"]["expected"]))
         also += f"; did you mean {close!r}?" if close is not None else ""
     if detail["type"] == "too_long" and written and all(isinstance(item, int) for item in found):
-        also = "; if commas among them are decimal ones, write decimal points"
+        also += "; if commas among them are decimal ones, write decimal points"
     return loc, message[:1].lower() + message[1:] + also
 
 
@@ -71,7 +77,15 @@ def of_an_option(error: ValidationError) -> str:
     found = str(detail["input"])
     if detail["type"] == "value_error":  # ours or typer's, which say the value
         return message
-    return f"{message}, found {found if found.isalnum() else shown(found)}{_comma(found)}"
+    share = _as_a_share(detail, "") if detail["type"] in _BOUNDED_ABOVE else _of_per_cent(found, ())
+    return f"{message}, found {found if found.isalnum() else shown(found)}{_comma(found)}{share}"
+
+
+def of_a_choice(message: str) -> str:
+    """The message for an option that takes one of several words, with the nearest one."""
+    told = re.search(r"'([^']*)' is not one of ('[^']*'(?:, '[^']*')*)", message)
+    close = None if told is None else closest(told[1].lower(), re.findall("'([^']*)'", told[2]))
+    return message if close is None else f"{message.removesuffix('.')}; did you mean {close!r}?"
 
 
 def _in_plain_words(detail: Any) -> str:
@@ -87,6 +101,29 @@ def _in_plain_words(detail: Any) -> str:
     return message_text.removeprefix("Value error, ")
 
 
+def _as_a_share(detail: Any, key: str) -> str:
+    """The hint for a share that was given in per cent; empty for what is none."""
+    found, most = detail["input"], min(detail["ctx"].get(bound, math.inf) for bound in ("le", "lt"))
+    number = float(found) if isinstance(found, int | float) or _numeric(str(found)) else math.nan
+    if most > 1 or not 1 < number <= 100 or number / 100 > most or key.endswith(_UNITS):
+        return ""
+    return f": a share, not per cent; did you mean {number / 100:g}?"
+
+
+def _of_per_cent(text: str, loc: Loc) -> str:
+    """The hint for a share that was given with a sign of per cent; empty for other text."""
+    number = text.strip().removesuffix("%").strip()
+    if not text.strip().endswith("%") or not _numeric(number) or (loc and str(loc[-1]).endswith(_UNITS)):
+        return ""
+    return f": write a share, {float(number) / 100:g}"
+
+
+def hint_of_per_cent(text: str) -> str:
+    """The hint for per cent that were given without their sign, or as a share; empty for other text."""
+    number = float(text) if _numeric(text) else 0.0
+    return f"; did you mean {number if number >= 1 else 100 * number:g}%?" if number > 0 else ""
+
+
 def _comma(text: str) -> str:
     """The hint for a number with a decimal comma; empty for other text."""
     return f": write a decimal point, {text.replace(',', '.')}" if text.count(",") == 1 and len(text) <= 40 \
@@ -100,6 +137,11 @@ def _numeric(text: str) -> bool:
         return False
 
 
+_UNITS = ("_m", "_s", "_kg", "_deg", "_pct")
+"""Ends of keys that are no shares."""
+_BOUNDED_ABOVE = ("less_than_equal", "less_than")
+_OF_LISTS = ("too_short", "too_long", "list_type", "tuple_type")
+"""Pydantic's error types of lists of so many entries."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 """Pydantic's error types for an unknown key: of models, and of dataclasses."""
 
@@ -175,13 +217,32 @@ def _existing(data: Any, loc: Loc) -> Loc:
 
 def _keys_at(schema: type[Any], loc: Loc) -> list[str]:
     """The schema's keys at ``loc``, of every alternative of a union."""
+    return sorted({key for form in _forms_at(schema, loc) for key in _keys_of(form)})
+
+
+def _forms_at(schema: type[Any], loc: Loc) -> set[type[Any]]:
+    """The sections at ``loc``, every alternative of a union."""
     found: set[type[Any]] = {schema}
     for part in loc:
         inner: set[type[Any]] = set()
         for form in found:
             inner |= _forms_in(_keys_of(form).get(str(part)))
         found = inner or found
-    return sorted({key for form in found for key in _keys_of(form)})
+    return found
+
+
+def _told_at(schema: type[Any], loc: Loc) -> str | None:
+    """What the schema says of a key, of any alternative of a union; ``None`` where that is nothing."""
+    for depth in range(len(loc) - 1, -1, -1):
+        if isinstance(loc[depth], str):
+            break
+    else:
+        return None
+    if depth < len(loc) - 1:  # of an item
+        return None
+    described = [form.model_fields[str(loc[depth])].description for form in _forms_at(schema, loc[:depth])
+                 if issubclass(form, BaseModel) and str(loc[depth]) in form.model_fields]
+    return next((told for told in described if told), None)
 
 
 def _keys_of(form: type[Any]) -> dict[str, Any]:

@@ -56,6 +56,18 @@ class About:
         return head + results_table(traces)
 
 
+def legend(*, changed: bool, believed: bool, lost: bool, forgone: bool, touched: bool) -> str:
+    """What the marks on the map mean, as Markdown; those of what didn't happen are left out."""
+    said = ["yellow: POI, larger if worth more; in a robot's colour: collected by it", "green: station", "black: base",
+            "dashes: planned", "line: driven"]
+    said += ["thin: orders before news", "thick: after it", "pale: taken over"] if changed else []
+    said += ["ring: where a robot believes to be"] if believed else []
+    said += ["red cross: lost robot"] if lost else []
+    said += ["other cross: POI left by the robot of its colour"] if forgone else []
+    said += ["red dot: a hull touched something"] if touched else []
+    return f"*Marks: {'; '.join(said)}.*"
+
+
 def results_table(traces: Sequence[Trace]) -> str:
     """How each robot ended, as a Markdown table."""
     rows = ["| robot | end | at | collected |", "| --- | --- | --- | --- |"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import rerun as rr
 
 from sva_bench.recording.colors import ALARM, Color, pale
@@ -59,9 +60,12 @@ def _write_numbers(pen: Pen, story: Story) -> None:
         _line(pen, f"speed/{robot.name}", robot.speed, robot.name, robot.color, steps=False)
 
 
-def write_total(pen: Pen, entity: str, story: Story, name: str, color: Color) -> None:
-    """Write what all robots of a story collect, as one line of a chart."""
-    _line(pen, entity, story.total, name, color, steps=True, width=3.0)
+def write_total(pen: Pen, entity: str, story: Story, name: str, color: Color, end_s: float) -> None:
+    """Write what all robots of a story collect, as one line of a chart that goes on to some time [s]."""
+    total = story.total
+    if total.time_s[-1] < end_s:
+        total = Series(time_s=np.append(total.time_s, end_s), value=np.append(total.value, total.value[-1]))
+    _line(pen, entity, total, name, color, steps=True, width=3.0)
 
 
 def _write_log(pen: Pen, story: Story) -> None:

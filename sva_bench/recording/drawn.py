@@ -29,10 +29,10 @@ _ORDERS_M, _LOST_M = 0.045, 0.6  # of changed orders above those, and of what ma
 _NEW_UI, _CROSS_UI, _MARK_UI = 3.5, 3.5, 6.0  # widths of new orders and crosses, and size of marks
 _PATCH_M, _GATE_M, _RING_M = 0.01, 0.1, 0.02  # thickness of floors' plates, height of gates, and of rings above hulls
 _BAR_M, _GATE_UI = 0.12, 4.0  # length of a gate's dashes and of their gaps, and width
+_NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
 _FORGONE_M = 0.3  # half the width of crosses over POIs
 _WIDEST = 1.35  # radius of the POI that is worth most, in half widths of a station
-_INSET = 0.08  # share of the floor's width by which words stand beside what they are about
-_NAME_M = 0.75  # a robot's name is this far north of its hull; the names of sites are south of them
+_WITHIN = 0.02  # by what share of its size a hull is smaller than one that comes before it in the same place
 
 
 def write_map(pen: Pen, story: Story) -> None:
@@ -40,8 +40,9 @@ def write_map(pen: Pen, story: Story) -> None:
     write_ground(pen, story.solids, story.marks)
     for robot in story.views:
         _write_robot(pen, robot)
+    by_name = {robot.name: robot for robot in story.views}
     for lost in story.lost:
-        _write_lost(pen, lost, story.solids)
+        _write_lost(pen, lost, by_name[lost.robot])
     for forgone in story.forgone:
         _write_forgone(pen, forgone)
     _write_floors(pen, story.floors)
@@ -134,7 +135,10 @@ def _write_robot(pen: Pen, robot: RobotView) -> None:
     # Place and heading apart: the name goes where the robot goes, but stays north of it.
     pen.column(here, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.pose[:, :2], 0.0)))
     pen.column(f"{here}/hull", robot.time_s, rr.Transform3D.columns(quaternion=_about_z(robot.pose[:, 2])))
-    pen.names(f"{here}/name", [robot.name], np.array([[0.0, r + _NAME_M, height]]))
+    _write_name(pen, f"{here}/name", robot, np.array([0.0, r + _NAME_M, height]))
+    if robot.rank:
+        # Else of hulls in one place now this and now that one would be seen, in patches.
+        pen.constant(f"{here}/hull/body", rr.Transform3D.from_fields(scale=[1.0 - _WITHIN * min(robot.rank, 9)] * 3))
     _write_hull(pen, f"{here}/hull/body", robot)
     # A white bar on top, from the centre to the front.
     pen.constant(f"{here}/hull/heading", rr.Boxes3D(
@@ -154,6 +158,16 @@ def _write_robot(pen: Pen, robot: RobotView) -> None:
         pen.constant(entity, rr.LineStrips3D.from_fields(
             colors=[robot.color], radii=rr.Radius.ui_points(1.75)))
         pen.column(entity, robot.trail_s, rr.LineStrips3D.columns(strips=_deep(robot.trail, _DRIVEN_M)))
+
+
+def _write_name(pen: Pen, entity: str, robot: RobotView, at_m: FloatArray) -> None:
+    """The name of a robot above its hull, raised where others stand in the same place; gone once it is lost."""
+    raised, gone_s = robot.raised, robot.disabled_s
+    shown = raised.time_s < (math.inf if gone_s is None else gone_s)
+    places = (at_m + np.outer(raised.value[shown], [0.0, 1.0, 0.0])).astype(np.float32)
+    pen.names(entity, [robot.name])
+    pen.column(entity, [*raised.time_s[shown], *([] if gone_s is None else [gone_s])], rr.Points3D.columns(
+        positions=places).partition([1] * len(places) + [0] * (gone_s is not None)))
 
 
 def _write_hull(pen: Pen, entity: str, robot: RobotView) -> None:
@@ -193,21 +207,17 @@ def _write_forgone(pen: Pen, forgone: Forgone) -> None:
     pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_NEW_UI)))
 
 
-def _write_lost(pen: Pen, lost: Lost, solids: Obstacles) -> None:
-    """A red cross where a robot was lost, from then on, larger than the robot, and what happened."""
+def _write_lost(pen: Pen, lost: Lost, robot: RobotView) -> None:
+    """A red cross where a robot was lost, from then on, larger than it, and what happened, in the place of its name."""
     entity, r = f"world/lost/{lost.robot}", 2.2 * lost.radius_m
     cross = np.array([[[-r, -r], [r, r]], [[-r, r], [r, -r]]]) + lost.at_m
     pen.column(entity, [lost.time_s], rr.LineStrips3D.columns(
         strips=_deep(cross, _LOST_M), colors=[ALARM] * 2).partition([2]))
     pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_CROSS_UI)))
-    # Beside it, where no name of a site or robot stands, and towards the middle of the floor, where the view ends last.
-    x0, _, x1, _ = solids.bounds_m.tolist()
-    aside = (r + _INSET * (x1 - x0)) * (1 if lost.at_m[0] < (x0 + x1) / 2 else -1)
-    at = lost.at_m[None] + [aside, 0.0]
+    at = lost.at_m + np.array([0.0, robot.radius_m + _NAME_M + float(robot.raised.value[-1])])
     pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
-        positions=_deep(at, _LOST_M), colors=[pale(ALARM)], labels=[lost.what]))  # light: names have dark shields
-    pen.constant(f"{entity}/what", rr.Points3D.from_fields(
-        radii=rr.Radius.ui_points(0.0), show_labels=True))
+        positions=_deep(at[None], _LOST_M), labels=[lost.what]))
+    pen.names(f"{entity}/what")
 
 
 def _write_floors(pen: Pen, floors: Sequence[Floor]) -> None:
@@ -241,8 +251,7 @@ def _write_touched(pen: Pen, touched: Touched) -> None:
     named = [k for k, what in enumerate(touched.what) if what]
     pen.column(f"{entity}/what", touched.time_s[named], rr.Points3D.columns(
         positions=_deep(touched.at_m[named], _LOST_M), labels=[touched.what[k] for k in named]))
-    pen.constant(f"{entity}/what", rr.Points3D.from_fields(
-        colors=[ALARM], radii=rr.Radius.ui_points(0.0), show_labels=True))
+    pen.names(f"{entity}/what")
 
 
 def _write_waiting(pen: Pen, waiting: Sequence[Waiting]) -> None:
@@ -250,11 +259,14 @@ def _write_waiting(pen: Pen, waiting: Sequence[Waiting]) -> None:
     for robot in dict.fromkeys(wait.robot for wait in waiting):
         mine, entity = [wait for wait in waiting if wait.robot == robot], f"world/waits/{robot}"
         times = [time for wait in mine for time in (wait.since_s, wait.until_s)]
+        at = _deep(np.array([wait.at_m for wait in mine]), _LOST_M)
         pen.column(entity, times, rr.Points3D.columns(
-            positions=_deep(np.array([wait.at_m for wait in mine]), _LOST_M), labels=[
-                f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine],
-            colors=[ORANGE] * len(mine)).partition([1, 0] * len(mine)))
-        pen.constant(entity, rr.Points3D.from_fields(radii=rr.Radius.ui_points(_MARK_UI), show_labels=True))
+            positions=at, colors=[ORANGE] * len(mine)).partition([1, 0] * len(mine)))
+        pen.constant(entity, rr.Points3D.from_fields(radii=rr.Radius.ui_points(_MARK_UI)))
+        pen.column(f"{entity}/what", times, rr.Points3D.columns(positions=at, labels=[
+            f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine]).partition(
+                [1, 0] * len(mine)))
+        pen.names(f"{entity}/what")
 
 
 def _write_change(pen: Pen, change: Change) -> None:

@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import FilmMark
 from sva_bench.palette import ALARM, BLACK, GREEN, YELLOW, Color
 from sva_bench.recording.colors import pale
 from sva_bench.recording.read_back import Shown, ShownPlan, ShownRobot
 
 _OVER = 2  # frames are drawn so many times as large, and made smaller: edges are smooth
 _MAP_PX, _PAIR_PX = 900, 640  # greatest side of a map alone, and of one of two
-_HEAD_PX, _ROW_PX, _FOOT_PX, _GAP_PX = 44, 24, 30, 16
+_HEAD_PX, _ROW_PX, _LINE_PX, _GAP_PX = 44, 24, 20, 16  # heights of title, rows and lines of the legend, and margin
+_SUM_PX = 416  # right edge of what a robot collected, from the left edge of its map
+_TOGETHER_PX = 12  # robots so near to each other share a line for their names
 _PAPER: Color = (255, 255, 255)
 _INK: Color = (30, 30, 30)
 _FLOOR: Color = (240, 240, 240)
 _WALLS: Color = (140, 140, 140)
 _LEAST_PX = 7  # radius of a robot, however large the world
+_LEGEND: Sequence[tuple[FilmMark, Color | None, str]] = (
+    ("disc", YELLOW, "POI, the larger the more it is worth"),
+    ("disc", None, "POI that a robot of this colour collected"), ("cross", None, "POI that it left"),
+    ("cross", ALARM, "lost robot"), ("dash", None, "planned"), ("line", None, "driven"), ("square", GREEN, "station"),
+    ("diamond", BLACK, "base"))
+"""Marks, their colours (``None``: that of a robot), and what they mean."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,14 +54,16 @@ class Frames:
     def __init__(self, shown: Shown) -> None:
         self._shown, self._fonts = shown, {size: ImageFont.load_default(size * _OVER) for size in (12, 14, 18)}
         most = _MAP_PX if len(shown.plans) == 1 else _PAIR_PX
-        x0, y0, x1, y1 = shown.plans[0].bounds_m
+        x0, y0, x1, y1 = _extent(shown.plans[0])
         scale = most / max(x1 - x0, y1 - y0)
         wide, tall = (x1 - x0) * scale, (y1 - y0) * scale
         column = max(wide, 420.0)  # room for the words below
         robots = max(len(plan.robots) for plan in shown.plans)
-        self._rows_at = _HEAD_PX + tall + 8 + (_ROW_PX if len(shown.plans) > 1 else 0)
+        self._rows_at = _HEAD_PX + tall + 10 + (_ROW_PX if len(shown.plans) > 1 else 0)
         self.width = _even(len(shown.plans) * (column + _GAP_PX) + _GAP_PX)
-        self.height = _even(self._rows_at + (robots + 1) * _ROW_PX + _FOOT_PX)
+        legend = self._legend()
+        self._legend_at = self._rows_at + (robots + (robots > 1)) * _ROW_PX + 8
+        self.height = _even(self._legend_at + len(legend) * _LINE_PX + 8)
         self._columns = [_GAP_PX + number * (column + _GAP_PX) for number in range(len(shown.plans))]
         top = _HEAD_PX + (_ROW_PX if len(shown.plans) > 1 else 0)
         self._places = [_Place(left=(left + (column - wide) / 2) * _OVER, top=top * _OVER, scale=scale * _OVER,
@@ -60,7 +72,7 @@ class Frames:
         self._trailed_s = -1.0
         draw = ImageDraw.Draw(self._still)
         self._text(draw, _GAP_PX, 12, shown.title, 18)
-        self._legend(draw)
+        self._draw_legend(draw, legend)
         for plan, place, left in zip(shown.plans, self._places, self._columns, strict=True):
             if plan.name:
                 self._text(draw, left, _HEAD_PX, f"{plan.name} plan", 14)
@@ -91,11 +103,13 @@ class Frames:
                 if time_s >= robot.forgone_s:
                     for stroke in robot.forgone.tolist():
                         _line(draw, place, stroke, robot.color, 2.5)
-            for robot in plan.robots:
+            # Lost ones are seen above those that stand in the same place.
+            for robot in sorted(plan.robots, key=lambda robot: robot.lost is not None and time_s >= robot.lost[0]):
                 _robot(draw, robot, place, time_s)
-                x, y, _ = robot.pose_at(time_s)
-                px, py = place.at(x, y)
-                self._text(draw, px / _OVER, py / _OVER - 26, robot.name, 12, anchor="ma", halo=True)
+            gone = {robot.name for robot in plan.robots if robot.lost is not None and time_s >= robot.lost[0]}
+            for (px, py), names in _named(plan, place, time_s):
+                up = 26 if gone.isdisjoint(names) else 46  # above the cross
+                self._text(draw, px / _OVER, py / _OVER - up, ", ".join(names), 12, anchor="ma", halo=True)
             self._rows(draw, plan, left, time_s)
         return frame.resize((self.width, self.height), Image.Resampling.BOX)
 
@@ -117,7 +131,7 @@ class Frames:
 
     def _sites(self, draw: ImageDraw.ImageDraw, plan: ShownPlan, place: _Place, time_s: float) -> None:
         for sites in plan.sites:
-            colors = sites.colors.at(time_s)
+            colors = sites.colors.at(time_s) or []
             for name, (x, y), half, color in zip(sites.names, sites.at_m.tolist(), sites.half_m.tolist(), colors,
                                                  strict=True):
                 px, py = place.at(x, y)
@@ -133,42 +147,85 @@ class Frames:
         """A row for each robot: its colour, what it does, what fuel it has left, and what it collected."""
         for number, robot in enumerate(plan.robots):
             y = self._rows_at + number * _ROW_PX
-            state = (robot.state.at(time_s) or [""])[0]
+            state = robot.state.at(time_s) or ""
             gone = robot.lost is not None and time_s >= robot.lost[0]
             _disc(draw, ((left + 8) * _OVER, (y + 9) * _OVER), 6 * _OVER, robot.color)
             self._text(draw, left + 22, y, robot.name, 14)
             self._text(draw, left + 110, y, state, 14, color=ALARM if gone else _INK)
-            if robot.fuel is not None:
+            if robot.fuel is not None and not gone:
                 self._text(draw, left + 300, y, f"fuel {np.interp(time_s, *robot.fuel):.0f} s", 14, anchor="ra")
-            self._text(draw, left + 410, y, f"{robot.collected.at(time_s) or 0.0:.6g}", 14, anchor="ra")
+            self._text(draw, left + _SUM_PX, y, f"collected {robot.collected.at(time_s) or 0.0:.6g}", 14, anchor="ra")
         if len(plan.robots) > 1:
             y = self._rows_at + len(plan.robots) * _ROW_PX
-            self._text(draw, left + 22, y, "collected together", 14)
-            self._text(draw, left + 410, y, f"{plan.total.at(time_s) or 0.0:.6g}", 14, anchor="ra")
+            self._text(draw, left + 22, y, "all robots", 14)
+            self._text(draw, left + _SUM_PX, y, f"collected {plan.total.at(time_s) or 0.0:.6g}", 14, anchor="ra")
 
-    def _legend(self, draw: ImageDraw.ImageDraw) -> None:
-        x, y = float(_GAP_PX), self.height - _FOOT_PX + 6
-        for mark, color, words in (("disc", YELLOW, "POI, the larger the more it is worth"),
-                                   ("disc", self._shown.plans[0].robots[0].color, "collected"),
-                                   ("cross", ALARM, "lost robot, or POI left by it"),
-                                   ("square", GREEN, "refuelling"), ("diamond", BLACK, "base")):
-            at = (x + 6) * _OVER, (y + 7) * _OVER
-            if mark == "disc":
-                _disc(draw, at, 5 * _OVER, color, outline=_INK)
-            elif mark == "cross":
-                _cross(draw, at, 5 * _OVER, color)
-            else:
-                r = 5 * _OVER
-                square, diamond = [(-r, -r), (r, -r), (r, r), (-r, r)], [(0, -r), (r, 0), (0, r), (-r, 0)]
-                corners = square if mark == "square" else diamond
-                draw.polygon([(at[0] + dx, at[1] + dy) for dx, dy in corners], fill=color)
-            self._text(draw, x + 16, y, words, 12)
-            x += 16 + self._fonts[12].getlength(words) / _OVER + 18
+    def _legend(self) -> list[list[tuple[float, FilmMark, Color, str]]]:
+        """What marks mean, in lines: where each begins [px], the mark, its colour, and words."""
+        lines: list[list[tuple[float, FilmMark, Color, str]]] = [[]]
+        mine = self._shown.plans[0].robots[0].color
+        x = float(_GAP_PX)
+        for mark, color, words in _LEGEND:
+            wide = 16 + self._fonts[12].getlength(words) / _OVER
+            if lines[-1] and x + wide > self.width - _GAP_PX:
+                lines.append([])
+                x = float(_GAP_PX)
+            lines[-1].append((x, mark, color or (pale(mine) if mark == "dash" else mine), words))
+            x += wide + 18
+        return lines
+
+    def _draw_legend(self, draw: ImageDraw.ImageDraw, lines: list[list[tuple[float, FilmMark, Color, str]]]) -> None:
+        for number, line in enumerate(lines):
+            y = self._legend_at + number * _LINE_PX
+            for x, mark, color, words in line:
+                _mark(draw, ((x + 6) * _OVER, (y + 7) * _OVER), mark, color)
+                self._text(draw, x + 16, y, words, 12)
 
 
 def _even(length: float) -> int:
     """The next even number of pixels, which videos want."""
     return 2 * math.ceil(length / 2)
+
+
+def _extent(plan: ShownPlan) -> tuple[float, float, float, float]:
+    """Least x, y, greatest x, y [m] of floor and walls, which stand about it."""
+    reach = plan.boxes[:, 2:3] * np.abs(np.stack([np.cos(plan.boxes[:, 4]), np.sin(plan.boxes[:, 4])], axis=1)) \
+        + plan.boxes[:, 3:4] * np.abs(np.stack([np.sin(plan.boxes[:, 4]), np.cos(plan.boxes[:, 4])], axis=1))
+    x0, y0, x1, y1 = plan.bounds_m
+    low = np.vstack([plan.boxes[:, :2] - reach, [[x0, y0]]]).min(axis=0).tolist()
+    high = np.vstack([plan.boxes[:, :2] + reach, [[x1, y1]]]).max(axis=0).tolist()
+    return low[0], low[1], high[0], high[1]
+
+
+def _named(plan: ShownPlan, place: _Place, time_s: float) -> list[tuple[tuple[float, float], list[str]]]:
+    """Names of robots and where they are [px]; those of robots in one place together."""
+    found: list[tuple[tuple[float, float], list[str]]] = []
+    for robot in plan.robots:
+        x, y, _ = robot.pose_at(time_s)
+        at = place.at(x, y)
+        here = next((names for other, names in found if math.dist(at, other) < _TOGETHER_PX * _OVER), None)
+        if here is None:
+            found.append((at, [robot.name]))
+        else:
+            here.append(robot.name)
+    return found
+
+
+def _mark(draw: ImageDraw.ImageDraw, at: tuple[float, float], mark: FilmMark, color: Color) -> None:
+    """A mark of the legend."""
+    r = 5 * _OVER
+    match mark:
+        case "disc":
+            _disc(draw, at, r, color, outline=_INK)
+        case "cross":
+            _cross(draw, at, r, color)
+        case "line" | "dash":
+            for start, end in [(-r, r)] if mark == "line" else [(-r, -0.2 * r), (0.4 * r, 1.2 * r)]:
+                draw.line([(at[0] + start, at[1]), (at[0] + end, at[1])], fill=color, width=2 * _OVER)
+        case "square" | "diamond":
+            square, diamond = [(-r, -r), (r, -r), (r, r), (-r, r)], [(0, -r), (r, 0), (0, r), (-r, 0)]
+            corners = square if mark == "square" else diamond
+            draw.polygon([(at[0] + dx, at[1] + dy) for dx, dy in corners], fill=color)
 
 
 def _robot(draw: ImageDraw.ImageDraw, robot: ShownRobot, place: _Place, time_s: float) -> None:

@@ -18,7 +18,7 @@ _PLAY_S = 30.0  # a mission is played in about this time
 def layout_of(story: Story) -> rrb.Blueprint:
     """The map over a lane of states for each robot at the left; words, fuel and speed, incentive and log at the right.
     """
-    axis = _axis(story.duration_s)
+    axis = _axis(float(story.total.time_s[-1]))
     most_fuel = max((float(robot.fuel.value.max()) for robot in story.views if robot.fuel is not None), default=0.0)
     most_speed = max((float(robot.speed.value.max()) for robot in story.views), default=0.0)
     fuel = rrb.TimeSeriesView(origin="fuel", name="Fuel left [s of driving]", axis_x=axis, axis_y=_from_zero(most_fuel),
@@ -31,14 +31,15 @@ def layout_of(story: Story) -> rrb.Blueprint:
         rrb.Tabs(fuel, speed, active_tab=0) if limited else speed,
         rrb.TimeSeriesView(origin="collected", name="Incentive collected", axis_x=axis,
                            axis_y=_from_zero(float(story.total.value[-1])), plot_legend=rrb.Corner2D.LeftTop)]
-    shares = [2.4 + 0.5 * len(story.views), 3, 3]
+    shares = [3.4 + 0.5 * len(story.views), 3, 3]
     if story.lanes:
         right.append(rrb.TimeSeriesView(
             origin="news", name="Who was lost, and who learned of it when", axis_x=axis,
             axis_y=rrb.ScalarAxis(range=(-len(story.views) + 0.4, 0.6)), plot_legend=rrb.Corner2D.RightTop))
+        shares[0] += 1  # there is more to say of the marks
         shares.append(2)
     right.append(_log("events", "Events"))
-    left = rrb.Vertical(_map("", story), _states(["states/**"], axis), row_shares=[10, _lanes_share(len(story.views))])
+    left = rrb.Vertical(_map("", story), _states("states", axis), row_shares=[10, _lanes_share(len(story.views))])
     return _whole(rrb.Horizontal(left, rrb.Vertical(*right, row_shares=[*shares, 4]), column_shares=[13, 7]), story)
 
 
@@ -49,17 +50,17 @@ def layout_of_pair(stories: Mapping[str, Story]) -> rrb.Blueprint:
         stories: The plans' stories by the path of their entities.
     """
     longest = max(stories.values(), key=lambda story: story.duration_s)
-    axis = _axis(longest.duration_s)
+    axis = _axis(float(longest.total.time_s[-1]))
     most = max(float(story.total.value[-1]) for story in stories.values())
     maps = rrb.Horizontal(*(_map(path, story) for path, story in stories.items()))
-    states = rrb.Horizontal(*(_states([f"{path}states/**"], axis) for path in stories))
+    states = rrb.Horizontal(*(_states(f"{path}states", axis) for path in stories))
     lanes = _lanes_share(max(len(story.views) for story in stories.values()))
     told = [rrb.Tabs(rrb.TextDocumentView(origin=f"{path}about", name="Mission"), _log(f"{path}events", "Events"),
                      active_tab=0) for path in stories]
     chart = rrb.TimeSeriesView(origin="compared", name="Incentive collected by all robots", axis_x=axis,
                                axis_y=_from_zero(most), plot_legend=rrb.Corner2D.LeftTop)
     charts = rrb.Horizontal(told[0], chart, *told[1:])
-    return _whole(rrb.Vertical(maps, states, charts, row_shares=[10, 1.6 * lanes, 6]), longest)
+    return _whole(rrb.Vertical(maps, states, charts, row_shares=[10, 1.6 * lanes, 7]), longest)
 
 
 def layout_of_drives(title: str, kinds: Sequence[str], eye_m: Sequence[float], target_m: Sequence[float]
@@ -98,8 +99,8 @@ def _map(path: str, story: Story) -> rrb.Spatial3DView:
             whole_trail))
 
 
-def _states(contents: Sequence[str], axis: rrb.TimeAxis) -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(origin="/", contents=list(contents), name="What robots do", time_view=axis)
+def _states(origin: str, axis: rrb.TimeAxis) -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(origin=origin, name="What robots do", time_view=axis)
 
 
 def _lanes_share(robots: int) -> float:
@@ -117,7 +118,7 @@ def _log(origin: str, name: str) -> rrb.TextLogView:
 def _axis(duration_s: float) -> rrb.TimeAxis:
     return rrb.TimeAxis(view_range=rr.TimeRange(
         start=rr.TimeRangeBoundary.absolute(seconds=0.0),
-        end=rr.TimeRangeBoundary.absolute(seconds=max(duration_s, 1.0))))
+        end=rr.TimeRangeBoundary.absolute(seconds=duration_s)))
 
 
 def _from_zero(most: float) -> rrb.ScalarAxis:

@@ -29,21 +29,29 @@ class Pen:
     stream: rr.RecordingStream
     below: str = ""
 
-    def column(self, entity: str, time_s: Iterable[float] | FloatArray, columns: Any) -> None:
+    def column(self, entity: str, time_s: Iterable[float] | FloatArray, columns: Iterable[rr.ComponentColumn]
+               ) -> None:
         """Write what an entity is at some times [s]."""
         # Rounded here: rerun cuts off, and 0.29 s would become 0.289999999 s.
         nanoseconds = np.round(np.asarray(time_s, dtype=np.float64) * 1e9).astype("timedelta64[ns]")
         self.stream.send_columns(f"{self.below}{entity}", [rr.TimeColumn(TIMELINE, duration=nanoseconds)], columns,
                                  strict=True)
 
-    def constant(self, entity: str, *shapes: Any) -> None:
+    def constant(self, entity: str, *shapes: rr.AsComponents) -> None:
         """Write what an entity is all the time."""
         self.stream.log(f"{self.below}{entity}", *shapes, static=True, strict=True)
 
-    def names(self, entity: str, names: Sequence[str], at_m: NDArray[np.floating[Any]]) -> None:
-        """Names, each just below its point; labels of solids would have the solid's colour, and be hard to read."""
-        self.constant(entity, rr.Points3D(
-            at_m, radii=rr.Radius.ui_points(0.0), colors=[_NAMES], labels=names, show_labels=True))
+    def names(self, entity: str, names: Sequence[str] | None = None, at_m: NDArray[np.floating[Any]] | None = None
+              ) -> None:
+        """Names, each just below its point; labels of solids would have the solid's colour, and be hard to read.
+
+        Args:
+            entity: Its path.
+            names: The names; ``None`` = they are written as a column.
+            at_m: Their points; ``None`` = likewise.
+        """
+        self.constant(entity, rr.Points3D.from_fields(
+            positions=at_m, radii=rr.Radius.ui_points(0.0), colors=[_NAMES], labels=names, show_labels=True))
 
 
 def part(name: str) -> str:

@@ -105,7 +105,7 @@ def lost_of(trace: Trace, radius_m: float) -> Lost:
     outcome, robot = trace.outcome, trace.orders.robot
     held = f" ({held_told(outcome.events[-1].what)})" if outcome.events and outcome.events[-1].what else ""
     return Lost(robot=robot, radius_m=radius_m, time_s=outcome.end_time_s, at_m=trace.pose[-1, :2],
-                what=f"{robot} {LOST[outcome.end]}{held}, {outcome.end_time_s:.0f} s")
+                what=f"{robot} {LOST[outcome.end]}{held} at {outcome.end_time_s:.0f} s")
 
 
 def held_told(what: str) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Generic, TypeVar
 
 import numpy as np
 from rerun.chunk import RrdReader
@@ -20,14 +20,17 @@ from sva_bench.recording.pen import TIMELINE
 _SITES: Mapping[SiteKind, str] = {"base": "base", "station": "stations", "poi": "pois"}
 
 
+T = TypeVar("T")
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Steps:
+class Steps(Generic[T]):
     """What something is from each time [s] on, the times ascending; nothing before the first."""
 
     time_s: FloatArray
-    values: Sequence[Any]
+    values: Sequence[T]
 
-    def at(self, time_s: float) -> Any:
+    def at(self, time_s: float) -> T | None:
         """What it is at a time; ``None`` before the first."""
         number = int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1
         return self.values[number] if number >= 0 else None
@@ -41,7 +44,7 @@ class ShownSites:
     names: Sequence[str]
     at_m: FloatArray
     half_m: FloatArray
-    colors: Steps
+    colors: Steps[Sequence[Color]]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,13 +68,13 @@ class ShownRobot:
     color: Color
     time_s: FloatArray
     pose: FloatArray
-    colors: Steps
+    colors: Steps[Sequence[Color]]
     footprint: Sequence[tuple[tuple[float, float, float, float, float], bool]]
     planned: FloatArray
     driven: tuple[FloatArray, FloatArray]
-    state: Steps
+    state: Steps[str]
     fuel: tuple[FloatArray, FloatArray] | None
-    collected: Steps
+    collected: Steps[float]
     lost: tuple[float, str] | None = None
     forgone_s: float = math.inf
     forgone: FloatArray = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -102,7 +105,7 @@ class ShownPlan:
     cylinders: FloatArray
     sites: Sequence[ShownSites]
     robots: Sequence[ShownRobot]
-    total: Steps
+    total: Steps[float]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -118,8 +121,8 @@ class _Entities:
     """All that a recording holds, by entity and component: constants, and what is at which times."""
 
     def __init__(self, path: Path) -> None:
-        self.constants: dict[tuple[str, str], Any] = {}
-        self.steps: dict[tuple[str, str], tuple[list[int], list[Any]]] = {}
+        self.constants: dict[tuple[str, str], object] = {}
+        self.steps: dict[tuple[str, str], tuple[list[int], list[object]]] = {}
         for chunk in RrdReader(path).stream():
             rows, entity = chunk.to_record_batch(), chunk.entity_path.removeprefix("/")
             for component in rows.schema.names:
@@ -130,21 +133,77 @@ class _Entities:
                     times += rows.column(TIMELINE).cast("int64").to_pylist()
                     values += rows.column(component).to_pylist()
 
-    def at_times(self, entity: str, component: str) -> Steps:
-        """What a component is when, in order of time."""
-        times, values = self.steps.get((entity, component), ([], []))
-        order = sorted(range(len(times)), key=times.__getitem__)
-        return Steps(time_s=np.array([times[k] for k in order]) / 1e9, values=[values[k] for k in order])
+    def words(self, entity: str, component: str) -> list[str]:
+        """A constant as words."""
+        return _words(self.constants.get((entity, component)))
 
     def array(self, entity: str, component: str, width: int) -> FloatArray:
         """A constant as an array, shape (n, width)."""
-        return np.array(self.constants.get((entity, component)) or [], dtype=np.float64).reshape(-1, width)
+        return _array(self.constants.get((entity, component)), width)
+
+    def words_at(self, entity: str, component: str) -> Steps[list[str]]:
+        """Words over time."""
+        return self._at_times(entity, component, _words)
+
+    def arrays_at(self, entity: str, component: str, width: int) -> Steps[FloatArray]:
+        """Arrays over time, each of shape (n, width)."""
+        return self._at_times(entity, component, lambda value: _array(value, width))
+
+    def numbers_at(self, entity: str) -> Steps[float]:
+        """Numbers over time, as in charts."""
+        return self._at_times(entity, "Scalars:scalars", lambda value: float(_array(value, 1)[0, 0]))
+
+    def colors_at(self, entity: str, shape: str) -> Steps[Sequence[Color]]:
+        """Colours of shapes over time."""
+        return self._at_times(entity, f"{shape}:colors", _colors)
+
+    def strips_at(self, entity: str) -> Steps[FloatArray]:
+        """Lines over time, by their first two points on the floor: each of shape (n, 2, 2)."""
+        return self._at_times(entity, "LineStrips3D:strips", _ends)
+
+    def strips(self, entity: str) -> FloatArray:
+        """Lines by their first two points on the floor, shape (n, 2, 2)."""
+        return _ends(self.constants.get((entity, "LineStrips3D:strips")))
+
+    def color(self, entity: str, component: str) -> Color:
+        """The first of constant colours."""
+        return _colors(self.constants.get((entity, component)))[0]
+
+    def _at_times(self, entity: str, component: str, read: Callable[[object], T]) -> Steps[T]:
+        """What a component is when, in order of time."""
+        times, values = self.steps.get((entity, component), ([], []))
+        order = sorted(range(len(times)), key=times.__getitem__)
+        return Steps(time_s=np.array([times[k] for k in order]) / 1e9, values=[read(values[k]) for k in order])
 
     def below(self, prefix: str) -> Iterator[str]:
         """Names right below a path, in order."""
         names = {entity.removeprefix(prefix).split("/")[0] for entity, _ in (*self.constants, *self.steps)
                  if entity.startswith(prefix)}
         yield from sorted(names)
+
+
+def _items(value: object) -> list[object]:
+    """What a list holds; of nothing, nothing."""
+    return list(value) if isinstance(value, list) else []
+
+
+def _words(value: object) -> list[str]:
+    return [str(word) for word in _items(value)]
+
+
+def _array(value: object, width: int) -> FloatArray:
+    return np.array(_items(value), dtype=np.float64).reshape(-1, width)
+
+
+def _colors(value: object) -> list[Color]:
+    packed = [color for color in _items(value) if isinstance(color, int)]
+    return [(color >> 24 & 255, color >> 16 & 255, color >> 8 & 255) for color in packed]
+
+
+def _ends(value: object) -> FloatArray:
+    """The first two points of strips, on the floor."""
+    strips = [_array(strip, 3)[:2, :2] for strip in map(_items, _items(value))]
+    return np.array(strips, dtype=np.float64).reshape(-1, 2, 2)
 
 
 def read_recording(path: Path) -> Shown:
@@ -162,7 +221,7 @@ def read_recording(path: Path) -> Shown:
     # In the order in which they are compared, the stochastic one first.
     plans.sort(key=lambda plan: (plan.name != "stochastic", plan.name))
     end_s = max(times[-1] for times in (sorted(t) for t, _ in entities.steps.values()) if times) / 1e9
-    title = (entities.constants.get(("__properties", "RecordingInfo:name")) or [path.stem])[0]
+    title = next(iter(entities.words("__properties", "RecordingInfo:name")), path.stem)
     return Shown(title=title, end_s=end_s, plans=plans)
 
 
@@ -177,7 +236,7 @@ def _plan(entities: _Entities, below: str) -> ShownPlan:
                                    entities.array(cylinders, "Cylinders3D:radii", 1)]),
         sites=[sites for kind, entity in _SITES.items() for sites in _sites(entities, kind, f"{below}world/{entity}")],
         robots=[_robot(entities, below, name) for name in entities.below(f"{below}world/robots/")],
-        total=_scalars(entities, f"{below}collected/total"))
+        total=entities.numbers_at(f"{below}collected/total"))
 
 
 def _boxes(entities: _Entities, entity: str) -> FloatArray:
@@ -192,39 +251,40 @@ def _sites(entities: _Entities, kind: SiteKind, entity: str) -> list[ShownSites]
     if not len(centers):
         return []
     return [ShownSites(
-        kind=kind, names=entities.constants[f"{entity}/names", "Points3D:labels"], at_m=centers[:, :2],
+        kind=kind, names=entities.words(f"{entity}/names", "Points3D:labels"), at_m=centers[:, :2],
         half_m=entities.array(entity, f"{shape}:{size}", 1 if kind == "poi" else 3)[:, 0],
-        colors=_colors(entities.at_times(entity, f"{shape}:colors")))]
+        colors=entities.colors_at(entity, shape))]
 
 
 def _robot(entities: _Entities, below: str, name: str) -> ShownRobot:
     here = f"{below}world/robots/{name}"
-    places = entities.at_times(here, "Transform3D:translation")
-    turned = entities.at_times(f"{here}/hull", "Transform3D:quaternion")
-    turns = np.array(turned.values, dtype=np.float64).reshape(-1, 4)
-    pose = np.column_stack([np.array(places.values, dtype=np.float64).reshape(-1, 3)[:, :2],
-                            2 * np.arctan2(turns[:, 2], turns[:, 3])])
+    places = entities.arrays_at(here, "Transform3D:translation", 3)
+    turns = np.concatenate(entities.arrays_at(f"{here}/hull", "Transform3D:quaternion", 4).values)
+    pose = np.column_stack([np.concatenate(places.values)[:, :2], 2 * np.arctan2(turns[:, 2], turns[:, 3])])
     bodies = [f"{here}/hull/body{of}" for of in ("", "/cylinder", "/box", "/sphere")]
-    painted = [_colors(entities.at_times(body, f"{shape}:colors")) for body in bodies
+    painted = [entities.colors_at(body, shape) for body in bodies
                for shape in ("Cylinders3D", "Boxes3D", "Ellipsoids3D")]
     hull = next(colors for colors in painted if len(colors.time_s))
-    trail = entities.at_times(f"{below}world/driven/{name}", "LineStrips3D:strips")
-    lost, what = (entities.at_times(f"{below}world/lost/{name}{of}", component)
-                  for of, component in (("", "LineStrips3D:strips"), ("/what", "Points3D:labels")))
-    forgone = entities.at_times(f"{below}world/forgone/{name}", "LineStrips3D:strips")
-    fuel = _scalars(entities, f"{below}fuel/{name}")
-    color = (entities.constants[f"{below}collected/{name}", "SeriesLines:colors"])[0]
+    trail, forgone = (entities.strips_at(f"{below}world/{what}/{name}") for what in ("driven", "forgone"))
+    lost = entities.words_at(f"{below}world/lost/{name}/what", "Points3D:labels")
+    states = entities.words_at(f"{below}states/{name}", "StateChange:state")
+    fuel = entities.numbers_at(f"{below}fuel/{name}")
     return ShownRobot(
-        name=name, color=_rgb(color), time_s=places.time_s, pose=pose, colors=hull,
+        name=name, color=entities.color(f"{below}collected/{name}", "SeriesLines:colors"), time_s=places.time_s,
+        pose=pose, colors=hull,
         footprint=[solid for body in bodies for solid in _footprint(entities, body)],
-        planned=_flat(entities.constants.get((f"{below}world/planned/{name}", "LineStrips3D:strips")) or []),
-        driven=(trail.time_s, _flat([strip for strips in trail.values for strip in strips])),
-        state=entities.at_times(f"{below}states/{name}", "StateChange:state"),
+        planned=entities.strips(f"{below}world/planned/{name}"), driven=(trail.time_s, _joined(trail)),
+        state=Steps(time_s=states.time_s, values=[words[0] for words in states.values]),
         fuel=(fuel.time_s, np.array(fuel.values)) if len(fuel.time_s) else None,
-        collected=_scalars(entities, f"{below}collected/{name}"),
-        lost=(float(lost.time_s[0]), str(what.values[0][0])) if len(lost.time_s) else None,
+        collected=entities.numbers_at(f"{below}collected/{name}"),
+        lost=(float(lost.time_s[0]), lost.values[0][0]) if len(lost.time_s) else None,
         forgone_s=float(forgone.time_s[0]) if len(forgone.time_s) else math.inf,
-        forgone=_flat([strip for strips in forgone.values for strip in strips]))
+        forgone=_joined(forgone))
+
+
+def _joined(strips: Steps[FloatArray]) -> FloatArray:
+    """All lines of all times, shape (n, 2, 2)."""
+    return np.concatenate([*strips.values, np.zeros((0, 2, 2))])
 
 
 def _footprint(entities: _Entities, body: str) -> Iterator[tuple[tuple[float, float, float, float, float], bool]]:
@@ -242,21 +302,3 @@ def _footprint(entities: _Entities, body: str) -> Iterator[tuple[tuple[float, fl
     for (x, y, _), (half, _, _) in zip(entities.array(body, "Ellipsoids3D:centers", 3).tolist(),
                                        entities.array(body, "Ellipsoids3D:half_sizes", 3).tolist(), strict=True):
         yield (x, y, half, half, 0.0), True
-
-
-def _scalars(entities: _Entities, entity: str) -> Steps:
-    steps = entities.at_times(entity, "Scalars:scalars")
-    return Steps(time_s=steps.time_s, values=[float(value[0]) for value in steps.values])
-
-
-def _colors(steps: Steps) -> Steps:
-    return Steps(time_s=steps.time_s, values=[[_rgb(color) for color in row] for row in steps.values])
-
-
-def _rgb(packed: int) -> Color:
-    return packed >> 24 & 255, packed >> 16 & 255, packed >> 8 & 255
-
-
-def _flat(strips: Iterable[Any]) -> FloatArray:
-    """The first two points of strips, on the floor: shape (n, 2, 2)."""
-    return np.array([[point[:2] for point in strip[:2]] for strip in strips], dtype=np.float64).reshape(-1, 2, 2)

@@ -146,9 +146,10 @@ def _application(title: str) -> str:
 
 def _write_compared(pen: Pen, stories: Mapping[str, Story]) -> None:
     """What both plans collect, in one chart, and what both are, in one text."""
+    end_s = max(float(story.total.time_s[-1]) for story in stories.values())
     for number, (below, story) in enumerate(stories.items()):
         name = str(story.properties["planner"])
-        write_total(pen, f"compared/{below.removesuffix('/')}", story, name, plan_color(name, number))
+        write_total(pen, f"compared/{below.removesuffix('/')}", story, name, plan_color(name, number), end_s)
     pen.constant("about", rr.TextDocument("\n\n---\n\n".join(story.text for story in stories.values()),
                                           media_type="text/markdown"))
 

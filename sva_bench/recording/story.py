@@ -14,7 +14,7 @@ from sva_bench.choices import SiteKind
 from sva_bench.execution.outcome import Trace
 from sva_bench.execution.team_trace import NewsHeard
 from sva_bench.geometry.obstacles import Obstacles
-from sva_bench.recording.about import About, results_table
+from sva_bench.recording.about import About, legend, results_table
 from sva_bench.recording.colors import ROBOT_COLORS, SITE_COLORS, Color, pale
 from sva_bench.recording.hulls import solids_of
 from sva_bench.recording.log import LogEntry, events_of, log_of
@@ -29,6 +29,7 @@ from sva_bench.recording.meetings import (
     waiting_of,
 )
 from sva_bench.recording.reactions import LOST, Change, Forgone, Lane, Lost, changes_of, forgone_of, lanes_of, lost_of
+from sva_bench.recording.standing import raised_by, ranks_of, standing
 from sva_bench.recording.states import StateLane, speed_of, state_lanes_of
 from sva_bench.robot.body import Solid
 from sva_bench.robot.model import RobotModel
@@ -43,6 +44,8 @@ _SLANT_RAD = math.radians(62)  # of the line of sight, from the horizontal
 _ASPECT = 1.55  # width to height of the 3D view in the layout
 _MARGIN = 0.07  # of the view, left free at its edges
 _SMALLEST = 0.45  # radius of a POI that is worth little, in those of the one that is worth most
+_LEAST_S = 10.0  # lines go on so long at least: of a mission that ends as it begins, too, something is seen
+_NAME_SHARE = 0.055  # height of a name, in that of the view
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -102,6 +105,8 @@ class RobotView:
         fuel: Fuel left [s of driving]; ``None`` = it has no limit.
         collected: Incentive collected, a step at each POI.
         speed: Speed over ground [m/s].
+        rank: How many robots that begin where it does come before it.
+        raised: How far its name is raised above where it usually is [m], so that it is seen above theirs.
         believed: x, y where it believes to be at each pose [m], shape (n, 2); none if it knows where it is.
     """
 
@@ -118,6 +123,8 @@ class RobotView:
     fuel: Series | None
     collected: Series
     speed: Series
+    rank: int
+    raised: Series
     believed: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
@@ -216,23 +223,30 @@ def story_of(
     colors = {name: ROBOT_COLORS[k % len(ROBOT_COLORS)] for name, k in known.items()}
     duration_s = max([*(heard.time_s for heard in news), *(max(float(trace.time_s[-1]), trace.outcome.end_time_s)
                                                            for trace in traces)])
-    views = tuple(
-        _robot_view(trace, world.robots[known[trace.orders.robot]].model, colors[trace.orders.robot], duration_s)
-        for trace in traces)
-    gains = [_gains(trace) for trace in traces]
+    shown_s = max(duration_s, _LEAST_S)
+    models = [world.robots[known[trace.orders.robot]].model for trace in traces]
     eye, target = _eye(world.obstacles.bounds_m)
+    step_m = _NAME_SHARE * 2 * math.tan(_VIEW_RAD / 2) * math.dist(eye, target)
+    views = _robot_views(traces, models, colors, shown_s, step_m)
+    gains = [_gains(trace) for trace in traces]
     lost = tuple(lost_of(trace, view.radius_m) for trace, view in zip(traces, views, strict=True)
                  if view.disabled_s is not None)
+    forgone, touched = forgone_of(world.pois, traces, colors, routes), touched_of(traces)
+    changes = changes_of(news, colors)
+    told = results_table(traces) if about is None else about.text(world.name, traces)
+    marks = legend(changed=bool(changes), believed=any(len(view.believed) for view in views), lost=bool(lost),
+                   forgone=bool(forgone), touched=bool(touched))
     return Story(
         title=title, world=world.name, duration_s=duration_s, solids=world.obstacles.walled(_WALL_M),
         marks=_marks(world, traces, colors, news), views=views, lost=lost,
-        forgone=forgone_of(world.pois, traces, colors, routes), changes=changes_of(news, colors),
-        lanes=lanes_of(traces, news, colors), touched=touched_of(traces), waiting=waiting_of(traces),
+        forgone=forgone, changes=changes,
+        lanes=lanes_of(traces, news, colors), touched=touched, waiting=waiting_of(traces),
         gates=gates_of(world.passages, traces), floors=floors_of(world.obstacles.floors),
-        total=_staircase(np.concatenate(gains), duration_s),
+        total=_staircase(np.concatenate(gains), shown_s),
         log=log_of(traces, colors, news), states=state_lanes_of(traces),
         properties={} if about is None else about.properties(world.name, traces),
-        text=results_table(traces) if about is None else about.text(world.name, traces), eye_m=eye, target_m=target)
+        text=f"{told}\n\n{marks}",
+        eye_m=eye, target_m=target)
 
 
 def dashes(path: FloatArray, dash_m: float, gap_m: float) -> FloatArray:
@@ -319,7 +333,18 @@ def _size(worth: float, most: float) -> float:
     return max(math.sqrt(worth / most), _SMALLEST) if most > 0 else 1.0
 
 
-def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float) -> RobotView:
+def _robot_views(traces: Sequence[Trace], models: Sequence[RobotModel], colors: Mapping[str, Color], duration_s: float,
+                 step_m: float) -> tuple[RobotView, ...]:
+    """The robots; names of those that stand together are in rows, which are a step [m] high."""
+    begins, lost = [trace.pose[0, :2] for trace in traces], [trace.outcome.end in LOST for trace in traces]
+    ranks = ranks_of(begins, lost, min(model.radius_m for model in models))
+    return tuple(_robot_view(trace, model, colors[trace.orders.robot], duration_s, rank, raised)
+                 for trace, model, rank, raised in zip(traces, models, ranks, raised_by(begins, lost, step_m),
+                                                       strict=True))
+
+
+def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float, rank: int, raised_m: float
+                ) -> RobotView:
     outcome, time, pose = trace.outcome, trace.time_s, trace.pose
     # The first pose at or after each step, and the last pose: the trail is as long as the drive.
     marks = np.searchsorted(time, np.arange(time[0], time[-1], _TRAIL_STEP_S))
@@ -329,15 +354,17 @@ def _robot_view(trace: Trace, model: RobotModel, color: Color, duration_s: float
     fuel = None
     if math.isfinite(trace.orders.fuel_capacity_s):
         when, left = time, trace.fuel_s
-        if when[-1] < duration_s:
+        if when[-1] < duration_s and outcome.end not in LOST:  # what a lost robot has left is nobody's
             when, left = np.append(when, duration_s), np.append(left, left[-1])
         kept = corners(when, left)
         fuel = Series(time_s=when[kept], value=left[kept])
+    since_s, stands = standing(time, pose, 2 * model.radius_m)
     return RobotView(
         name=trace.orders.robot, radius_m=model.radius_m, solids=solids_of(model), color=color, time_s=time, pose=pose,
         disabled_s=outcome.end_time_s if outcome.end in LOST else None,
         planned=dashes(trace.planned, _DASH_M, _GAP_M), trail_s=time[at[1:]][moved], trail=pieces, fuel=fuel,
-        collected=_staircase(_gains(trace), duration_s), speed=_speed(trace, duration_s), believed=trace.believed)
+        collected=_staircase(_gains(trace), duration_s), speed=_speed(trace, duration_s), rank=rank,
+        raised=Series(time_s=since_s, value=stands * raised_m), believed=trace.believed)
 
 
 def _speed(trace: Trace, duration_s: float) -> Series:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from PIL import Image
 
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError
+from sva_bench.palette import ALARM, BLACK, GREEN, YELLOW
 from sva_bench.recording.frames import Frames, moments
 from sva_bench.recording.read_back import Shown, read_recording
 
@@ -74,11 +76,24 @@ def _drawn(shown: Shown, progress: Callable[[int, int], None]) -> Iterator[Image
         progress(number + 1, count)
 
 
+def _with_swatches(frame: Image.Image, shown: Shown) -> Image.Image:
+    """A frame beside patches of the colours that mean something: of a small cross alone the palette would have none."""
+    meant = list(dict.fromkeys([ALARM, YELLOW, GREEN, BLACK, *(
+        robot.color for plan in shown.plans for robot in plan.robots)]))
+    side = math.isqrt(frame.width * frame.height // 50)
+    larger = Image.new("RGB", (frame.width + side, max(frame.height, side * len(meant))), (255, 255, 255))
+    larger.paste(frame, (0, 0))
+    for number, color in enumerate(meant):
+        larger.paste(color, (frame.width, number * side, frame.width + side, (number + 1) * side))
+    return larger
+
+
 def _as_gif(shown: Shown, progress: Callable[[int, int], None]) -> bytes:
     # One palette for all frames: what stands still is the same in each, and only what moves is written again. It is
     # made from the last frame, which has all colours. Optimised, so that of a frame only what changed is kept.
     drawn = list(_drawn(shown, progress))
-    palette = drawn[-1].quantize(_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    palette = _with_swatches(drawn[-1], shown).quantize(
+        _COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in drawn]
     stream = io.BytesIO()
     lasts = [round(1000 / _RATE)] * (len(frames) - 1) + [round(1000 * _HELD_S)]

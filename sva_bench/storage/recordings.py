@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sva_bench.analysis.results import ScenarioPlans
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary
 from sva_bench.errors import BadInput, nearest
+from sva_bench.files.read_back import read_ours
+from sva_bench.storage.manifest import MANIFEST, Manifest, RecordingNote
 from sva_bench.storage.run_folder import pair_stem, recording_stem
 from sva_bench.storage.stored_run import read_summary
+from sva_bench.storage.trial_choice import TrialChoice
+
+# ``S3-stochastic+resolve-report-trial17``; of plans from elsewhere, whose names may hold anything, before them.
+_WHICH = re.compile(r"(?:[+@]|[+@][a-z]+-[a-z]+-)(median|worst|trial[0-9]+)(?:$|\+)")
 
 
-def recordings_for(folder: Path, scenario: str | None, planner: str | None) -> tuple[Path, ...]:
-    """The recordings of a run that are of a scenario, and of a planner's plan: replayed trials and reactions too.
+def recordings_for(folder: Path, scenario: str | None, planner: str | None, choice: TrialChoice | None = None
+                   ) -> tuple[Path, ...]:
+    """The recordings of a run that are of a scenario, a planner's plan, and a trial: replayed trials and reactions too.
 
     The most telling come first: of the scenario in which plans differ most, and in it two plans side by side before the
     plans, the first plan before the others, and what was recorded by the run before what was replayed.
@@ -21,6 +29,7 @@ def recordings_for(folder: Path, scenario: str | None, planner: str | None) -> t
     Args:
         folder: The run folder.
         scenario, planner: What is wanted; ``None`` = any. Two plans side by side are no planner's.
+        choice: Of which trial; ``None`` = of any. One that was not recorded has none.
 
     Raises:
         BadInput: If this is no run folder, or the run has no such scenario, plan or recording.
@@ -38,21 +47,32 @@ def recordings_for(folder: Path, scenario: str | None, planner: str | None) -> t
     stems = {recording_stem((s, p, "none", "never"), foreign=foreign): (s, p) for s in names for p in planners}
     pairs = {pair_stem(name, foreign=foreign): name for name in names}
     order = _telling(summary)
+    notes: Mapping[str, RecordingNote] = {}
+    if choice is not None:
+        _, manifest = read_ours(folder / "manifest.json", Manifest, MANIFEST)
+        notes = {note.file: note for note in manifest.recordings}
     found: list[tuple[tuple[int, int, bool, str], Path]] = []
     for path in (folder / "recordings").glob("*.rrd"):
         if path.stem in pairs:
             key: tuple[str, str | None] | None = pairs[path.stem], None
         else:
             key = _key_of(path.stem, stems, foreign=foreign)
-        if key is not None and scenario in (None, key[0]) and (planner is None or planner == key[1]):
+        if key is None or (choice is not None and not _is_of(path, choice, notes)):
+            continue
+        if scenario in (None, key[0]) and (planner is None or planner == key[1]):
             rank = -1 if key[1] is None else planners.index(key[1])
             found.append(((order.index(key[0]), rank, path.stem not in stems, path.stem), path))
-    if not found:
+    if not found and choice is None:
         raise BadInput(f"{folder}: no recording is of "
                        + " and ".join(f"{option} {wanted}" for option, wanted in (
                            ("--scenario", scenario), ("--planner", planner)) if wanted is not None)
                        + "; 'sva-bench replay' records any trial")
     return tuple(path for _, path in sorted(found))
+
+
+def most_telling(folder: Path) -> str:
+    """The scenario of a run in which plans differ most."""
+    return _telling(read_summary(folder))[0]
 
 
 def _telling(summary: AnySummary) -> list[str]:
@@ -63,6 +83,16 @@ def _telling(summary: AnySummary) -> list[str]:
         means = [plan.executed.mean for plan in told.plans.values()]
         spread[told.name] = max(means) - min(means)
     return sorted(spread, key=lambda name: -spread[name])
+
+
+def _is_of(path: Path, choice: TrialChoice, notes: Mapping[str, RecordingNote]) -> bool:
+    """Whether a recording is of a trial, by what the manifest says, or by its name where it was replayed."""
+    note = notes.get(path.name)
+    if note is not None:
+        return note.trial == choice.trial if choice.kind == "trial" else note.chosen == choice.kind
+    which = _WHICH.search(path.stem)
+    return choice.in_names is not None and which is not None and which[1] in (
+        f"trial{choice.in_names}", str(choice.in_names))
 
 
 def _key_of(stem: str, stems: dict[str, tuple[str, str]], *, foreign: bool) -> tuple[str, str] | None:

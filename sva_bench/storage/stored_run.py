@@ -21,6 +21,7 @@ from sva_bench.analysis.reaction_table import reaction_columns, reaction_rows
 from sva_bench.analysis.results import SUMMARY, SUMMARY_OF_REACTIONS
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, summary_form
+from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.choices import ENDS, NEWS, POLICY_NAMES
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.atomic import draft_file
@@ -318,6 +319,19 @@ def last_trial(path: Path, key: Key) -> int:
         BadFile: If they can't be read.
     """
     return max((pc.max(piece.column("trial")).as_py() for piece in _rows_of(path, key) if piece.num_rows), default=-1)
+
+
+def values_of_trials(path: Path, key: Key) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Numbers of all trials of one plan and reaction, ascending; the value of each, all robots together; its weight.
+
+    Raises:
+        BadFile: If they can't be read.
+    """
+    pieces = [piece.select(["trial", "value", "weight"]) for piece in _rows_of(path, key)]
+    # One thread: sums in another order could differ in their last bit, and trials of equal value with them.
+    rows = pa.concat_tables(pieces).group_by("trial", use_threads=False).aggregate(
+        [("value", "sum"), ("weight", "min")]).sort_by("trial")
+    return (rows["trial"].to_numpy().astype(np.int64), rows["value_sum"].to_numpy(), rows["weight_min"].to_numpy())
 
 
 def _rows_of(path: Path, key: Key) -> Iterator[pa.Table]:

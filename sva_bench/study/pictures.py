@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from sva_bench.files.printable import printable
 from sva_bench.mission.plan import Plan
 from sva_bench.report.drawing import draw_world
 from sva_bench.report.overlays import Kind, Leg, Overlays
@@ -20,6 +22,7 @@ from sva_bench.travel.roadmap import roadmap_edges
 from sva_bench.workers.progress import OnProgress
 from sva_bench.world.model import World
 
+_MOST_LETTERS = 40  # of a file's name
 
 def picture_of(
     world: World, kind: Kind, *, roadmap: bool, paths: bool, progress: OnProgress,
@@ -59,9 +62,17 @@ def picture_of(
     if plan is not None and plan_file is not None:
         check_plans(world, costs, {"plan": plan}, {"plan": plan_file}, allow_infeasible=True)
         routes = routes_of(world, costs, plan)
+        world = replace(world, name=_title(world, plan, plan_file))  # which is what stands above the picture
     return draw_world(world, kind, Overlays(
         roadmap=edges, roadmap_of=kind_of_widest if several else "", paths=tuple(drawn),
         paths_of=listed(list(costs)) if several else "", routes=routes, stands=stands))
+
+
+def _title(world: World, plan: Plan, file: Path) -> str:
+    """What a picture of a plan is called: a plan that doesn't say what it maximises goes by its file."""
+    stem = printable(file.stem)[:_MOST_LETTERS].replace("$", r"\$")  # it would begin a formula
+    promised = "" if plan.value is None else f", promised {round(plan.value, 2) + 0.0:g}"
+    return f"{world.name}: {f'plan {stem}' if plan.objective is None else f'{plan.objective} plan'}{promised}"
 
 
 def routes_of(world: World, costs: Mapping[str, FuelCosts], plan: Plan) -> dict[str, list[Leg]]:

@@ -134,7 +134,7 @@ def plan_scenarios(
     planned: dict[str, Planned] = {}
     for number, scenario in enumerate(world.scenarios):
         progress("solving", number, len(world.scenarios))
-        others = _other_processes(world, options)
+        others = other_processes(world, assumptions=options.assumptions)
         instance = replace(instance_of(world, costs, scenario, others), failure=MODEL)
         if known is None or nominal is None:
             known = knowledge_of(instance)
@@ -164,9 +164,9 @@ def plan_scenarios(
     return planned
 
 
-def _other_processes(world: World, options: Options) -> list[FailureProcess]:
+def other_processes(world: World, *, assumptions: bool) -> list[FailureProcess]:
     """Failure processes beside the model's that plans are made for, the one that is executed first."""
-    asked = [world.execute_failure, world.plan_failure, *(PROCESSES if options.assumptions else ())]
+    asked = [world.execute_failure, world.plan_failure, *(PROCESSES if assumptions else ())]
     others = [name for name in dict.fromkeys(asked) if name != MODEL]
     apart = [name for name in others if not _defined(world, name)]
     if apart:

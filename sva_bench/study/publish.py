@@ -50,10 +50,17 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
-    """A finished run: its folder and summary."""
+    """A finished run.
+
+    Attributes:
+        folder: Its folder.
+        summary: Its summary.
+        unused: Robots that every plan leaves at home.
+    """
 
     folder: Path
     summary: AnySummary
+    unused: tuple[str, ...] = ()
 
 
 def publish(
@@ -114,7 +121,11 @@ def publish(
         write_report(folder / "report.html", Content(
             summary=summary, routes=routes, stems=stems, reaction_stems=told, legs=legs, world=world,
             manifest=manifest, contacts=contacts, waits=waits, paths=paths, counts=counting.result()))
-    return Run(folder=out / name, summary=summary)
+    # Of perfect-information plans there is one for each set of robots: what is not in the first may be in another.
+    informed = any(run.case.role == "informed" for run in executed)
+    unused = [] if informed else [robot.name for robot in world.robots if not any(
+        set(sites.get(robot.name, ())) - {world.sites[0].name} for sites in routes.values())]
+    return Run(folder=out / name, summary=summary, unused=tuple(unused))
 
 
 def report_again(folder: Path) -> Path:

@@ -61,7 +61,8 @@ def write_recordings(
                  for side in (one, other)]
         name = one.case.scenario.name
         write(pair_stem(name, foreign=foreign), one.case, [side.about.planner for side in sides], sides[0].about,
-              partial(record_pair, world=world, sides=sides, title=f"{world.name}, {name}, compared"))
+              partial(record_pair, world=world, sides=sides,
+                      title=f"{world.name}, {name}, trial {one.trial}, compared"))
     for case, team in teams:
         told[case.key] = stem = recording_stem(case.key, foreign=foreign)
         write(stem, case, [case.planner], team_about(case, team, settings),

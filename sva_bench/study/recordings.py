@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.choices import RECORDED_WORDS, RecordedKind
 from sva_bench.errors import BadInput, nearest
 from sva_bench.execution.case import Case, Settings
@@ -17,6 +16,7 @@ from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
 from sva_bench.execution.outcome import Trace
 from sva_bench.files.complaints import shown
+from sva_bench.storage.trial_choice import nearest_to_median
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World
 
@@ -109,16 +109,9 @@ def typical_trial(runs: Sequence[Executed]) -> int:
     most = np.flatnonzero(counts[course] == counts.max())
     alike = np.flatnonzero(course == course[most[0]])
     value = np.sum([run.value.sum(axis=1) for run in runs], axis=0)[alike]
-    near = alike[_nearest_to_median(value)]
+    near = alike[nearest_to_median(value)]
     first_draw = near[runs[0].rollout[near] == 0]
     return int((first_draw if len(first_draw) else near)[0])
-
-
-def _nearest_to_median(value: FloatArray) -> IntArray:
-    """Where a value is nearest to the median, of an even number to the lower of both; ascending."""
-    middle = np.sort(value)[(len(value) - 1) // 2]
-    away = np.abs(value - middle)
-    return np.flatnonzero(away <= away.min() + 1e-9 * max(abs(float(middle)), 1.0))
 
 
 def _chosen(run: Executed, ask: Ask, typical: int) -> int:
@@ -127,7 +120,7 @@ def _chosen(run: Executed, ask: Ask, typical: int) -> int:
         case "worst":
             return int(value.argmin())
         case "median":
-            return int(_nearest_to_median(value)[0])
+            return int(nearest_to_median(value)[0])
         case "trial" if ask.trial is not None:
             return ask.trial
         case _:

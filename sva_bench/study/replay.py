@@ -10,7 +10,7 @@ from typing import Any
 
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import ComparisonSummary
-from sva_bench.choices import News, PolicyName
+from sva_bench.choices import News, PolicyName, RecordedKind
 from sva_bench.errors import BadInput, nearest
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.execute import execute
@@ -25,7 +25,8 @@ from sva_bench.mission.plan_file import read_plan
 from sva_bench.solver.rest import plan_rest
 from sva_bench.storage.outcome_table import outcome_table
 from sva_bench.storage.run_folder import made_for, recording_stem, stem_of
-from sva_bench.storage.stored_run import Content, find_row, last_trial, read_content, run_folder_at
+from sva_bench.storage.stored_run import Content, find_row, read_content, run_folder_at
+from sva_bench.storage.trial_choice import TrialChoice, trial_of
 from sva_bench.study.costs import instance_of, plan_costs
 from sva_bench.study.given_plans import without_times
 from sva_bench.study.recording_files import about_of, record_team, record_trial
@@ -40,16 +41,33 @@ class Wanted:
 
     Attributes:
         scenario: The scenario; ``None`` = the only one.
-        trial: Number of the trial, or of the history.
+        trial: Number of the trial, or of the history; of no matter where ``kind`` says otherwise.
         planner: Whose plan; ``None`` = everybody's.
         policy, news: The reaction; ``None`` = the only one of the run that fits.
+        kind: How the trial is chosen: each plan has a worst one of its own.
     """
 
     scenario: str | None
-    trial: int
+    trial: int = 0
     planner: str | None = None
     policy: PolicyName = "none"
     news: News | None = None
+    kind: RecordedKind = "trial"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found:
+    """A trial of a run that can be played again.
+
+    Attributes:
+        case: Plan, scenario, policy and news.
+        trial: Number of the trial, or of the history.
+        history: Noise draw and history, where these are enumerated.
+    """
+
+    case: Case
+    trial: int
+    history: tuple[int, int] | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -133,27 +151,28 @@ def replay(folder: Path, wanted: Wanted, executor: Executor | None, progress: On
     costs = plan_costs(content.world, content.manifest.options["planner"], progress)
     foreign = isinstance(content.summary, ComparisonSummary)
     found = []
-    for case, history in cases:
-        path = folder / "recordings" / f"{recording_stem(case.key, wanted.trial, foreign=foreign)}.rrd"
+    for one in cases:
+        which = TrialChoice(kind=wanted.kind, trial=one.trial).in_names
+        path = folder / "recordings" / f"{recording_stem(one.case.key, which, foreign=foreign)}.rrd"
         path.parent.mkdir(exist_ok=True)
-        found.append(play_again(content, costs, case, wanted.trial, history, path, executor))
+        found.append(play_again(content, costs, one, path, executor, wanted.kind))
     return found
 
 
 def play_again(
-    content: Content, costs: Mapping[str, FuelCosts], case: Case, trial: int, history: tuple[int, int] | None,
-    path: Path | None, executor: Executor | None,
+    content: Content, costs: Mapping[str, FuelCosts], one: Found, path: Path | None, executor: Executor | None,
+    kind: RecordedKind = "trial",
 ) -> Replayed:
     """Play one trial of one case again.
 
     Args:
         content, costs: The run, and the fuel costs of its world.
-        case: Plan, scenario, policy and news.
-        trial: Number of the trial, or of the history.
-        history: Noise draw and history, where these are enumerated.
+        one: The trial.
         path: Where it is recorded; ``None``: nowhere.
         executor: Processes that drive.
+        kind: How it was chosen.
     """
+    case, trial = one.case, one.trial
     world, summary = content.world, content.summary
     settings = Settings(seed=summary.seed, trials=summary.trials, rollouts=summary.rollouts, fidelity=summary.fidelity)
     run: Executed | Reacted
@@ -164,24 +183,24 @@ def play_again(
         (run,) = execute(world, costs, [case], settings, executor)
         traces = run.traces
         if path is not None:
-            one = Recorded(case=case, trial=trial, kind="trial", traces=run.traces)
-            record_trial(path, world, case, run.traces, about_of(one, settings))
+            recorded = Recorded(case=case, trial=trial, kind=kind, traces=run.traces)
+            record_trial(path, world, case, run.traces, about_of(recorded, settings))
     else:
         instance = replace(instance_of(world, costs, case.scenario), failure=world.execute_failure)
         policy = POLICIES[case.policy](Means(instance=instance, plans_rest=plan_rest))
-        run = react_again(world, costs, case, policy, settings, trial, history, executor)
+        run = react_again(world, costs, case, policy, settings, trial, one.history, executor)
         assert run.shown is not None, "a mission that is played again is shown"
         traces, news = run.shown.traces, run.shown.news
         if path is not None:
-            record_team(path, world, case, run.shown, settings, "trial")
+            record_team(path, world, case, run.shown, settings, kind)
         reactions = run.played[0].reactions
     table = outcome_table(run, [robot.name for robot in world.robots], settings)
     return Replayed(case=case, rows=table.to_pylist(), recording=path, reactions=reactions, traces=traces,
                     news=news)
 
 
-def cases_of(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case, tuple[int, int] | None]]:
-    """The plans that are to be played again, with noise draw and history where these are enumerated.
+def cases_of(folder: Path, content: Content, wanted: Wanted) -> list[Found]:
+    """The plans that are to be played again, each in its trial.
 
     Raises:
         BadInput: If the run has no such plan, reaction or trial.
@@ -216,16 +235,16 @@ def cases_of(folder: Path, content: Content, wanted: Wanted) -> list[tuple[Case,
         raise BadInput("--planner informed: it has another plan for each set of robots; replay one of the others")
     cases = []
     for name in plans if wanted.planner is None else [wanted.planner]:
-        row = find_row(folder / "outcomes.parquet", (scenario.name, name, wanted.policy, news), wanted.trial)
-        if row is None:
-            last = last_trial(folder / "outcomes.parquet", (scenario.name, name, wanted.policy, news))
-            raise BadInput(f"--trial {wanted.trial}: {scenario.name}, {name} has no such trial; the first is 0, the "
-                           f"last {last}")
+        key = scenario.name, name, wanted.policy, news
+        choice = TrialChoice(kind=wanted.kind, trial=wanted.trial)
+        trial = trial_of(folder, choice, key, content.manifest.recordings)
+        row = find_row(folder / "outcomes.parquet", key, trial)
+        assert row is not None, "a trial that was found has rows"
         kept = name if (scenario.name, name) in content.stems else made_for(name, news)
         foreign = isinstance(content.summary, ComparisonSummary)
         plan = read_plan(folder / "plans" / f"{stem_of(scenario.name, kept, foreign=foreign)}.json", instance)
-        cases.append((Case(scenario=scenario, planner=name, plan=plan, policy=wanted.policy, news=news),
-                      row if row[1] >= 0 else None))
+        case = Case(scenario=scenario, planner=name, plan=plan, policy=wanted.policy, news=news)
+        cases.append(Found(case=case, trial=trial, history=row if row[1] >= 0 else None))
     return cases
 
 

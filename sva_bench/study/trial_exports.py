@@ -32,13 +32,13 @@ def export_trial(folder: Path, wanted: Wanted, to: TrialFormat, executor: Execut
     content = read_content(run_folder_at(folder))
     cases = cases_of(folder, content, wanted)
     if len(cases) > 1:
-        if isinstance(content.summary, ComparisonSummary) or "stochastic" not in [c.planner for c, _ in cases]:
+        if isinstance(content.summary, ComparisonSummary) or "stochastic" not in [one.case.planner for one in cases]:
             raise BadInput("--planner: a bag is of one plan, and the run has "
-                           + ", ".join(case.planner for case, _ in cases))
-        cases = [(case, history) for case, history in cases if case.planner == "stochastic"]
-    ((case, history),) = cases
+                           + ", ".join(one.case.planner for one in cases))
+        cases = [one for one in cases if one.case.planner == "stochastic"]
+    (one,) = cases
     costs = plan_costs(content.world, content.manifest.options["planner"], progress)
-    return TRIAL_EXPORTS[to](content, play_again(content, costs, case, wanted.trial, history, None, executor))
+    return TRIAL_EXPORTS[to](content, play_again(content, costs, one, None, executor))
 
 
 def as_mcap(content: Content, played: Replayed) -> bytes:

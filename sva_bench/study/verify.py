@@ -26,6 +26,7 @@ from sva_bench.storage.run_folder import travel_table
 from sva_bench.storage.stored_run import Content, last_trial, read_content, rows_of_trial, run_folder_at
 from sva_bench.storage.tables import TRAVEL_TIMES, pieces_of
 from sva_bench.study.costs import instance_of, plan_costs
+from sva_bench.study.planning import other_processes
 from sva_bench.study.replay import Wanted, cases_of, play_again
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.workers.progress import OnProgress
@@ -104,11 +105,12 @@ def _travel(folder: Path, costs: Mapping[str, FuelCosts]) -> str:
 
 
 def _instances(folder: Path, content: Content, costs: Mapping[str, FuelCosts]) -> str:
+    others = other_processes(content.world, assumptions=bool(content.manifest.options.get("assumptions")))
     for scenario in content.world.scenarios:
         path = folder / f"instance-{scenario.name}.json"
         if not path.is_file():
             raise _Differs(f"{path.name} is missing")
-        expected = instance_text(instance_of(content.world, costs, scenario)).encode()
+        expected = instance_text(instance_of(content.world, costs, scenario, others)).encode()
         if path.stat().st_size != len(expected) or path.read_bytes() != expected:
             raise _Differs(f"{path.name}: not the instance that the world gives")
     return counted(len(content.world.scenarios), "instance")
@@ -200,8 +202,8 @@ def _trials(folder: Path, content: Content, costs: Mapping[str, FuelCosts], samp
         progress("playing trials again", number, len(executed))
         key = first.scenario or "", first.planner or "", first.policy, first.news or "never"
         for trial in _spread(last_trial(outcomes, key) + 1, sample):
-            for case, history in cases_of(folder, content, replace(first, trial=trial)):
-                again = play_again(content, costs, case, trial, history, None, executor)
+            for one in cases_of(folder, content, replace(first, trial=trial)):
+                again = play_again(content, costs, one, None, executor)
                 for there, here in zip(rows_of_trial(outcomes, key, trial), again.rows, strict=True):
                     _check_row(key, trial, there, here)
                 played += 1

@@ -16,13 +16,15 @@ _MOST_DELAY_S = 0.15
 _MOST_SLOPE = 0.2  # its gradient has this standard deviation; at five of them, 1, two places would look like one
 _Share = Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)]
 _Coordinate = Annotated[float, Field(strict=True, ge=-1e5, le=1e5, allow_inf_nan=False)]
-_Point = Annotated[list[_Coordinate], Field(min_length=2, max_length=2)]
+_Point = Annotated[list[_Coordinate], Field(min_length=2, max_length=2, description="a point [x, y]")]
+LENGTHS = "two lengths [along x, along y]"
 _Size = Annotated[float, Field(strict=True, ge=1e-6, le=1e5, allow_inf_nan=False)]
 
 
 def _range(low: float, high: float) -> Any:
     limits = Field(strict=True, ge=low, le=high, allow_inf_nan=False)
-    return Annotated[list[Annotated[float, limits]], Field(min_length=2, max_length=2)]
+    return Annotated[list[Annotated[float, limits]], Field(
+        min_length=2, max_length=2, description="two numbers [least, most]")]
 
 
 class LocalisationEntry(Section):
@@ -122,7 +124,8 @@ NoiseSection = Annotated[NoiseEntry, BeforeValidator(
 class PassageEntry(Section):
     """A door or gate that may be shut."""
 
-    at_m: Annotated[list[_Point], Field(min_length=2, max_length=2)]
+    at_m: Annotated[list[_Point], Field(
+        min_length=2, max_length=2, description="two points [[x1, y1], [x2, y2]], the posts of the passage")]
     blocked: Probability
     wait_s: Bounded
 
@@ -143,7 +146,7 @@ class FloorEntry(Section):
     """A patch of floor that grips less, or more."""
 
     box: _Point
-    size_m: Annotated[list[_Size], Field(min_length=2, max_length=2)]
+    size_m: Annotated[list[_Size], Field(min_length=2, max_length=2, description=LENGTHS)]
     yaw_deg: Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)] = 0.0
     friction: Annotated[float, Field(strict=True, ge=0.01, le=5, allow_inf_nan=False)]
 

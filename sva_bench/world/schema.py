@@ -22,7 +22,7 @@ from sva_bench.files.fields import (
 from sva_bench.seeds import MOST_SEED
 from sva_bench.world.maps.formats import FORMATS
 from sva_bench.world.maps.section import MapSection
-from sva_bench.world.noise_schema import FloorEntry, NoiseEntry, NoiseSection, PassageEntry
+from sva_bench.world.noise_schema import LENGTHS, FloorEntry, NoiseEntry, NoiseSection, PassageEntry
 from sva_bench.world.places import APART_M
 from sva_bench.world.robot_schema import ModelEntry
 
@@ -31,12 +31,12 @@ Coordinate = Annotated[Number, Field(ge=-1e5, le=1e5)]
 Size = Annotated[Positive, Field(ge=1e-6, le=1e5)]  # smaller sizes are lost in physics
 Angle = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Seed = Annotated[NonNegativeInt, Field(le=MOST_SEED)]
-Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2, description="a point [x, y]")]
 
 
 class Box(Section):
     box: Point
-    size_m: Annotated[list[Size], Field(min_length=2, max_length=2)]
+    size_m: Annotated[list[Size], Field(min_length=2, max_length=2, description=LENGTHS)]
     yaw_deg: Angle = 0.0
 
 
@@ -46,7 +46,8 @@ class Cylinder(Section):
 
 
 class Wall(Section):
-    wall: Annotated[list[Point], Field(min_length=2, max_length=2)]
+    wall: Annotated[list[Point], Field(
+        min_length=2, max_length=2, description="two points [[x1, y1], [x2, y2]] (a wall that bends is several)")]
     thickness_m: Size = 0.1
 
     @field_validator("wall")
@@ -58,7 +59,7 @@ class Wall(Section):
 
 
 class Shapes(Section):
-    bounds_m: Annotated[list[Number], Field(min_length=4, max_length=4)]
+    bounds_m: Annotated[list[Number], Field(min_length=4, max_length=4, description="[x_min, y_min, x_max, y_max]")]
     obstacles: list[Box | Cylinder | Wall] = Field(default_factory=list)
     floors: Annotated[list[FloorEntry], Field(max_length=1000)] = Field(default_factory=list)
 
@@ -171,7 +172,7 @@ class Sites(Section):
 class Drawn(Section):
     """Incentives drawn at random for each POI: uniform, with a share of them zero."""
 
-    uniform: Annotated[list[Bounded], Field(min_length=2, max_length=2)]
+    uniform: Annotated[list[Bounded], Field(min_length=2, max_length=2, description="two numbers [least, most]")]
     zero_share: Probability = 0.0
     seed: Seed
 

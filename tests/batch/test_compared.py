@@ -108,6 +108,39 @@ def test_a_finished_batch_answers_without_running_anything_again(batch: Path) ->
     assert run_command_line(["report", str(batch), "--compare", KEY]) == 0
 
 
+def test_a_sweep_file_compares_like_the_option_which_comes_before_it(batch: Path, tmp_path: Path) -> None:
+    world(tmp_path, "one")
+    (tmp_path / "sweep.yaml").write_text(
+        "format: sva-bench/sweep@1\nworlds: [one.yaml]\ntrials: 60\nunit_trials: 40\nseeds: 0-1\nrollouts: 2\n"
+        f"fidelity: kinematic\nset: {{{KEY}: [10, 60, x2]}}\ncompare: [{KEY}=10]\n", encoding="utf-8")
+    words = ["batch", str(tmp_path / "sweep.yaml"), "--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache"),
+             "--workers", "1"]
+    assert run_command_line(words) == 0
+    assert compared(tmp_path / "out")["reference"] == "10"
+    assert run_command_line([*words, "--compare", KEY, "--resume"]) == 0
+    assert compared(tmp_path / "out") == compared(batch)
+
+
+@pytest.mark.parametrize(("line", "said"), [
+    ("robots.uv2.fuel_capacity", "robots.uv2.fuel_capacity is not varied in this batch; did you mean"),
+    (f"[{KEY}=70]", "take one of 10, 60"),
+    (f"[{KEY}, {KEY}=60]", "asked for twice"),
+    ("7", "expected a list, found 7"),
+    ("[]", "at least 1 entry"),
+])
+def test_what_a_sweep_file_cannot_compare_is_told_with_its_line(
+    line: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    world(tmp_path, "one")
+    (tmp_path / "sweep.yaml").write_text(
+        f"format: sva-bench/sweep@1\nworlds: [one.yaml]\nfidelity: kinematic\nset: {{{KEY}: [10, 60]}}\n"
+        f"compare: {line}\n", encoding="utf-8")
+    assert run_command_line(["batch", str(tmp_path / "sweep.yaml"), "--dry-run"]) == 2
+    told = capsys.readouterr().err
+    assert "sweep.yaml:5: compare" in told
+    assert said in told
+
+
 def test_the_page_shows_the_response_and_the_table(batch: Path) -> None:
     page = (batch / "report.html").read_text()
     assert "Which value is worth more?" in page

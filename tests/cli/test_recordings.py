@@ -62,7 +62,7 @@ def test_a_video_that_cannot_be_is_refused(arguments: tuple[str, ...], told: str
 
 @pytest.mark.parametrize(("arguments", "told"), [
     ((), "say which with --trial"),
-    (("--trial", "-1"), "expected at least 0"),
+    (("--trial", "-1"), "expected a trial's number, from 0 on, or typical, median or worst"),
     (("--trial", "20", "--scenario", "half"), "no such trial; the first is 0, the last 19"),
     (("--trial", "1"), "the run has several"),
     (("--trial", "1", "--scenario", "S9"), "the run has none of that name"),

@@ -10,7 +10,8 @@ import pytest
 from sva_bench.analysis.calibration import Calibration, PlanJudged, Tried
 from sva_bench.analysis.results import Share
 from sva_bench.analysis.summaries import Summary
-from sva_bench.cli.tables import print_summary
+from sva_bench.choices import FailureProcess
+from sva_bench.cli.tables import print_summary, processes_told
 from tests.results_for_tests import summary
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -32,6 +33,17 @@ def test_robots_that_do_not_fit_are_left_out_of_the_table_and_it_is_said(capsys:
     assert " u0 " in said
     assert " u15 " not in said
     assert "of 16 left out of the table for want of room" in said
+
+
+@pytest.mark.parametrize(("planned", "executed", "said"), [
+    ("mission", "mission", "Robots may fail for a whole mission, as plans expect it."),
+    ("mission", "per_leg", "Plans expect that robots may fail for a whole mission; in execution they may fail before "
+                           "each POI."),
+    ("hazard", "hazard", "Robots may fail at any time while driving, as plans expect it."),
+])
+def test_when_robots_fail_is_said_in_words(planned: FailureProcess, executed: FailureProcess, said: str) -> None:
+    found = summary((10.0, 20.0), 900.0)
+    assert processes_told(replace(found, failure=replace(found.failure, plan=planned, execute=executed))) == said
 
 
 def test_how_missions_ended_is_said_plan_by_plan_without_brackets_in_brackets(

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from rich.cells import cell_len
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.cli.sheets import Column, Sheet, fitted
+from sva_bench.cli.sheets import Column, Sheet, fitted, print_sheet
+from sva_bench.cli.terminal import results
 from tests.worlds_for_tests import SMALL
 
 WORLD = "world-of-thirty-letters-in-all"
@@ -50,8 +51,9 @@ def printed(arguments: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch,
             ) -> str:
     monkeypatch.chdir(folder)
     monkeypatch.delenv("COLUMNS", raising=False)
+    run = next((folder / "run").glob("*"), folder)
     capsys.readouterr()
-    assert run_command_line(arguments) == 0
+    assert run_command_line([word.replace("RUN", str(run)) for word in arguments]) == 0
     return capsys.readouterr().out
 
 
@@ -67,6 +69,15 @@ COMMANDS = [
      [WORLD, *SCENARIOS, f"{KEY}=20", f"{KEY}=60", KEY, "stochastic", "deterministic"]),
     (["batch", "status", "batch"], [*SCENARIOS, f"{KEY}=20", f"{KEY}=60"]),
     (["report", "batch", "--compare", f"{KEY}=20"], [*SCENARIOS, KEY]),
+    (["verify", "RUN", "--workers", "1"], ["ok"]),
+    (["expect", "RUN", f"{SCENARIOS[0]}.plans.stochastic.executed.mean >= "
+      f"{SCENARIOS[0]}.plans.deterministic.executed.ci95[0]"],
+     ["ok", f"{SCENARIOS[0]}.plans.stochastic.executed.mean"]),
+    (["replay", "RUN", "--scenario", SCENARIOS[0], "--trial", "worst", "--policy", "resolve", "--news", "report",
+      "--workers", "1"], [SCENARIOS[0], *ROBOTS]),
+    (["certify", "RUN/instance-" + SCENARIOS[0] + ".json", "plan-made-by-hand-1-long-name.json"], ["feasible,"]),
+    (["doctor"], ["planner", "physics"]),
+    (["world", "example", "--list"], ["four-rooms"]),
     (["world", "check", "w.yaml"], [WORLD]),
     (["world", "check", "w.yaml", "--noise", "--draws", "5"], [*SCENARIOS, ROBOTS[0], SITES["p1"], "base"]),
 ]
@@ -139,3 +150,15 @@ def test_any_names_and_figures_fit_and_none_is_lost(
         for word in (first, second, *figure.split()):
             assert word in {each.rstrip(",") for each in shown} | set(shown)
     assert not set(left_out) & {headings[2]} or headings.count(headings[2]) > 1
+
+
+def test_a_figure_rounded_to_nought_from_below_has_no_sign_and_names_keep_theirs(
+    capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [["robot-0.0", "-0.0"], ["a-0", "-0.0 [-0.0, 1.0]"], ["b", "-0"], ["c", "-0.5"],
+            ["d", "-0.05 [-10.0, -0.0]"]]
+    columns = [Column(heading="name", words=True), Column(heading="x")]
+    print_sheet(Sheet(title="", rows=rows, columns=columns), results())
+    shown = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()[2:] if line.strip()]
+    assert shown == [["robot-0.0", "0.0"], ["a-0", "0.0 [0.0, 1.0]"], ["b", "0"], ["c", "-0.5"],
+                     ["d", "-0.05 [-10.0, 0.0]"]]

@@ -92,7 +92,7 @@ def test_a_recording_shows_all_of_it(tmp_path: Path) -> None:
     times, places = rows(path, "world/contacts/uv1", "Points3D:positions")
     assert_array_equal(times, [7, 8, 13])
     assert_allclose(np.array(places)[:, 0, :2], [[4.0, 2.7]] * 3, atol=1e-6)
-    times, labels = rows(path, "world/waits/uv1", "Points3D:labels")
+    times, labels = rows(path, "world/waits/uv1/what", "Points3D:labels")
     assert_array_equal(times, [3, 6])
     assert labels == [["waits 3 s for d1"], []]
     _, believed = rows(path, "world/believed/uv1", "Transform3D:translation")

@@ -9,10 +9,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from rerun.chunk import RrdReader
 
+from sva_bench.recording.about import About
 from sva_bench.recording.colors import ALARM, BLUE, DISABLED, ROBOT_COLORS, VERMILLION, YELLOW, pale
-from sva_bench.recording.rerun import TIMELINE, end_s, record
+from sva_bench.recording.rerun import TIMELINE, Side, end_s, record, record_pair
 from sva_bench.recording.viewer import program, verify
-from tests.recording.missions import WORLD, mission_with_news, trace
+from tests.recording.missions import TOUR, WORLD, mission_with_news, trace
 
 
 def rows(path: Path, entity: str, component: str) -> tuple[np.ndarray[Any, np.dtype[np.float64]], list[Any]]:
@@ -80,6 +81,7 @@ def test_series_hold_fuel_and_incentive(tour: Path) -> None:
     assert_array_equal(np.array(values)[:, 0], [0, 30, 60, 72.5, 72.5])
     times, values = rows(tour, "fuel/uv1", "Scalars:scalars")
     assert_allclose(np.column_stack([times, np.array(values)[:, 0]]), [[0, 20], [4, 16], [6, 20], [14, 12]], atol=1e-9)
+    assert rows(tour, "fuel/uv2", "Scalars:scalars")[0][-1] == 6  # it failed
     assert not len(rows(tour, "fuel/uv3", "Scalars:scalars")[0])  # no limit
 
 
@@ -93,7 +95,60 @@ def test_robots_that_never_leave_are_recorded(tmp_path: Path) -> None:
         assert_array_equal(places, [[[1, 1, 0]]])
         _, colors = rows(path, f"world/robots/{robot}/hull/body", "Cylinders3D:colors")
         assert [rgb(row[0]) for row in colors] == [color]
-    assert end_s(path) == 0
+    # There is no mission to play, and yet lines and lanes have a length.
+    assert end_s(path) == 10
+    assert_array_equal(rows(path, "collected/total", "Scalars:scalars")[0], [0, 10])
+
+
+def test_names_of_robots_in_one_place_are_seen_above_each_other_until_they_part(tour: Path) -> None:
+    # uv2 fails and comes first; uv1 is two radii away from the base from 2 x 0.177 s on, until as long before 14 s.
+    times, places = rows(tour, "world/robots/uv2/name", "Points3D:positions")
+    assert_allclose(times, [0, 0.4, 6], atol=0.06)
+    assert places[-1] == []  # lost: from then on it is said what happened
+    ((usual,), (away,), _) = places
+    assert_allclose(usual, away)
+    ((said,),) = rows(tour, "world/lost/uv2/what", "Points3D:positions")[1]
+    assert_allclose(said[:2], [5 + usual[0], 1 + usual[1]], atol=1e-6)
+    heights = {}
+    for robot, changes in (("uv1", [0, 0.4, 13.7]), ("uv3", [0])):
+        times, places = rows(tour, f"world/robots/{robot}/name", "Points3D:positions")
+        assert_allclose(times, changes, atol=0.06)
+        heights[robot] = [place[0][1] - usual[1] for place in places]
+    assert_allclose(heights["uv1"][1], 0.0, atol=1e-6)
+    assert 0.2 < heights["uv1"][0] == heights["uv1"][2] == pytest.approx(heights["uv3"][0] / 2)
+
+
+def test_whatever_is_written_on_a_map_is_white(told: Path, tour: Path) -> None:
+    for path in (told, tour):
+        written = {chunk.entity_path for chunk in RrdReader(path).stream()
+                   if "Points3D:labels" in chunk.to_record_batch().schema.names}
+        assert {"/world/pois/names", "/world/robots/uv1/name"} < written
+        assert any(entity.endswith("/what") for entity in written)
+        for entity in written:
+            ((packed,),) = constants(path, entity.removeprefix("/"), "Points3D:colors")
+            assert rgb(packed) == (255, 255, 255), entity
+
+
+def test_a_recording_says_what_its_marks_mean_and_leaves_out_what_is_not_there(told: Path, tmp_path: Path) -> None:
+    quiet = tmp_path / "quiet.rrd"
+    record(quiet, WORLD, [trace("uv1")], title="quiet")
+    for path, lost in ((told, True), (quiet, False)):
+        ((text,),) = constants(path, "about", "TextDocument:text")
+        assert "yellow: POI" in text
+        assert ("red cross: lost robot" in text) is lost
+        assert "red dot" not in text
+
+
+def test_of_two_plans_both_lines_go_on_to_the_end_of_the_longer_one(tmp_path: Path) -> None:
+    path = tmp_path / "pair.rrd"
+    sides = [Side(about=About(scenario="nominal", planner=name, trial=0, seed=0, fidelity="rollout"), traces=traces,
+                  routes={"uv1": TOUR}) for name, traces in (("stochastic", [trace("uv1")]),
+                                                             ("deterministic", [trace("uv1", fails_before=0)]))]
+    record_pair(path, WORLD, sides, title="pair")
+    for name, values in (("stochastic", [0, 30, 42.5, 42.5]), ("deterministic", [0, 0, 0])):
+        times, said = rows(path, f"compared/{name}", "Scalars:scalars")
+        assert times[-1] == 14
+        assert_array_equal(np.array(said)[:, 0], values)
 
 
 def test_the_same_mission_twice_is_the_same_recording(tour: Path, tmp_path: Path) -> None:
@@ -149,7 +204,7 @@ def constants(path: Path, entity: str, component: str) -> list[Any]:
 
 
 def test_a_lost_robot_is_crossed_out_and_named_from_then_on(told: Path, tour: Path) -> None:
-    for path, robot, when, at, what in ((told, "uv1", 0, (1, 1), "uv1 failed, 0 s"), (tour, "uv2", 6, (5, 1), None)):
+    for path, robot, when, at, what in ((told, "uv1", 0, (1, 1), "uv1 failed at 0 s"), (tour, "uv2", 6, (5, 1), None)):
         times, (cross,) = rows(path, f"world/lost/{robot}", "LineStrips3D:strips")
         assert_array_equal(times, [when])
         corners = np.array(cross)[..., :2]

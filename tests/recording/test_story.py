@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sva_bench.execution.outcome import Event
 from sva_bench.recording.colors import ALARM, BLUE, PURPLE, ROBOT_COLORS, VERMILLION, YELLOW, pale
 from sva_bench.recording.log import Level
+from sva_bench.recording.standing import raised_by
 from sva_bench.recording.story import Story, corners, dashes, story_of
 from tests.recording.missions import WORLD, mission_with_news, trace
 
@@ -155,7 +157,7 @@ def test_who_was_lost_is_marked_where_it_stands_and_in_its_lane_with_who_learned
     traces, news = mission_with_news()
     story = story_of(WORLD, traces, "news", news)
     ((name, when, what),) = [(lost.robot, lost.time_s, lost.what) for lost in story.lost]
-    assert (name, when, what) == ("uv1", 0.0, "uv1 failed, 0 s")
+    assert (name, when, what) == ("uv1", 0.0, "uv1 failed at 0 s")
     assert_array_equal(story.lost[0].at_m, [1, 1])
     assert [(lane.robot, lane.height, lane.lost_s.tolist(), lane.learned_s.tolist()) for lane in story.lanes] == [
         ("uv1", 0, [0], []), ("uv2", -1, [], [4]), ("uv3", -2, [], [4])]
@@ -176,3 +178,21 @@ def test_a_robot_that_fails_as_it_is_sent_out_from_the_base_is_logged_there() ->
     story = story_of(WORLD, [trace("uv1"), failed], "t")
     assert (4.0, "ERROR", "uv3 failed at base, with 0 collected") in entries(story)
     assert all("stays home" not in entry.text for entry in story.log)
+
+
+@given(st.lists(st.tuples(st.floats(0, 4), st.floats(0, 4), st.booleans()), min_size=1, max_size=8),
+       st.floats(0.3, 1.5))
+def test_names_of_robots_that_stand_together_cover_none_and_those_of_lost_ones_are_lowest(
+    robots: list[tuple[float, float, bool]], step_m: float
+) -> None:
+    at_m, lost = [np.array([x, y]) for x, y, _ in robots], [gone for *_, gone in robots]
+    raised = raised_by(at_m, lost, step_m)
+    places = [at + np.array([0.0, up]) for at, up in zip(at_m, raised, strict=True)]
+    for (k, one), (j, other) in itertools.combinations(enumerate(places), 2):
+        dx, dy = np.abs(one - other)
+        assert dx >= 2 * step_m or dy >= 0.98 * step_m, (k, j)
+    first = min(range(len(robots)), key=lambda k: (not lost[k], k))
+    assert raised[first] == 0.0
+    for k, up in enumerate(raised):
+        near = [j for j in range(len(robots)) if j != k and abs(at_m[j][0] - at_m[k][0]) < 2 * step_m]
+        assert up == 0.0 or near, "a robot that stands apart has its name where it usually is"

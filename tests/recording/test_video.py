@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import io
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from sva_bench.errors import BadFile, BadInput
+from sva_bench.palette import ALARM, GREEN, ROBOTS, YELLOW
 from sva_bench.recording.about import About
 from sva_bench.recording.frames import Frames
-from sva_bench.recording.read_back import read_recording
+from sva_bench.recording.read_back import Shown, read_recording
 from sva_bench.recording.rerun import Side, record, record_pair
 from sva_bench.recording.video import NoVideoEncoder, kind_of, video_of
 from tests.recording.missions import WORLD, trace
@@ -56,7 +59,7 @@ def test_what_is_read_back_is_what_was_recorded(tour: Path) -> None:
         assert_allclose(robot.pose[:, :2], expected.pose[:, :2], atol=1e-6)
         assert robot.collected.values[-1] == expected.outcome.incentive
         assert (robot.lost is None) == (not expected.outcome.lost)
-    assert plan.robots[1].lost == (6.0, "uv2 failed, 6 s")
+    assert plan.robots[1].lost == (6.0, "uv2 failed at 6 s")
     # uv2 failed with p2 ahead, but uv1 collected it; uv3 had nothing to do.
     assert [len(robot.forgone) for robot in plan.robots] == [0, 0, 0]
 
@@ -99,6 +102,56 @@ def test_a_gif_shows_the_whole_mission_and_is_the_same_each_time(pair: Path) -> 
         # A short mission takes its own time, and its last frame is held; frames that are alike are one.
         assert sum(lasts_ms) / 1000 == pytest.approx(14 + 2, abs=0.11)
         assert np.abs(np.asarray(video.convert("RGB")).astype(int) - first).max() > 100
+
+
+def words_drawn(shown: Shown, time_s: float, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """All that is written on a frame."""
+    said: list[str] = []
+    write = ImageDraw.ImageDraw.text
+
+    def writing(draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, **how: Any) -> None:
+        said.append(text)
+        write(draw, at, text, **how)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ImageDraw.ImageDraw, "text", writing)
+        Frames(shown).at(time_s)
+    return said
+
+
+def test_a_frame_says_what_its_marks_mean_and_whose_fuel_is_left(tour: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = read_recording(tour)
+    before, after = (words_drawn(shown, time_s, monkeypatch) for time_s in (5.9, 6.1))
+    assert {"tour", "lost robot", "POI that it left", "planned", "driven", "station", "base"} <= set(before)
+    # Both drive the same route, and are full at the station; what the one that failed has left is nobody's.
+    assert [text for text in before if text.startswith("fuel")] == ["fuel 20 s", "fuel 20 s"]
+    assert [text for text in after if text.startswith("fuel")] == ["fuel 20 s"]
+    assert "uv1, uv2" in after  # in one place
+    assert "collected 30" in after
+
+
+def test_the_legend_fits_whatever_the_width(tour: Path) -> None:
+    shown = read_recording(tour)
+    (plan,) = shown.plans
+    x0, y0, x1, _ = plan.bounds_m
+    tall = replace(plan, bounds_m=(x0, y0, x1, y0 + 10 * (x1 - x0)))
+    narrow, wide = Frames(replace(shown, plans=[tall])), Frames(shown)
+    assert narrow.width < wide.width
+    pixels = np.asarray(narrow.at(0.0)).astype(int)
+    assert (pixels[:, -10:].min() > 200), "nothing is cut at the right"
+    red = (np.abs(pixels - [208, 0, 0]).sum(axis=-1) < 60)
+    assert red[-100:].any(), "the cross of lost robots is in the legend"
+
+
+def test_a_gif_has_the_colours_that_mean_something_however_small_what_they_paint_is(tmp_path: Path) -> None:
+    solids = replace(WORLD.obstacles, bounds_m=np.array([-200.0, -200.0, 200.0, 200.0]))
+    path = tmp_path / "large.rrd"
+    record(path, replace(WORLD, obstacles=solids), TRACES, title="large")
+    with Image.open(io.BytesIO(video_of(path, ".gif", quiet))) as video:
+        video.seek(video.n_frames - 1)  # type: ignore[attr-defined]
+        last = np.asarray(video.convert("RGB")).astype(int)
+    for color in (ALARM, GREEN, YELLOW, *ROBOTS[:3]):
+        assert np.abs(last - color).sum(axis=-1).min() < 12, color
 
 
 @pytest.mark.long

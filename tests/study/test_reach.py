@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached
+from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached, unused_told
 from sva_bench.analysis.summaries import ComparisonSummary, Reach
 from sva_bench.cli.tables import print_summary
 from sva_bench.study.compare import execute_plans
@@ -83,6 +83,21 @@ def test_pois_that_no_robot_reaches_are_named(tmp_path: Path, capsys: pytest.Cap
     assert len(missed) < 4
     for text in told(done, capsys):
         assert f"No robot reaches {' and '.join(missed)}." in text
+
+
+def test_a_robot_that_no_plan_uses_is_pointed_out_and_no_other(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    idle = re.sub(r"(?s)(  uv2:.*?)incentives: {.*?}", r"\1incentives: {}", SMALL)
+    done = run_of(tmp_path, idle)
+    assert done.unused == ("uv2",)
+    capsys.readouterr()
+    print_summary(done.summary, unused=done.unused)
+    assert "uv2 stays home in every plan." in capsys.readouterr().out
+    assert run_of(tmp_path, SMALL).unused == ()
+    # One that reaches nothing is said to stay home already.
+    unable = run_of(tmp_path, SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 1", 1))
+    assert unable.unused == ("uv1",)
+    assert unused_told(unable.unused, unable.summary) == []
 
 
 def test_where_all_pois_are_reachable_there_is_no_warning(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
 
-from sva_bench.choices import Fidelity, Interaction, News, PolicyName
+from sva_bench.choices import Fidelity, Interaction, News, PolicyName, RecordedKind
 from sva_bench.errors import BadInput
 from sva_bench.execution.executed import Executed
 from sva_bench.recording.pen import TIMELINE
@@ -64,6 +64,36 @@ def test_a_trial_that_is_replayed_gives_its_rows_again(interaction: Interaction,
                 assert one.rows == rows_of_trial(run.folder / "outcomes.parquet", one.case.key, trial)
                 assert one.recording is not None
                 assert told(one.recording)["trial"] == trial
+
+
+@pytest.mark.parametrize(("policy", "news"), [("none", "never"), ("resolve", "report")])
+def test_the_worst_and_the_median_trial_of_a_plan_are_those_of_its_rows(policy: PolicyName, news: News, tmp_path: Path
+                                                                        ) -> None:
+    world = of_kind(tmp_path, "independent")
+    options = Options(trials=12, rollouts=3, fidelity="kinematic", policies=("none", "resolve"), news=("report",))
+    run = publish_run(world, options, measure(world, options, None, quiet), tmp_path / "runs", quiet)
+    rows = [row for row in pq.read_table(run.folder / "outcomes.parquet").to_pylist() if row["policy"] == policy]
+    for planner in ("stochastic", "deterministic"):
+        mine = [row for row in rows if row["planner"] == planner]
+        weight = {row["trial"]: row["weight"] for row in mine}
+        value = {trial: sum(row["value"] for row in mine if row["trial"] == trial) for trial in weight}
+        worst, median = (value[replayed(run.folder, planner, policy, news, kind)] for kind in WORST_AND_MEDIAN)
+        assert worst == min(value.values())
+        # At most half of the probability lies below the median, and at most half above.
+        for beyond in ([t for t in value if value[t] < median], [t for t in value if value[t] > median]):
+            assert sum(weight[trial] for trial in beyond) <= 0.5 * sum(weight.values()) + 1e-9
+
+
+WORST_AND_MEDIAN: tuple[RecordedKind, ...] = ("worst", "median")
+
+
+def replayed(folder: Path, planner: str, policy: PolicyName, news: News, kind: RecordedKind) -> int:
+    """The trial that is played again and recorded as the worst, or the median one."""
+    (one,) = replay(folder, Wanted(scenario="half", planner=planner, policy=policy, news=news, kind=kind), None, quiet)
+    assert one.recording is not None
+    assert one.recording.stem.endswith(kind)
+    assert told(one.recording)["chosen"] == kind
+    return int(one.rows[0]["trial"])
 
 
 @pytest.fixture(scope="module")

@@ -33,6 +33,18 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run
 
 
+def test_a_run_with_other_failure_processes_holds(tmp_path: Path) -> None:
+    # Its instances say mean times to failure, which the world's own process has no use for.
+    (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
+    done = subprocess.run([sys.executable, "-m", "sva_bench", "run", "small.yaml", "--trials", "20", "--rollouts", "2",
+                           "--fidelity", "kinematic", "--assumptions", "--workers", "1"], cwd=tmp_path,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (run,) = (tmp_path / "runs").iterdir()
+    assert "mtbf_s" in (run / "instance-half.json").read_text()
+    assert verify(run, 1, None, lambda *_: None).difference is None
+
+
 def in_summary(change: Callable[[dict[str, Any]], None]) -> Callable[[Path], None]:
     """A change of the first scenario of ``summary.json``."""
     def changed(run: Path) -> None:

@@ -65,8 +65,8 @@ def test_a_key_beside_the_preset_counts_whichever_comes_first(tmp_path: Path) ->
     ("noise: {delay_s: [0.03, 0.16]}", "noise.delay_s", "at most 0.15 s"),
     ("noise: {delay_s: [0.1, 0.05]}", "noise.delay_s", "expected [least, greatest]"),
     ("noise: {delay_s: [-0.1, 0.05]}", "noise.delay_s[0]", "expected at least 0"),
-    ("noise: {delay_s: 0.05}", "noise.delay_s", "list"),
-    ("noise: {delay_s: [0.05]}", "noise.delay_s", "at least 2 entries"),
+    ("noise: {delay_s: 0.05}", "noise.delay_s", "two numbers [least, most], found 0.05"),
+    ("noise: {delay_s: [0.05]}", "noise.delay_s", "two numbers [least, most], found 1 entry"),
     ("noise: {capacity_fade: [0.2, 0.1]}", "noise.capacity_fade", "expected [least, greatest]"),
     ("noise: {capacity_fade: [0, 1]}", "noise.capacity_fade[1]", "expected at most 0.95"),
     ("noise: {payload_kg: [5, 1]}", "noise.payload_kg", "expected [least, greatest]"),
@@ -91,7 +91,7 @@ def test_what_is_wrong_with_noise_is_one_complaint_with_line_and_key(tmp_path: P
 
 @pytest.mark.parametrize(("said", "key", "says"), [
     ("passages: {d1: {at_m: [[1, 1], [1, 1]], blocked: 0.1, wait_s: 1}}", "passages.d1.at_m", "the same point"),
-    ("passages: {d1: {at_m: [[1, 1]], blocked: 0.1, wait_s: 1}}", "passages.d1.at_m", "at least 2 entries"),
+    ("passages: {d1: {at_m: [[1, 1]], blocked: 0.1, wait_s: 1}}", "passages.d1.at_m", "expected two points"),
     ("passages: {d1: {at_m: [[1, 1], [1, 2]], blocked: 1.5, wait_s: 1}}", "passages.d1.blocked", "expected at most 1"),
     ("passages: {d1: {at_m: [[1, 1], [1, 2]], blocked: 0.5, wait_s: -1}}", "passages.d1.wait_s",
      "expected at least 0"),
