@@ -85,15 +85,11 @@ def _compared(summary: BatchSummary) -> list[str]:
     """What the values of varied keys are worth."""
     if not summary.compared:
         return []
-    with holding_back_ctrl_c():
-        from sva_bench.report.response_chart import response
-
     parts = [heading("Which value is worth more?")]
     for found in summary.compared:
         head, words, cells = compared_table(found)
         parts += [f"<ul>{''.join(f'<li>{sentence(said)}</li>' for said in compared_answers(found))}</ul>",
-                  f'<div class=pair>{figure(response(found), _MEANS)}'
-                  f'{figure(response(found, more=True), _DIFFERENCES)}</div>',
+                  response(found, _MEANS), response(found, _DIFFERENCES, more=True),
                   table(head, cells, words=words, caption=compared_title(found))]
     return [*parts, *map(note, compared_notes(summary.compared))]
 

@@ -40,6 +40,9 @@ p{{margin:.5rem 0}}
 .answer{{border-left:.4rem solid var(--edge);background:var(--answer);padding:.6rem 1rem;margin:.8rem 0}}
 .answer p:first-child{{font-size:1.15rem;font-weight:600;margin-top:0}}.answer ul{{margin:.3rem 0;padding-left:1.2rem}}
 .answer .note{{max-width:none}}
+dl{{display:grid;grid-template-columns:max-content 1fr;gap:.25rem .9rem;margin:.6rem 0 .2rem;font-size:.92rem}}
+dt{{font-weight:600;grid-column:1}}dd{{margin:0;grid-column:2;overflow-wrap:anywhere}}
+.whole{{white-space:nowrap}}pre .whole{{display:inline-block;max-width:100%;white-space:normal}}
 .doubt{{border-left:.25rem solid {hex_of(ALARM)};padding-left:.6rem}}
 nav{{font-size:.92rem;margin:.8rem 0;color:var(--soft)}}nav a{{margin-right:.9rem;display:inline-block}}
 .wide{{overflow-x:auto;max-width:max-content;background:linear-gradient(90deg,var(--paper) 30%,transparent),
@@ -52,7 +55,8 @@ background-attachment:local,local,scroll,scroll}}
 table{{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem}}
 th,td{{padding:.3rem .7rem;text-align:right;border-bottom:1px solid var(--line);vertical-align:top}}
 thead th{{border-bottom:2px solid var(--soft)}}.text{{text-align:left}}td.text{{white-space:nowrap}}
-.section{{overflow-wrap:anywhere;padding-top:.8rem}}
+th.section{{overflow-wrap:anywhere;padding-top:.7rem;background:var(--fill)}}
+tbody tr:first-child .section{{padding-top:.3rem}}
 td.long{{white-space:normal;min-width:16rem;overflow-wrap:anywhere}}
 td b{{font-weight:600}}
 figure.rows>figcaption{{padding-bottom:.3rem}}
@@ -91,12 +95,20 @@ stroke-width:3px;stroke-linejoin:round}}
 .ended path{{stroke:{hex_of(ALARM)};stroke-width:2}}
 .plan .ended text,.plan .met text{{font-size:10px}}.plan .met text{{text-anchor:start}}
 .met path{{fill:{hex_of(ALARM)};stroke:var(--free)}}.met.wait path{{fill:#8a4fb0}}
-svg.rows{{font:12px system-ui,sans-serif;max-width:33rem;width:100%}}
-svg.rows .group{{font-weight:600}}svg.rows .told{{text-anchor:end}}
-svg.rows .tick{{text-anchor:middle;font-size:11px;fill:var(--soft)}}
-svg.rows .grid{{stroke:var(--line)}}svg.rows .zero{{stroke:var(--soft)}}svg.rows .span{{fill-opacity:.75}}
-svg.rows .steps{{fill:none;stroke-width:1.8}}
-@media(max-width:40rem){{body{{font-size:15px;padding:.8rem}}th,td{{padding:.25rem .45rem}}}}
+svg.rows,svg.panel{{font:12px system-ui,sans-serif;width:100%}}svg.rows{{max-width:29rem}}
+.rows .group,.panel .name{{font-weight:600}}.rows .told{{text-anchor:end}}
+.rows .tick,.panel .tick{{text-anchor:middle;font-size:11px;fill:var(--soft)}}
+.rows .below{{paint-order:stroke;stroke:var(--fill);stroke-width:3px;stroke-linejoin:round}}
+.rows .lane,.panel .lane{{fill:var(--fill)}}.rows .span{{fill-opacity:.75}}
+.rows .grid,.panel .grid{{stroke:var(--line)}}.rows .zero,.panel .zero{{stroke:var(--soft)}}
+.rows .steps,.panel .joined{{fill:none;stroke-width:1.8}}.panel .joined{{stroke:var(--soft);stroke-width:1.2}}
+.panel .tick.left{{text-anchor:end}}.panel .aim{{stroke:var(--soft);stroke-dasharray:4 3}}
+.panel .bar{{stroke-width:2.2}}.panel .ring{{fill:none;stroke:var(--ink);stroke-width:1.4}}
+.panels{{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,15.5rem),1fr));
+gap:.6rem 1.4rem}}
+.panels svg{{max-width:20rem}}
+@media(max-width:40rem){{body{{font-size:15px;padding:.8rem}}th,td{{padding:.25rem .4rem}}
+.answer{{padding:.5rem .7rem}}dl{{display:block}}dd{{margin-bottom:.4rem}}}}
 @media print{{html,body{{font-size:10pt}}body{{max-width:none;padding:0}}.wide{{overflow:visible;background:none}}
 h2,h3,summary,thead{{break-after:avoid}}nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows{{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
