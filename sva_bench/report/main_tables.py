@@ -16,7 +16,6 @@ from sva_bench.report.wording import (
     adjusted,
     doubts_told,
     optional,
-    per_cent,
     reliability_told,
     vss_verdict,
     with_interval,
@@ -34,7 +33,8 @@ def main_tables(summary: AnySummary, world: World, counts: TrialCounts) -> list[
 
 
 def _vss(summary: Summary) -> list[str]:
-    rows = [[s.name, vss_verdict(s.vss), "" if s.vss.same_plan else per_cent(s.vss.executed_pct),
+    rows = [[s.name, vss_verdict(s.vss),
+             "" if s.vss.same_plan or s.vss.executed_pct is None else f"{s.vss.executed_pct:.1f}",
              "" if s.vss.same_plan else with_interval(s.vss.executed_controlled), f"{s.vss.modelled:.1f}",
              optional(s.evpi)] for s in summary.scenarios]
     head = ["scenario", "VSS", "VSS [%]", "variance-reduced", "modelled", "EVPI"]
@@ -52,15 +52,16 @@ REDUCED = "Variance-reduced: the luck of the failures drawn is replaced by its e
 
 def _pairs(summary: ComparisonSummary) -> list[str]:
     """Every pair of given plans; nothing where only one was given."""
-    rows = [[f"{c.a} − {c.b}", adjusted(c), with_interval(c)] for s in summary.scenarios for c in s.comparisons]
-    if not rows:
+    pairs = [(s.name, c) for s in summary.scenarios for c in s.comparisons]
+    if not pairs:
         return []
-    several = any(len(s.comparisons) > 1 for s in summary.scenarios)
-    head = ["plans", "difference", *(["by itself"] if several else [])]
-    meaning = "Differences, trial by trial" + (
-        "; their intervals hold together with 95 %, those by themselves one by one" if several else "")
-    return [table(head, [row[:len(head)] for row in rows], words=(0,), caption=meaning,
-                  sections=[s.name for s in summary.scenarios for _ in s.comparisons])]
+    if len({(c.a, c.b) for _, c in pairs}) == 1:
+        first = pairs[0][1]
+        return [table(["scenario", "difference"], [[name, adjusted(c)] for name, c in pairs],
+                      caption=f"{first.a} less {first.b}, trial by trial")]
+    return [table(["plans", "difference", "by itself"], [
+        [f"{c.a} − {c.b}", adjusted(c), with_interval(c)] for _, c in pairs], sections=[name for name, _ in pairs],
+        caption="Differences, trial by trial; their intervals hold together with 95 %, those by themselves one by one")]
 
 
 def _plans(summary: AnySummary, world: World, counts: TrialCounts) -> list[str]:

@@ -129,10 +129,11 @@ def command(words: Sequence[str]) -> str:
 def sentence(words: str) -> str:
     """As it stands in a paragraph: a line never begins with a per cent sign, nor ends within an option's name."""
     kept = text(typeset(re.sub(r"(?<=[0-9]) %", "\u00a0%", words)))
-    return _OPTION.sub(r"<span class=whole>\g<0></span>", kept)
+    return _WHOLE.sub(r"<span class=whole>\g<0></span>", kept)
 
 
-_OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")  # copied from a page it must still be one: no other hyphens in it
+_WHOLE = re.compile(r"(?<![\w-])--[a-z][a-z-]*|[0-9.]+–[0-9.]+")
+"""Options and ranges break nowhere. Copied from a page, an option must be one still: so no other hyphens in it."""
 
 
 def typeset(words: str) -> str:

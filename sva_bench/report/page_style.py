@@ -8,13 +8,12 @@ from sva_bench.palette import ALARM, ROBOTS, SITES, hex_of
 
 LIGHT: Mapping[str, str] = {
     "paper": "#ffffff", "ink": "#1b1e22", "soft": "#4a515a", "line": "#d5dae0", "fill": "#f2f4f6", "answer": "#eef4f8",
-    "edge": "#2d6f94", "link": "#0b5a86", "solid": "#b3b8be", "free": "#fbfbfc"}
+    "edge": "#2d6f94", "link": "#0b5a86", "solid": "#b3b8be", "free": "#fbfbfc", "faint": ".35"}
 DARK: Mapping[str, str] = {
     "paper": "#16191d", "ink": "#e7e9ec", "soft": "#aab2bb", "line": "#3a4149", "fill": "#21262c", "answer": "#1b2731",
-    "edge": "#5fa8d0", "link": "#7dc0e8", "solid": "#4c535c", "free": "#1c2025"}
-"""Colours of a page in each mode, by the names of their variables."""
-_DASHES = ("none", "7 3", "2 3", "8 2.5 2 2.5", "4 5")
-_BORDERS = ("solid", "dashed", "dotted", "double", "dashed")
+    "edge": "#5fa8d0", "link": "#7dc0e8", "solid": "#4c535c", "free": "#1c2025", "faint": ".62"}
+"""Colours of a page in each mode, and the opacity of a leg that is hardly ever driven, by the names of variables."""
+_DASHES = ("none", "7 3.5", "0.1 4.5", "9 3 2 3", "15 4")  # the third one's are dots: its ends are round
 
 
 def _variables(colours: Mapping[str, str]) -> str:
@@ -23,9 +22,9 @@ def _variables(colours: Mapping[str, str]) -> str:
 
 def _robots() -> str:
     return "".join(
-        f".leg.r{k} path{{stroke:{hex_of(colour)};stroke-dasharray:{dash}}}.leg.r{k} .head{{fill:{hex_of(colour)}}}"
-        f"i.r{k}{{border-top:3px {border} {hex_of(colour)}}}\n"
-        for k, (colour, dash, border) in enumerate(zip(ROBOTS, _DASHES, _BORDERS, strict=True)))
+        f".leg.r{k} path{{stroke:{hex_of(colour)};stroke-dasharray:{dash}"
+        f"{';stroke-linecap:round' * dash.startswith('0.1')}}}.leg.r{k} .head{{fill:{hex_of(colour)}}}\n"
+        for k, (colour, dash) in enumerate(zip(ROBOTS, _DASHES, strict=True)))
 
 
 STYLE = f"""
@@ -55,7 +54,7 @@ background-attachment:local,local,scroll,scroll}}
 table{{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem}}
 th,td{{padding:.3rem .7rem;text-align:right;border-bottom:1px solid var(--line);vertical-align:top}}
 thead th{{border-bottom:2px solid var(--soft)}}.text{{text-align:left}}td.text{{white-space:nowrap}}
-th.section{{overflow-wrap:anywhere;padding-top:.7rem;background:var(--fill)}}
+th.section{{overflow-wrap:anywhere;padding-top:.7rem;background:color-mix(in srgb,var(--ink) 5%,transparent)}}
 tbody tr:first-child .section{{padding-top:.3rem}}
 td.long{{white-space:normal;min-width:16rem;overflow-wrap:anywhere}}
 td b{{font-weight:600}}
@@ -77,7 +76,7 @@ align-items:start;margin-top:.6rem}}
 background:linear-gradient(var(--plan) 50%,var(--other,var(--plan)) 50%) 0/.5rem 100% no-repeat}}
 .map ul{{list-style:none;margin:0;padding:0;font-size:.92rem}}.map li{{margin:.2rem 0;overflow-wrap:anywhere}}
 .map span{{color:var(--soft)}}
-i.k{{display:inline-block;width:1.6rem;margin-right:.4rem;vertical-align:middle;height:0}}
+svg.k{{width:1.9rem!important;height:.55rem;margin-right:.4rem;vertical-align:middle;display:inline-block}}
 .solid{{fill:var(--solid)}}.free{{fill:var(--free)}}.cells{{image-rendering:pixelated}}
 .slippery{{fill:#7fb6d3;fill-opacity:.35;stroke:#5b98b8;stroke-dasharray:3 2}}
 .passage{{stroke:#1d9a74;stroke-width:3;stroke-dasharray:4 2.5;fill:none}}
@@ -89,11 +88,13 @@ stroke-width:3px;stroke-linejoin:round}}
 .poi{{fill:{hex_of(SITES["poi"])};stroke:#4a4310}}
 .plan .scale path{{fill:none;stroke:var(--ink);stroke-width:1.2}}
 .plan .scale text{{font-weight:400;font-size:10px;text-anchor:end;stroke:none}}
-.leg path{{fill:none;stroke-width:2.4;stroke-linejoin:round}}.leg .head{{stroke:none!important}}
-.leg:hover path{{stroke-width:4.5}}.leg.replanned path{{stroke-dasharray:1.5 3.5;stroke-width:2}}
-{_robots()}.ended circle{{fill:var(--free);stroke:{hex_of(ALARM)};stroke-width:1.6}}
+.leg path{{fill:none;stroke-width:calc(1.5px + .9px*var(--often,1));stroke-linejoin:round}}
+.leg{{opacity:calc(var(--faint) + (1 - var(--faint))*var(--often,1))}}.leg .head{{stroke:none!important}}
+{_robots()}.leg.replanned path{{stroke-width:4.2}}
+.leg.replanned .core{{stroke:var(--free);stroke-width:2;stroke-dasharray:none}}
+.leg:hover path:not(.core){{stroke-width:5.2}}.ended circle{{fill:var(--free);stroke:{hex_of(ALARM)};stroke-width:1.6}}
 .ended path{{stroke:{hex_of(ALARM)};stroke-width:2}}
-.plan .ended text,.plan .met text{{font-size:10px}}.plan .met text{{text-anchor:start}}
+.plan .ended text,.plan .met text{{font-size:10px}}
 .met path{{fill:{hex_of(ALARM)};stroke:var(--free)}}.met.wait path{{fill:#8a4fb0}}
 svg.rows,svg.panel{{font:12px system-ui,sans-serif;width:100%}}svg.rows{{max-width:29rem}}
 .rows .group,.panel .name{{font-weight:600}}.rows .told{{text-anchor:end}}

@@ -48,12 +48,14 @@ class Axes:
         places: Places on the x axis that have names, in place of round numbers.
         joined: Whether points of a panel are joined from left to right.
         zero: Whether the y axis holds zero.
+        apart: Whether each panel has a y axis of its own, for figures that are not to be compared between them.
     """
 
     x: str
     places: Sequence[tuple[float, str]] = ()
     joined: bool = False
     zero: bool = False
+    apart: bool = False
 
 
 def panels(told: str, axes: Axes, shown: Sequence[Panel], caption: str) -> str:
@@ -68,16 +70,21 @@ def panels(told: str, axes: Axes, shown: Sequence[Panel], caption: str) -> str:
     drawn = [panel for panel in shown if panel.points][:MOST_PANELS]
     if not drawn:
         return ""
-    points = [point for panel in drawn for point in panel.points]
-    ends = [end for point in points for end in (point.y, *(point.interval or ()))]
-    across = [point.x for point in points] + [at for at, _ in axes.places] + [
-        panel.aim for panel in drawn if panel.aim is not None]
-    reach = _Reach(*_with_room(across), *_with_room([*ends, 0.0] if axes.zero else ends))
+    every = [point for panel in drawn for point in panel.points]
+    x0, x1 = _with_room([point.x for point in every] + [at for at, _ in axes.places] + [
+        panel.aim for panel in drawn if panel.aim is not None])
+    reaches = [_Reach(x0, x1, *_upright(panel.points if axes.apart else every, zero=axes.zero)) for panel in drawn]
     left = len(shown) - len(drawn)
     more = f" The first {len(drawn)} of {len(shown)}." if left and len(drawn) == MOST_PANELS else ""
-    pictures = "".join(_picture(f"{told}, {panel.title}", axes, panel, reach) for panel in drawn)
+    pictures = "".join(_picture(f"{told}, {panel.title}", axes, panel, reach)
+                       for panel, reach in zip(drawn, reaches, strict=True))
     return (f"<figure class=rows><div class=panels>{pictures}</div><figcaption>{sentence(caption + more)}</figcaption>"
             "</figure>")
+
+
+def _upright(points: Sequence[Point], *, zero: bool) -> tuple[float, float]:
+    ends = [end for point in points for end in (point.y, *(point.interval or ()))]
+    return _with_room([*ends, 0.0] if zero else ends)
 
 
 def _with_room(ends: Sequence[float]) -> tuple[float, float]:

@@ -59,7 +59,7 @@ def lead_of(reaction: ReactionResult) -> Estimate:
 
 
 def leads(reaction: ReactionResult) -> bool:
-    """Whether the best plan tried is distinguishably ahead of the next: it is found without noise, which may turn it."""
+    """Whether the best plan tried is distinguishably ahead of the next: noise may turn that."""
     ahead = lead_of(reaction)
     return reaction.best.over is not None and ahead.mean > 0 and ahead.excludes_zero
 

@@ -26,7 +26,7 @@ def response(found: KeyComparison, caption: str, *, more: bool = False) -> str:
         _point(found, row, at[row.value], value) for row in found.rows if (row.scenario, row.others) == place
         and (value := _shown(found, row, more=more)) is not None]) for place in places]
     told = f"Value more than at {shown_value(found.reference)}" if more else f"Value over {found.key}"
-    axes = Axes(x=found.key, zero=more, joined=numbers is not None,
+    axes = Axes(x=found.key, zero=more, joined=numbers is not None, apart=True,
                 places=[(at[value], shown_value(value)) for value in found.values])
     return panels(f"{told}: means and 95 % intervals", axes, shown, caption)
 
