@@ -63,7 +63,8 @@ def table(
         return f'<tr><th scope="rowgroup" class="text section" colspan={len(head)}>{text(sections[k])}</th></tr>'
 
     body = "".join(above(k) + row(cells, "td") for k, cells in enumerate(rows))
-    whole = f"<div class=wide tabindex=0><table><thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table></div>"
+    kept = "<table class=few>" if len(rows) <= _FEW else "<table>"
+    whole = f"<div class=wide tabindex=0>{kept}<thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table></div>"
     # No caption of the table's own: it would be as wide as the table, and scroll out of sight with it.
     return f"<figure class=rows><figcaption>{sentence(caption)}</figcaption>{whole}</figure>" if caption else whole
 
@@ -72,11 +73,12 @@ def table_of_html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table of words, whose cells are HTML."""
     above = "".join(f'<th scope="col" class=text>{text(word)}</th>' for word in head)
     body = "".join("<tr>" + "".join(f"<td class=text>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<div class=wide tabindex=0><table><thead><tr>{above}</tr></thead><tbody>{body}</tbody></table></div>"
+    return f"<div class=wide tabindex=0><table class=few><thead><tr>{above}</tr></thead><tbody>{body}</tbody></table></div>"
 
 
 CONTENTS = "<!--contents-->"
 """Where a page has its contents."""
+_FEW = 16  # rows that print keeps on one sheet
 _LONG = 40  # letters from which on a name or a route may go on in a second line
 
 

@@ -8,10 +8,12 @@ from sva_bench.palette import ALARM, ROBOTS, SITES, hex_of
 
 LIGHT: Mapping[str, str] = {
     "paper": "#ffffff", "ink": "#1b1e22", "soft": "#4a515a", "line": "#d5dae0", "fill": "#f2f4f6", "answer": "#eef4f8",
-    "edge": "#2d6f94", "link": "#0b5a86", "solid": "#b3b8be", "free": "#fbfbfc", "faint": ".35"}
+    "edge": "#2d6f94", "link": "#0b5a86", "solid": "#b3b8be", "free": "#fbfbfc", "faint": ".35",
+    "alarm": hex_of(ALARM)}
 DARK: Mapping[str, str] = {
     "paper": "#16191d", "ink": "#e7e9ec", "soft": "#aab2bb", "line": "#3a4149", "fill": "#21262c", "answer": "#1b2731",
-    "edge": "#5fa8d0", "link": "#7dc0e8", "solid": "#4c535c", "free": "#1c2025", "faint": ".62"}
+    "edge": "#5fa8d0", "link": "#7dc0e8", "solid": "#4c535c", "free": "#1c2025", "faint": ".8",
+    "alarm": "#ff6257"}
 """Colours of a page in each mode, and the opacity of a leg that is hardly ever driven, by the names of variables."""
 _DASHES = ("none", "7 3.5", "0.1 4.5", "9 3 2 3", "15 4")  # the third one's are dots: its ends are round
 
@@ -42,7 +44,7 @@ p{{margin:.5rem 0}}
 dl{{display:grid;grid-template-columns:max-content 1fr;gap:.25rem .9rem;margin:.6rem 0 .2rem;font-size:.92rem}}
 dt{{font-weight:600;grid-column:1}}dd{{margin:0;grid-column:2;overflow-wrap:anywhere}}
 .whole{{white-space:nowrap}}pre .whole{{display:inline-block;max-width:100%;white-space:normal}}
-.doubt{{border-left:.25rem solid {hex_of(ALARM)};padding-left:.6rem}}
+.doubt{{border-left:.25rem solid var(--alarm);padding-left:.6rem}}
 nav{{font-size:.92rem;margin:.8rem 0;color:var(--soft)}}nav a{{margin-right:.9rem;display:inline-block}}
 .wide{{overflow-x:auto;max-width:max-content;background:linear-gradient(90deg,var(--paper) 30%,transparent),
 linear-gradient(270deg,var(--paper) 30%,transparent) 100% 0,
@@ -92,10 +94,10 @@ stroke-width:3px;stroke-linejoin:round}}
 .leg{{opacity:calc(var(--faint) + (1 - var(--faint))*var(--often,1))}}.leg .head{{stroke:none!important}}
 {_robots()}.leg.replanned path{{stroke-width:4.2}}
 .leg.replanned .core{{stroke:var(--free);stroke-width:2;stroke-dasharray:none}}
-.leg:hover path:not(.core){{stroke-width:5.2}}.ended circle{{fill:var(--free);stroke:{hex_of(ALARM)};stroke-width:1.6}}
-.ended path{{stroke:{hex_of(ALARM)};stroke-width:2}}
+.leg:hover path:not(.core){{stroke-width:5.2}}.ended circle{{fill:var(--free);stroke:var(--alarm);stroke-width:1.6}}
+.ended path{{stroke:var(--alarm);stroke-width:2}}
 .plan .ended text,.plan .met text{{font-size:10px}}
-.met path{{fill:{hex_of(ALARM)};stroke:var(--free)}}.met.wait path{{fill:#8a4fb0}}
+.met path{{fill:var(--alarm);stroke:var(--free)}}.met.wait path{{fill:#8a4fb0}}
 svg.rows,svg.panel{{font:12px system-ui,sans-serif;width:100%}}svg.rows{{max-width:29rem}}
 .rows .group,.panel .name{{font-weight:600}}.rows .told{{text-anchor:end}}
 .rows .tick,.panel .tick{{text-anchor:middle;font-size:11px;fill:var(--soft)}}
@@ -111,7 +113,9 @@ gap:.6rem 1.4rem}}
 @media(max-width:40rem){{body{{font-size:15px;padding:.8rem}}th,td{{padding:.25rem .4rem}}
 .answer{{padding:.5rem .7rem}}dl{{display:block}}dd{{margin-bottom:.4rem}}}}
 @media print{{html,body{{font-size:10pt}}body{{max-width:none;padding:0}}.wide{{overflow:visible;background:none}}
-h2,h3,summary,thead{{break-after:avoid}}nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows{{break-inside:auto}}
+h2,h3,summary,thead,tr:has(>.section),figure.rows>figcaption,nav{{break-after:avoid}}
+details::details-content{{break-before:avoid}}table.few,figure:has(>.wide>.few){{break-inside:avoid}}
+nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows:not(:has(>.wide>.few)){{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
 summary{{list-style:none}}
 table{{font-size:8pt}}

@@ -99,7 +99,7 @@ def reaction_ledgers(summary: AnySummary) -> list[str]:
                   sections=[scenario.name for scenario, reaction in rows for _ in reaction.plans]),
             note("Reaction: what re-planning gained or lost. No draws where all histories were played. The promise of "
                  "an anticipative plan has the reaction in it, which the assumption takes out again. "
-                 f"{NOTHING} and columns that are left out: nothing.")]
+                 f"{NOTHING}: nothing; columns of nothing else are left out.")]
 
 
 def _policies(rows: Sequence[AnyReacting]) -> str:

@@ -87,7 +87,7 @@ def rows_chart(title: str, unit: str, rows: Sequence[Row], *, zero: bool = False
             y += _GROUP if number else 16.0
             parts.append(f'<text class=group x="0" y="{y - 5:.0f}">{text(row.group)}</text>')
         parts.append(_labels(row, y + _LABEL - 4))
-        y += _LABEL
+        y += _LABEL * (1 if _beside(row) else 2)
         tall = _tall(row)
         parts.append(f'<rect class=lane x="0" y="{y:.0f}" width="{_WIDTH:.0f}" height="{tall:.0f}" rx="2"/>')
         parts += [f'<path class="{"zero" if at == 0 else "grid"}" d="M{x(at):.1f} {y:.0f}v{tall:.0f}"/>'
@@ -114,11 +114,18 @@ def _ends(mark: Dot | Span | Steps) -> list[float]:
     return [mark.low, mark.high] if isinstance(mark, Span) else [min(mark.values), max(mark.values)]
 
 
+def _beside(row: Row) -> bool:
+    """Whether there is room for what a row comes to beside its label, or only below it."""
+    return not row.told or _LETTER * (len(row.label) + len(row.told) + 2) <= _WIDTH
+
+
 def _labels(row: Row, y: float) -> str:
-    room = int((_WIDTH - _LETTER * len(row.told)) / _LETTER) - 2
-    label = row.label if len(row.label) <= room else f"{row.label[:max(room - 1, 1)]}…"
+    room = int(_WIDTH / _LETTER)
+    label = row.label if len(row.label) <= room else f"{row.label[:room - 1]}…"
+    below = y if _beside(row) else y + _LABEL - 1
     return (f'<text x="0" y="{y:.0f}"><title>{text(row.label)}</title>{text(label)}</text>'
-            + (f'<text class=told x="{_WIDTH:.0f}" y="{y:.0f}">{text(typeset(row.told))}</text>' if row.told else ""))
+            + (f'<text class=told x="{_WIDTH:.0f}" y="{below:.0f}">{text(typeset(row.told))}</text>' if row.told
+               else ""))
 
 
 def _drawn(mark: Dot | Span | Steps, x: _Scale, top: float, tall: float) -> str:

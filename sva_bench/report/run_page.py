@@ -65,7 +65,7 @@ def write_report(path: Path, content: Content) -> None:
         *source_section(scenarios),
         *reaction_ledgers(summary),
         *(_assumptions(summary) if isinstance(summary, Summary) else ()),
-        *_ends(summary, content.routes),
+        *_ends(scenarios, content.routes),
         *folded(_by_robot(summary)),
         *folded(_measured(scenarios)),
         *interaction_section(scenarios, content.world),
@@ -117,7 +117,7 @@ def _from_promise(scenarios: Scenarios) -> list[str]:
     return [heading("From promise to execution"), _statistics(scenarios, "promise"),
             note("Assumption: the plan's value under the failures executed, against what its maker believed. Draws: "
                  "failures as drawn, against their expectation. Then the value lost to each end of the execution. "
-                 f"{NOTHING} and columns that are left out: nothing.")]
+                 f"{NOTHING}: nothing; columns of nothing else are left out.")]
 
 
 def _measured(scenarios: Scenarios) -> list[str]:
@@ -148,14 +148,13 @@ def _assumptions(summary: Summary) -> list[str]:
                  "in the same trials.")]
 
 
-def _ends(summary: AnySummary, routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> list[str]:
+def _ends(scenarios: Scenarios, routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]]) -> list[str]:
     def ends(scenario: str, planner: str, robot: str, shares: Mapping[End, Share]) -> list[str]:
         # The perfect-information plans have other routes in each outcome.
         if planner != "informed" and stays_home(routes[scenario, planner].get(robot, ())):
             return ["stays home", *[""] * (len(ENDS) - 1)]
         return [_in_per_cent(shares[end]) if end in shares else NOTHING for end in ENDS]
 
-    scenarios: Scenarios = summary.scenarios
     rows = [[shown_name(s, name), robot, *ends(s.name, name, robot, shares)]
             for s in scenarios for name, plan in s.plans.items() for robot, shares in plan.end_shares.items()]
     head, cells = told_columns(["plan", "robot", *(f"{end.replace('_', ' ')} [%]" for end in ENDS)], rows, (0, 1, 2))

@@ -69,10 +69,10 @@ def source_section(scenarios: Scenarios) -> list[str]:
         if len(head) > 1]
     return [heading(source_title(rows)), note(costliest(scenarios)), *tables,
             *([note(_OF_OTHERS)] if _met(rows) else []),
-            note(f"{NOTHING} and sources that are left out: nothing, to the digit shown. Value: in the same trials and "
-                 "noise draws, by the noisy twin; of contact, floors and payload, executed less by the twin. "
-                 "Interplay: what is due to no source by itself. The values add up to executed less expected less "
-                 "draws. Route times: of the team's routes, driven whole, waits included.")]
+            note(f"{NOTHING}: nothing, to the digit shown; sources of nothing else are left out. Value: in the same "
+                 "trials and noise draws, by the noisy twin; of contact, floors and payload, executed less by the "
+                 "twin. Interplay: what is due to no source by itself. The values add up to executed less expected "
+                 "less draws. Route times: of the team's routes, driven whole, waits included.")]
 
 
 def _pivoted(scenarios: Scenarios, read: Callable[[SourceEffect], float]) -> tuple[list[str], list[list[str]]]:

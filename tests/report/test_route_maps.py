@@ -90,7 +90,7 @@ def test_a_leg_is_the_fainter_the_seldomer_it_is_driven(contents: Mapping[str, C
                 if found.robot == "uv2" and found.left)
     figure = maps_of(content)["half", "deterministic"]
     assert 0.2 < share < 0.8
-    assert f'<g class="leg r1" style="opacity:{0.3 + 0.7 * share:.2f}"' in figure
+    assert f'<g class="leg r1" style="--often:{share:.2f}"' in figure
     assert '<g class="leg r0" style' not in figure  # uv1 is always there
 
 
@@ -106,7 +106,7 @@ def test_marks_say_on_which_leg_how_often_robots_ended(
         counts[whose] = counts.get(whose, 0) + 1
     figure = html.unescape(maps_of(content)["safe", "stochastic"])
     assert len(counts) > 2
-    assert figure.count("<g class=ended>") == len(counts)
+    assert figure.count('<g class="ended">') == len(counts)
     for (robot, stops), count in counts.items():
         ends = content.routes["safe", "stochastic"][robot][stops:stops + 2]
         said = re.search(rf"{robot} failed on leg {stops + 1}, {' → '.join(ends)}: ([0-9.]+) % of missions", figure)
