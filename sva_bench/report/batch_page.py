@@ -164,7 +164,8 @@ def _reactions(summary: BatchSummary, names: VariantNames) -> list[str]:
     return [heading("Teams that react"), table(head, cells, words=words, sections=[
         names.whole(row.variant) for row in summary.reactions] if any(summary.variants) else ()), note(
         "VSS: stochastic less deterministic plan under the reaction, of either sign. Recourse: what reacting adds to a "
-        "plan. VSS with recourse and anticipation: the best plan for the reaction less the deterministic and the "
+        "plan. In per cent: VSS of the stochastic plan's value, recourse of the plan's value without reaction. VSS "
+        "with recourse and anticipation: the best plan for the reaction less the deterministic and the "
         "stochastic one."), note(knows_what_when(row.news for row in summary.reactions))]
 
 

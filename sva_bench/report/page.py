@@ -73,7 +73,8 @@ def table_of_html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table of words, whose cells are HTML."""
     above = "".join(f'<th scope="col" class=text>{text(word)}</th>' for word in head)
     body = "".join("<tr>" + "".join(f"<td class=text>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<div class=wide tabindex=0><table class=few><thead><tr>{above}</tr></thead><tbody>{body}</tbody></table></div>"
+    return (f"<div class=wide tabindex=0><table class=few><thead><tr>{above}</tr></thead><tbody>{body}</tbody></table>"
+            "</div>")
 
 
 CONTENTS = "<!--contents-->"
