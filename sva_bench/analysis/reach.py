@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from sva_bench.analysis.results import GivenPlanResult
 from sva_bench.analysis.summaries import ComparisonSummary, Reach
@@ -11,19 +11,26 @@ _NOTHING = "no robot reaches any POI: give them more fuel or time"
 _NAMED = 20  # POIs or maps that a sentence names
 
 
-def reached(missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Sequence[str]) -> Reach:
+def reached(
+    missed: Mapping[str, Sequence[str]], robots: Sequence[str], pois: Sequence[str],
+    earning: Mapping[str, Collection[str]] | None = None,
+) -> Reach:
     """The section ``reach`` of ``summary.json``.
 
     Args:
         missed: POIs that each robot cannot visit and return from, by robot; robots that miss none may be left out.
         robots: All robots.
         pois: All POIs.
+        earning: POIs at which each robot earns something, by robot; ``None`` = all. Nobody is missed at the others.
     """
+    wanted = {robot: set(pois) if earning is None else set(earning.get(robot, ())) for robot in robots}
+    told = {robot: tuple(poi for poi in missed.get(robot, ()) if poi in wanted[robot]) for robot in robots}
     return Reach(
         nothing=all(len(missed.get(robot, ())) == len(pois) for robot in robots),
         robots=tuple(robot for robot in robots if len(missed.get(robot, ())) == len(pois)),
-        pois=tuple(poi for poi in pois if all(poi in missed.get(robot, ()) for robot in robots)),
-        missed={robot: tuple(missed[robot]) for robot in robots if missed.get(robot)})
+        pois=tuple(poi for poi in pois if all(poi in missed.get(robot, ()) for robot in robots)
+                   and any(poi in wanted[robot] for robot in robots)),
+        missed={robot: found for robot, found in told.items() if found})
 
 
 def why_nothing(reach: Reach) -> str:

@@ -65,22 +65,20 @@ def _pairs(summary: ComparisonSummary) -> list[str]:
 
 
 def _plans(summary: AnySummary, world: World, counts: TrialCounts) -> list[str]:
-    head = ["plan", "executed", "rank", "goes wrong [%]", "robots lost", "feasible", "expected", "promised"]
+    head = ["plan", "executed", "rank", "goes wrong [%]", "robots lost", "expected", "promised"]
     given, rows = isinstance(summary, ComparisonSummary), []
     for scenario in summary.scenarios:
         ranks = {row.plan: str(row.rank) for row in scenario.ranking} if isinstance(scenario, ComparedScenario) else {}
-        rows += [[shown_name(scenario, name), with_interval(plan.executed), ranks.get(name, ""), _wrong(plan),
-                  lost(counts, scenario.name, name), _feasible(plan), optional(plan.expected),
+        rows += [[shown_name(scenario, name) + _infeasible(plan), with_interval(plan.executed), ranks.get(name, ""),
+                  _wrong(plan), lost(counts, scenario.name, name), optional(plan.expected),
                   "" if given else f"{plan.promised:.1f}"] for name, plan in scenario.plans.items()]
     shown, cells = told_columns(head, rows, (0, 1, 4))
     meant = {"rank": "Rank: one more than the number of plans that are distinguishably better.",
              "goes wrong [%]": "Goes wrong: in so many missions some robot runs out of fuel, comes home late or gets "
                                "stuck.",
-             "robots lost": "Robots lost: how many a mission left the base and never came back, on average.",
-             "feasible": "Infeasible plans would break fuel or limit; they were driven all the same."}
+             "robots lost": "Robots lost: how many a mission left the base and never came back, on average."}
     titles = {s.name: f"{s.name} ({reliability_told(world, s.name, summary)})" for s in summary.scenarios}
-    return [table(shown, cells, caption="What the plans are worth", words=[
-                0, *(k for k, name in enumerate(shown) if name == "feasible")],
+    return [table(shown, cells, caption="What the plans are worth",
                   sections=[titles[s.name] for s in summary.scenarios for _ in s.plans]),
             note(" ".join(meant[name] for name in shown if name in meant))]
 
@@ -89,8 +87,9 @@ def _wrong(plan: PlanResult) -> str:
     return "" if plan.bad is None else f"{100 * plan.bad.share:.1f}"
 
 
-def _feasible(plan: PlanResult) -> str:
-    return "no: fuel or limit" if isinstance(plan, GivenPlanResult) and not plan.feasible else ""
+def _infeasible(plan: PlanResult) -> str:
+    """Beside the name, so before any figure."""
+    return " (infeasible)" if isinstance(plan, GivenPlanResult) and not plan.feasible else ""
 
 
 def lost(counts: TrialCounts, scenario: str, planner: str) -> str:

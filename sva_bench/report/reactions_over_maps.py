@@ -59,8 +59,8 @@ def reaction_table(rows: Sequence[ReactionOverMaps], *, narrow: bool
     cells = [[*([row.variant] if varied else []), row.scenario, f"{row.policy}, {row.news}", str(row.maps),
               *(cell for name, gain in zip(figures, (
                   row.vss, *(row.value_of_recourse.get(plan) for plan in plans), row.vss_with_recourse,
-                  row.anticipation), strict=True) for cell in _gain(gain, narrow=narrow)[:1 if name in _OF_BEST else 2])]
-             for row in rows]
+                  row.anticipation), strict=True)
+                for cell in _gain(gain, narrow=narrow)[:1 if name in _OF_BEST else 2])] for row in rows]
     return [*(["variant"] if varied else []), "scenario", "reaction", "maps", *shown], tuple(range(2 + varied)), cells
 
 

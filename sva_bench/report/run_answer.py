@@ -84,12 +84,12 @@ def _ranges(summary: AnySummary, found: Mapping[str, list[float]], show: Callabl
 
 
 def unused(content: Content) -> str:
-    """Which robots no plan sends anywhere, though they could earn something; nothing where all drive."""
+    """Which robots no plan sends anywhere; nothing where all drive."""
     summary = content.summary
     sent = {robot for routes in content.routes.values() for robot, route in routes.items() if len(set(route)) > 1}
     sent.update(content.legs.robot)  # those that are sent by new orders alone
     idle = [robot.name for robot in content.world.robots if robot.name not in sent
-            and robot.name not in summary.reach.robots]
+            and not (robot.name in summary.reach.robots and robot.name in summary.reach.missed)]  # said to reach none
     if not idle or summary.reach.nothing:
         return ""
     stay = "stays home" if len(idle) == 1 else "stay home"

@@ -23,7 +23,7 @@ def _headline(rows: Sequence[OverMaps], *, variants: int) -> str:
     if rows and all(row.maps == 1 for row in rows):
         return "One map can't tell what planning for failures is worth over maps; below is its worth on this one."
     most = max((row.maps for row in rows), default=0)
-    over = f"Over {counted(most, 'map')}" if len({row.maps for row in rows}) == 1 else f"Over up to {counted(most, 'map')}"
+    over = f"Over {'up to ' if len({row.maps for row in rows}) > 1 else ''}{counted(most, 'map')}"
     pays = [row for row in rows if _verdict(row) == _PAYS]
     if not pays:
         return f"{over} no scenario shows a value of planning for failures beyond doubt."

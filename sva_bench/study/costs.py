@@ -121,6 +121,8 @@ def out_of_reach(world: World, costs: Mapping[str, FuelCosts]) -> dict[str, list
 
 
 def reach_of(world: World, costs: Mapping[str, FuelCosts]) -> Reach:
-    """The section ``reach`` of summaries: POIs that robots cannot reach within fuel and limit."""
+    """The section ``reach`` of summaries: POIs that would earn robots something beyond their fuel and limit."""
     return reached(out_of_reach(world, costs), [robot.name for robot in world.robots],
-                   [poi.name for poi in world.pois])
+                   [poi.name for poi in world.pois],
+                   {robot.name: [poi for poi, worth in robot.incentives.items() if worth > 0]
+                    for robot in world.robots})

@@ -33,8 +33,8 @@ from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.batch_page import write_batch_report
 from sva_bench.report.reactions_over_maps import answers_over_maps
 from sva_bench.study.options import Options
-from tests.results_for_tests import unit
 from tests.pages import untypeset
+from tests.results_for_tests import unit
 from tests.worlds_for_tests import SMALL, world_of
 
 QUICK = ("--trials", "30", "--rollouts", "3", "--fidelity", "kinematic", "--unit-trials", "10")
