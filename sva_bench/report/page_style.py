@@ -107,15 +107,17 @@ svg.rows,svg.panel{{font:12px system-ui,sans-serif;width:100%}}svg.rows{{max-wid
 .rows .steps,.panel .joined{{fill:none;stroke-width:1.8}}.panel .joined{{stroke:var(--soft);stroke-width:1.2}}
 .panel .tick.left{{text-anchor:end}}.panel .aim{{stroke:var(--soft);stroke-dasharray:4 3}}
 .panel .bar{{stroke-width:2.2}}.panel .ring{{fill:none;stroke:var(--ink);stroke-width:1.4}}
+.legend{{font-size:.92rem}}.legend span{{margin-right:1.2rem}}.legend svg.k{{width:.8rem!important;height:.8rem}}
 .panels{{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,15.5rem),1fr));
 gap:.6rem 1.4rem}}
 .panels svg{{max-width:20rem}}
-@media(max-width:40rem){{body{{font-size:15px;padding:.8rem}}th,td{{padding:.25rem .4rem}}
+@media(max-width:40rem){{body{{font-size:15px;padding:.8rem}}th,td{{padding:.25rem .3rem}}table{{font-size:.88rem}}
 .answer{{padding:.5rem .7rem}}dl{{display:block}}dd{{margin-bottom:.4rem}}}}
 @media print{{html,body{{font-size:10pt}}body{{max-width:none;padding:0}}.wide{{overflow:visible;background:none}}
-h2,h3,summary,thead,tr:has(>.section),figure.rows>figcaption,nav{{break-after:avoid}}
-details::details-content{{break-before:avoid}}table.few,figure:has(>.wide>.few){{break-inside:avoid}}
-nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows:not(:has(>.wide>.few)){{break-inside:auto}}
+h2,h3,summary,thead,tr:has(>.section),figure.rows>figcaption,nav,h2+.note,h2+p,p.legend{{break-after:avoid}}
+details::details-content{{break-before:avoid}}table.few,figure:has(>.wide>.few),figure:has(>.panels),li:not(:has(ul)){{break-inside:avoid}}
+li>b{{break-after:avoid}}li:has(>ul)>ul{{break-before:avoid}}
+nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows:not(:has(>.wide>.few,>.panels)){{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
 summary{{list-style:none}}
 table{{font-size:8pt}}

@@ -19,7 +19,7 @@ MOST_PANELS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """A point with its interval, if it has one; ``shape``: round, square or hollow."""
+    """A point with its interval, if it has one; ``shape``: round, square, up or hollow."""
 
     x: float
     y: float
@@ -49,6 +49,8 @@ class Axes:
         joined: Whether points of a panel are joined from left to right.
         zero: Whether the y axis holds zero.
         apart: Whether each panel has a y axis of its own, for figures that are not to be compared between them.
+        legend: Colour, shape and name of what is told apart by them.
+        ends: Of the x axis; ``None`` = as far as points go.
     """
 
     x: str
@@ -56,6 +58,8 @@ class Axes:
     joined: bool = False
     zero: bool = False
     apart: bool = False
+    legend: Sequence[tuple[str, str, str]] = ()
+    ends: tuple[float, float] | None = None
 
 
 def panels(told: str, axes: Axes, shown: Sequence[Panel], caption: str) -> str:
@@ -71,15 +75,15 @@ def panels(told: str, axes: Axes, shown: Sequence[Panel], caption: str) -> str:
     if not drawn:
         return ""
     every = [point for panel in drawn for point in panel.points]
-    x0, x1 = _with_room([point.x for point in every] + [at for at, _ in axes.places] + [
+    x0, x1 = axes.ends or _with_room([point.x for point in every] + [at for at, _ in axes.places] + [
         panel.aim for panel in drawn if panel.aim is not None])
     reaches = [_Reach(x0, x1, *_upright(panel.points if axes.apart else every, zero=axes.zero)) for panel in drawn]
     left = len(shown) - len(drawn)
     more = f" The first {len(drawn)} of {len(shown)}." if left and len(drawn) == MOST_PANELS else ""
     pictures = "".join(_picture(f"{told}, {panel.title}", axes, panel, reach)
                        for panel, reach in zip(drawn, reaches, strict=True))
-    return (f"<figure class=rows><div class=panels>{pictures}</div><figcaption>{sentence(caption + more)}</figcaption>"
-            "</figure>")
+    return (f"<figure class=rows>{_legend(axes)}<div class=panels>{pictures}</div>"
+            f"<figcaption>{sentence(caption + more)}</figcaption></figure>")
 
 
 def _upright(points: Sequence[Point], *, zero: bool) -> tuple[float, float]:
@@ -154,16 +158,27 @@ def _places(axes: Axes, reach: _Reach) -> list[tuple[float, str, str]]:
     return kept
 
 
+def _shape(shape: str, colour: str, x: float, y: float) -> str:
+    if shape == "square":
+        return f'<rect x="{x - 3.4:.1f}" y="{y - 3.4:.1f}" width="6.8" height="6.8" style="fill:{colour}"/>'
+    if shape == "up":
+        return f'<path d="M{x:.1f} {y - 4.6:.1f}l4.4 7.8h-8.8z" style="fill:{colour}"/>'
+    fill = f"fill:var(--paper);stroke:{colour};stroke-width:1.6" if shape == "hollow" else f"fill:{colour}"
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.8" style="{fill}"/>'
+
+
+def _legend(axes: Axes) -> str:
+    """What is what, in a line above the charts."""
+    items = "".join(f'<span class=whole><svg class=k viewBox="0 0 10 10" aria-hidden=true>{_shape(shape, colour, 5, 5)}'
+                    f"</svg>{text(name)}</span> " for colour, shape, name in axes.legend)
+    return f"<p class=legend>{items}</p>" if items else ""
+
+
 def _drawn(point: Point, reach: _Reach) -> str:
     x, y = reach.x(point.x), reach.y(point.y)
     bar = "" if point.interval is None else (
         f'<path class=bar style="stroke:{point.colour}" d="M{x:.1f} {reach.y(point.interval[0]):.1f}'
         f'V{reach.y(point.interval[1]):.1f}"/>')
-    if point.shape == "square":
-        shape = f'<rect x="{x - 3.5:.1f}" y="{y - 3.5:.1f}" width="7" height="7" style="fill:{point.colour}"/>'
-    else:
-        fill = f"fill:var(--paper);stroke:{point.colour};stroke-width:1.6" if point.shape == "hollow" else \
-            f"fill:{point.colour}"
-        shape = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.8" style="{fill}"/>'
+    shape = _shape(point.shape, point.colour, x, y)
     ring = f'<circle class=ring cx="{x:.1f}" cy="{y:.1f}" r="7"/>' if point.ringed else ""
     return f"<g><title>{text(typeset(point.said))}</title>{bar}{shape}{ring}</g>"

@@ -10,11 +10,7 @@ from sva_bench.palette import hex_of, plan_color
 from sva_bench.report.panels import Axes, Panel, Point, panels
 from sva_bench.report.reaction_shares import recourse_pct, tell, vss_pct, without_pct
 from sva_bench.report.reaction_wording import AnyReacting, Reacting
-from sva_bench.report.rows_chart import Dot, Row, Span, rows_chart
 from sva_bench.report.wording import with_interval
-
-MOST_SCENARIOS = 8
-"""Scenarios that a chart of rows shows."""
 
 
 def vss_against_news(rows: Sequence[Reacting], caption: str) -> str:
@@ -40,28 +36,34 @@ def vss_against_news(rows: Sequence[Reacting], caption: str) -> str:
     return panels(f"VSS in {unit} without reaction and by the kind of news, with 95 % intervals", axes, shown, caption)
 
 
-def recourse_by_plan(rows: Sequence[AnyReacting]) -> str:
-    """Points with intervals: what reacting adds to each plan, a row for each scenario, kind of news and plan.
+def recourse_by_plan(rows: Sequence[AnyReacting], caption: str) -> str:
+    """Points with intervals: what reacting adds to each plan by the kind of news, a small chart for each scenario.
 
     In incentive where some base is too little for per cent.
     """
-    first = list(dict.fromkeys(row.scenario.name for row in rows))[:MOST_SCENARIOS]
-    kept = [row for row in rows if row.scenario.name in first]
-    pct = tell(recourse_pct(reaction, name) for _, reaction in kept for name in reaction.plans)
-    several = len({row.reaction.news for row in kept}) > 1
-    shown = []
-    for scenario, reaction in kept:
+    heard = [news for news in NEWS if any(row.reaction.news == news for row in rows)]
+    plans = list(dict.fromkeys(name for row in rows for name in row.reaction.plans))
+    pct = tell(recourse_pct(reaction, name) for _, reaction in rows for name in reaction.plans)
+    colours = {name: hex_of(plan_color(name, number)) for number, name in enumerate(plans)}
+    shown: dict[str, list[Point]] = {}
+    for scenario, reaction in rows:
         for number, name in enumerate(reaction.plans):
             gain = recourse_pct(reaction, name) if pct else reaction.value_of_recourse[name]
-            if gain is None:
-                continue
-            colour, told = hex_of(plan_color(name, number)), with_interval(gain)
-            spans = [] if gain.ci95 is None else [
-                Span(low=gain.ci95[0], high=gain.ci95[1], said=f"95 % interval: {told}", colour=colour)]
-            shown.append(Row(label=f"{name}, {reaction.news} news" if several else name, told=told,
-                             group=scenario.name, marks=[*spans, Dot(at=gain.mean, said=f"mean: {told}",
-                                                                     colour=colour)]))
+            if gain is not None:
+                aside = _APART * (number - (len(reaction.plans) - 1) / 2)
+                shown.setdefault(scenario.name, []).append(Point(
+                    x=heard.index(reaction.news) + aside, y=gain.mean, interval=gain.ci95, colour=colours[name],
+                    shape=_SHAPES[number % len(_SHAPES)],
+                    said=f"{name}, {reaction.news} news: {with_interval(gain)}"))
     unit = "per cent of its value without reaction" if pct else "incentive"
-    return rows_chart(f"Value of recourse of each plan in {unit}, by scenario and kind of news, with 95 % intervals",
-                      "value of recourse " + ("[% of the plan's value without]" if pct else "[incentive]"), shown,
-                      zero=True)
+    said = f"{caption} In {unit}."
+    axes = Axes(x="news", zero=True, places=[(float(at), word) for at, word in enumerate(heard)],
+                ends=(-0.5, len(heard) - 0.5),
+                legend=[(colours[name], _SHAPES[number % len(_SHAPES)], name) for number, name in enumerate(plans)])
+    return panels(f"Value of recourse of each plan in {unit}, by scenario and kind of news, with 95 % intervals", axes,
+                  [Panel(title=scenario, points=points) for scenario, points in shown.items()],
+                  said)
+
+
+_APART = 0.14  # of plans under one kind of news
+_SHAPES = ("round", "square", "up")

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary
-from sva_bench.files.printable import counted
 from sva_bench.report.compared_reactions import given_answers, given_reacting
-from sva_bench.report.page import figure, heading, note, sentence, table, text
-from sva_bench.report.reaction_charts import MOST_SCENARIOS, recourse_by_plan, vss_against_news
+from sva_bench.report.page import heading, note, sentence, table, text
+from sva_bench.report.reaction_charts import recourse_by_plan, vss_against_news
 from sva_bench.report.reaction_shares import (
     doubted,
     lead_of,
@@ -39,9 +38,13 @@ def _rows(summary: AnySummary) -> Sequence[AnyReacting]:
     return given_reacting(summary) if isinstance(summary, ComparisonSummary) else reacting(summary)
 
 
+def _answers(summary: AnySummary) -> list[Answer]:
+    return given_answers(summary) if isinstance(summary, ComparisonSummary) else reaction_answers(summary)
+
+
 def reactions_answered(summary: AnySummary) -> list[str]:
     """The answers that belong on top of the page; none where nobody reacts."""
-    answers = given_answers(summary) if isinstance(summary, ComparisonSummary) else reaction_answers(summary)
+    answers = _answers(summary)
     if not answers:
         return []
     return ["<div class=answer><p>What if the robots re-plan?</p>",
@@ -49,9 +52,15 @@ def reactions_answered(summary: AnySummary) -> list[str]:
 
 
 def _answered(answer: Answer) -> str:
-    first, *more = answer.sentences
-    below = f"<ul>{''.join(f'<li>{sentence(said)}</li>' for said in more)}</ul>" if more else ""
-    return f"<li><b>{sentence(answer.condition)}</b> {sentence(first)}{below}</li>"
+    return f"<li><b>{sentence(answer.condition)}</b> {sentence(answer.sentences[0])}</li>"
+
+
+def _answered_further(answers: Sequence[Answer]) -> str:
+    """What else each policy and news come to, of which the first sentence stands on top of the page."""
+    items = "".join(f"<li><b>{sentence(answer.condition.rstrip(','))}:</b><ul>"
+                    f"{''.join(f'<li>{sentence(said)}</li>' for said in answer.sentences[1:])}</ul></li>"
+                    for answer in answers if len(answer.sentences) > 1)
+    return f"<ul>{items}</ul>" if items else ""
 
 
 def reaction_section(summary: AnySummary) -> list[str]:
@@ -62,7 +71,7 @@ def reaction_section(summary: AnySummary) -> list[str]:
             "The missions counted here were played with the reaction and without, and all figures are by them; the " \
             "tables on top are by the trials of the run, so theirs may differ. VSS in per cent: of the stochastic " \
             "plan's value with the reaction, or without where nobody reacts."
-    rests = [note(said) for said in assumptions_of(_rows(summary))]
+    rests = [_answered_further(_answers(summary)), *(note(said) for said in assumptions_of(_rows(summary)))]
     if isinstance(summary, ComparisonSummary):
         return [heading("What reacting is worth"), *rests, *_recourse_charts(given_reacting(summary)), _pairs(summary),
                 _plans(given_reacting(summary)), note(units),
@@ -119,11 +128,9 @@ def _charts(rows: Sequence[Reacting]) -> list[str]:
 
 def _recourse_charts(rows: Sequence[AnyReacting]) -> list[str]:
     """What reacting adds to each plan, a chart for each policy."""
-    scenarios = len({row.scenario.name for row in rows})
-    cut = f" The first {MOST_SCENARIOS} of {counted(scenarios, 'scenario')}." if scenarios > MOST_SCENARIOS else ""
-    return [figure(recourse_by_plan([row for row in rows if row.reaction.policy == policy]),
-                   f"What reacting adds, policy {policy}. Right of zero the plan gains by the reaction. A plan that "
-                   f"loses much by failures has much to gain.{cut}")
+    return [recourse_by_plan([row for row in rows if row.reaction.policy == policy],
+                             f"What reacting adds, policy {policy}. Above zero the plan gains by the reaction. A plan "
+                             "that loses much by failures has much to gain.")
             for policy in dict.fromkeys(row.reaction.policy for row in rows)]
 
 
@@ -165,15 +172,18 @@ def _difference(found: Estimate, pct: Estimate | None) -> tuple[str, str]:
 def _plans(rows: Sequence[AnyReacting]) -> str:
     """Each plan with the reaction and without."""
     twice = bool(doubles(rows))
-    head = ["plan", "value of recourse", "of its value without [%]", "with it", "without reaction", "news",
-            "orders changed [% of missions]", *(["doubled visits [per mission]"] if twice else []), "missions played",
-            "histories"]
-    cells = [[name, *_difference(reaction.value_of_recourse[name], recourse_pct(reaction, name)),
-              with_interval(plan.executed), f"{value_without(reaction, name):.1f}", reaction.news,
-              f"{100 * plan.reacted:.1f}", *([f"{plan.doubled:.3g}"] if twice else []), str(plan.missions),
-              reaction.histories]
+    several, mixed = (len(found) > 1 for found in (
+        {reaction.news for _, reaction in rows}, {reaction.histories for _, reaction in rows}))
+    head = ["plan", *(["news"] if several else []), "value of recourse", "of its value without [%]", "with it",
+            "without reaction", "orders changed [% of missions]",
+            *(["doubled visits [per mission]"] if twice else []), "missions played", *(["histories"] if mixed else [])]
+    cells = [[name, *([reaction.news] if several else []),
+              *_difference(reaction.value_of_recourse[name], recourse_pct(reaction, name)),
+              with_interval(plan.executed), f"{value_without(reaction, name):.1f}", f"{100 * plan.reacted:.1f}",
+              *([f"{plan.doubled:.3g}"] if twice else []), str(plan.missions), *([reaction.histories] if mixed else [])]
              for _, reaction in rows for name, plan in reaction.plans.items()]
-    return table(head, cells, words=(0, 5, len(head) - 1), caption="Each plan with the reaction",
+    words = [0, *([1] if several else []), *([len(head) - 1] if mixed else [])]
+    return table(head, cells, words=words, caption="Each plan with the reaction",
                  sections=[scenario.name for scenario, reaction in rows for _ in reaction.plans])
 
 

@@ -198,7 +198,9 @@ def _without(row: Reacting) -> str:
     scenario, reaction = row
     found = reaction.vss_without_reaction
     if found.excludes_zero and amount(found) == _amount_of_vss(reaction):
-        return ", as without reaction"
+        return ", as without reaction" + ("" if _is_the_runs(scenario, reaction) else _ANOTHER.format(
+            "all histories" if reaction.histories == "enumerated" else "the missions played",
+            amount(_of_the_run(scenario))))
     if found.excludes_zero:
         if _is_the_runs(scenario, reaction):
             return f" in place of {amount(found)}"
@@ -211,9 +213,15 @@ def _without(row: Reacting) -> str:
 
 def _is_the_runs(scenario: ScenarioSummary, reaction: ReactionResult) -> bool:
     """Whether the VSS without reaction, as it is shown, is the figure that the run's own trials gave."""
+    return amount(reaction.vss_without_reaction) == amount(_of_the_run(scenario))
+
+
+def _of_the_run(scenario: ScenarioSummary) -> Gain:
     vss = scenario.vss
-    return amount(reaction.vss_without_reaction) == amount(
-        Gain(mean=vss.executed.mean, ci95=vss.executed.ci95, pct=vss.executed_pct))
+    return Gain(mean=vss.executed.mean, ci95=vss.executed.ci95, pct=vss.executed_pct)
+
+
+_ANOTHER = " (that is over {}; the trials drawn gave {})"
 
 
 def _where_uneven(row: Reacting) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from urllib.parse import quote
 
 from sva_bench.analysis.plan_names import ShownNames
-from sva_bench.report.page import heading, note, sentence, table_of_html, text
+from sva_bench.report.page import heading, note, table_of_html, text
 from sva_bench.report.wording import listed
 from sva_bench.storage.manifest import RecordingNote
 from sva_bench.storage.stored_run import Content
@@ -19,7 +19,7 @@ def recordings_section(content: Content, shown: ShownNames) -> list[str]:
     plans = list(dict.fromkeys(plan for by_plan in cells.values() for plan in by_plan))
     parts = [heading("Recordings")]
     if plans:
-        parts += [f"<p>{sentence('For the Rerun viewer; open them all with')} <code>sva-bench view</code> and this "
+        parts += ["<p>For the Rerun viewer; open them all with <code class=whole>sva-bench view</code> and this "
                   "folder.</p>",
                   table_of_html(["scenario", *plans], [
                       [text(scenario), *("<br>".join(by_plan.get(plan, ())) for plan in plans)]

@@ -29,7 +29,7 @@ from sva_bench.report.route_maps import route_maps
 from sva_bench.report.run_answer import answer_box
 from sva_bench.report.source_table import source_section
 from sva_bench.report.told_columns import NOTHING, difference, told_columns
-from sva_bench.report.wording import ASSUMPTION_HEAD, assumed, assumption_rows, cell, listed, with_interval
+from sva_bench.report.wording import assumed, cell, listed, verdict, with_interval
 from sva_bench.storage.manifest import Manifest
 from sva_bench.storage.stored_run import Content
 from sva_bench.storage.trial_counts import TrialCounts
@@ -140,10 +140,15 @@ def _told(entry: Statistic, plan: PlanFigures) -> str:
 
 
 def _assumptions(summary: Summary) -> list[str]:
-    rows = assumption_rows(summary.scenarios)
+    rows = [(s.name, row) for s in summary.scenarios for row in s.assumptions or ()]
     if not rows:
         return []
-    return [heading("The wrong assumption"), table(ASSUMPTION_HEAD, rows, words=(0, 1, 2, 3)),
+    cells = [[row.planner, row.planned_for or "no failures",
+              verdict(row.loss, distinguishable=row.loss.distinguishable, same=row.loss.same_plan),
+              with_interval(row.executed), f"{row.expected:.1f}"] for _, row in rows]
+    return [heading("The wrong assumption"),
+            table(["plan", "made for", "loss", "executed", "expected"], cells, words=(0, 1), sections=[
+                f"{name}, executed under {row.executed_under} failures" for name, row in rows]),
             note("Loss: how much more the stochastic plan for the failures that were executed is worth than this one, "
                  "in the same trials.")]
 
@@ -163,7 +168,7 @@ def _ends(scenarios: Scenarios, routes: Mapping[tuple[str, str], Mapping[str, Se
             table(head, cells, words=(0, 1), sections=[
                 s.name for s in scenarios for plan in s.plans.values() for _ in plan.end_shares]),
             note("Failed: by draw. Out of fuel, late (home past its limit), stuck: by what physics made of the plan. "
-                 + (f"No robot ended {' or '.join(never)}. " if never else "")
+                 + (f"No robot ended {listed(never, 'or')}. " if never else "")
                  + "Where all trials ended alike, the interval says how often another end could still come up."),
             *(note(said) for said in costless_ends(scenarios))]
 
@@ -187,9 +192,10 @@ def _world(world: World, *, drawn: bool) -> list[str]:
 
 
 def _routes(routes: Mapping[tuple[str, str], Mapping[str, Sequence[str]]], shown: ShownNames) -> list[str]:
-    rows = [[scenario, shown.of(scenario, planner), robot, "stays home" if stays_home(route) else " → ".join(route)]
+    rows = [[shown.of(scenario, planner), robot, "stays home" if stays_home(route) else " → ".join(route)]
             for (scenario, planner), robots in routes.items() for robot, route in robots.items()]
-    return [heading("List of routes"), table(["scenario", "plan", "robot", "route"], rows, words=(0, 1, 2, 3))]
+    return [heading("List of routes"), table(["plan", "robot", "route"], rows, words=(0, 1, 2), sections=[
+        scenario for (scenario, _), robots in routes.items() for _ in robots])]
 
 
 def _again(summary: AnySummary, manifest: Manifest) -> list[str]:

@@ -67,6 +67,8 @@ def source_section(scenarios: Scenarios) -> list[str]:
                     caption=caption) for (head, cells), caption in (
         (value, "Value: with the source less without it"), (seconds, "Route times [s]: how much longer routes take"))
         if len(head) > 1]
+    if not tables:
+        return [heading(source_title(rows)), note(costliest(scenarios))]
     return [heading(source_title(rows)), note(costliest(scenarios)), *tables,
             *([note(_OF_OTHERS)] if _met(rows) else []),
             note(f"{NOTHING}: nothing, to the digit shown; sources of nothing else are left out. Value: in the same "

@@ -23,7 +23,7 @@ from sva_bench.analysis.summaries import Summary
 from sva_bench.choices import NEWS
 from sva_bench.cli.reaction_table import print_reactions
 from sva_bench.files.records import as_dict, from_dict
-from sva_bench.report.reaction_charts import MOST_SCENARIOS
+from sva_bench.report.panels import MOST_PANELS
 from sva_bench.report.reaction_page import reaction_ledgers, reaction_section, reactions_answered
 from sva_bench.report.reaction_shares import doubted, in_per_cent
 from sva_bench.report.reaction_wording import (
@@ -264,10 +264,10 @@ def test_the_page_says_what_each_figure_is_and_shows_reaction_in_the_ledger() ->
 
 
 def test_charts_show_as_many_scenarios_as_can_be_told_apart_and_say_so() -> None:
-    names = tuple(f"S{k}" for k in range(MOST_SCENARIOS + 1))
+    names = tuple(f"S{k}" for k in range(MOST_PANELS + 1))
     few, many = (page_of(summary_of(reaction("report", PAYS), names=some)) for some in (names[:-1], names))
-    assert f"The first {MOST_SCENARIOS} of" not in few
-    assert f"The first {MOST_SCENARIOS} of {len(names)} scenarios" in many
+    assert f"The first {MOST_PANELS} of" not in few
+    assert many.count(f"The first {MOST_PANELS} of {len(names)}.") == 2
 
 
 def test_a_difference_in_per_cent_of_nothing_is_none() -> None:
