@@ -79,7 +79,7 @@ def table_of_html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 CONTENTS = "<!--contents-->"
 """Where a page has its contents."""
-_FEW = 16  # rows that print keeps on one sheet
+_FEW = 24  # rows that print keeps on one sheet
 _LONG = 40  # letters from which on a name or a route may go on in a second line
 
 
