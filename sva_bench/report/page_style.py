@@ -114,9 +114,11 @@ gap:.6rem 1.4rem}}
 @media(max-width:40rem){{body{{font-size:15px;padding:.8rem}}th,td{{padding:.25rem .3rem}}table{{font-size:.88rem}}
 .answer{{padding:.5rem .7rem}}dl{{display:block}}dd{{margin-bottom:.4rem}}}}
 @media print{{html,body{{font-size:10pt}}body{{max-width:none;padding:0}}.wide{{overflow:visible;background:none}}
-h2,h3,summary,thead,tr:has(>.section),figure.rows>figcaption,nav,h2+.note,h2+p,p.legend{{break-after:avoid}}
+h2,h3,summary,thead,tr:has(>.section),figure.rows>figcaption:not(:last-child),nav,h2+.note,h2+p,p.legend{{break-after:avoid}}
 details::details-content{{break-before:avoid}}table.few,figure:has(>.wide>.few),figure:has(>.panels),li:not(:has(ul)){{break-inside:avoid}}
 li>b{{break-after:avoid}}li:has(>ul)>ul{{break-before:avoid}}
+details:has(>.pair){{break-inside:avoid}}.panels{{display:block}}
+.panels svg{{display:inline-block!important;width:31%;margin-right:1.5%}}
 nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows:not(:has(>.wide>.few,>.panels)){{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
 summary{{list-style:none}}
