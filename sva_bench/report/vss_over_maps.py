@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from sva_bench.analysis.over_maps import BatchSummary, OverMaps
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import listed, with_interval
+from sva_bench.report.wording import FEW_MAPS, listed, with_interval
 
 _PAYS, _COSTS, _NONE, _EVEN, _UNSURE = "pays", "costs", "no difference", "can't be told", "no interval"
 
@@ -23,7 +23,8 @@ def _headline(rows: Sequence[OverMaps], *, variants: int) -> str:
     if rows and all(row.maps == 1 for row in rows):
         return "One map can't tell what planning for failures is worth over maps; below is its worth on this one."
     most = max((row.maps for row in rows), default=0)
-    over = f"Over {'up to ' if len({row.maps for row in rows}) > 1 else ''}{counted(most, 'map')}"
+    few = "at most " if len({row.maps for row in rows}) > 1 else "only " if most < FEW_MAPS else ""
+    over = f"Over {few}{counted(most, 'map')}"
     pays = [row for row in rows if _verdict(row) == _PAYS]
     if not pays:
         return f"{over} no scenario shows a value of planning for failures beyond doubt."

@@ -258,7 +258,7 @@ def headline_of(*rows: OverMaps) -> str:
 def test_a_batchs_verdict_and_figure_rest_on_the_same_interval() -> None:
     # Large maps with a surely positive VSS, and a small one that makes its percentage anybody's guess.
     assert headline_of(over_maps(5, (2.0, 8.0), (-1.0, 9.0))) == (
-        "Over 5 maps planning for failures pays in S3 (VSS 5.0 [2.0, 8.0]).")
+        "Over only 5 maps planning for failures pays in S3 (VSS 5.0 [2.0, 8.0]).")
     assert "no scenario shows a value" in headline_of(over_maps(5, (-2.0, 8.0), (1.0, 9.0)))
 
 

@@ -30,7 +30,8 @@ def headline(*rows: OverMaps) -> str:
     ([row("S1", "x", LOSES), row("S1", "y", EVEN)],
      "Over 12 maps no scenario shows a value of planning for failures beyond doubt."),
     ([row("S1", "", PAYS, maps=3), row("S2", "", None, maps=2)],
-     "Over up to 3 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
+     "Over at most 3 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
+    ([row("S1", "", PAYS, maps=9)], "Over only 9 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
     ([row("S1", "", PAYS, maps=1)],
      "One map can't tell what planning for failures is worth over maps; below is its worth on this one.")])
 def test_a_headline_says_over_how_many_maps_and_for_which_variants(rows: list[OverMaps], said: str) -> None:
