@@ -11,6 +11,12 @@ from typing import Literal, get_args
 # Inputs
 SiteKind = Literal["base", "station", "poi"]
 FailureProcess = Literal["mission", "per_leg", "hazard"]
+FAILURES: Mapping[FailureProcess, str] = {
+    "mission": "one draw for each robot and mission: a robot that fails never leaves",
+    "per_leg": "a draw before each next point: a robot that fails there keeps what it has",
+    "hazard": "each robot fails after a time of driving that is drawn: what it has by then it keeps",
+}
+"""How robots fail, in a few words each."""
 MapMode = Literal["trinary", "scale", "raw"]
 Interaction = Literal["independent", "uncoordinated", "shared"]
 INTERACTIONS: Mapping[Interaction, str] = {

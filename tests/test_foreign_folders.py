@@ -169,7 +169,7 @@ def test_a_batch_folder_with_anything_anywhere_is_gone_on_with_or_gives_one_erro
     monkeypatch.setattr("sva_bench.batch.conductor.Conductor.run", lambda *_: None)
     monkeypatch.setattr("sva_bench.workers.local.LocalProcesses.__init__", lambda *_: None)
     monkeypatch.setattr("sva_bench.workers.local.LocalProcesses.close", lambda *_: None)
-    monkeypatch.setattr("sva_bench.batch.run.write_batch_report", lambda path, _: path.write_text(""))
+    monkeypatch.setattr("sva_bench.batch.run.write_batch_report", lambda path, *_: path.write_text(""))
     folder, work = folders["batch"], tmp_path / "work"
     shutil.copytree(folder, work)
     world = folder.parent / "small.yaml"

@@ -69,24 +69,14 @@ class KeyComparison(Record):
     rows: tuple[ValueRow, ...]
 
 
-def settings_in(variant: str) -> dict[str, str]:
-    """The varied keys of a variant, each with its value as JSON; that of a planner is its bare name."""
-    found, at, decoder = {}, 0, json.JSONDecoder()
-    while at < len(variant):
-        key, _, _ = variant[at:].partition("=")
-        begin = at + len(key) + 1
-        try:
-            _, end = decoder.raw_decode(variant, begin)
-        except ValueError:
-            end = begin + len(variant[begin:].partition("; ")[0])
-        found[key] = variant[begin:end]
-        at = end + len("; ")
-    return found
+def variant_of(settings: Mapping[str, str]) -> str:
+    """The name of a variant: its varied keys, each with its value as JSON; that of a planner is its bare name."""
+    return "; ".join(f"{key}={value}" for key, value in settings.items())
 
 
-def variant_without(variant: str, key: str) -> str:
-    """A variant's other settings."""
-    return "; ".join(f"{name}={value}" for name, value in settings_in(variant).items() if name != key)
+def other_settings(settings: Mapping[str, str], key: str) -> dict[str, str]:
+    """A variant's settings but for one."""
+    return {name: value for name, value in settings.items() if name != key}
 
 
 def shown_value(word: str) -> str:

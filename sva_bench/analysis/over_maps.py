@@ -140,7 +140,11 @@ class GivenUp(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class BatchSummary(Record):
-    """``summary.json`` of a batch."""
+    """``summary.json`` of a batch.
+
+    Attributes:
+        settings: The varied keys of each variant, each with its value as JSON; empty without a sweep.
+    """
 
     format: BatchFormat = BATCH
     trials: int
@@ -153,6 +157,7 @@ class BatchSummary(Record):
     aggregate: tuple[OverMaps, ...]
     failed: tuple[GivenUp, ...]
     reactions: tuple[ReactionOverMaps, ...] = field(default_factory=tuple, metadata=stands_after("aggregate"))
+    settings: Mapping[str, Mapping[str, str]] = field(default_factory=dict, metadata=stands_after("variants"))
     compared: tuple[KeyComparison, ...] = field(default_factory=tuple, metadata=stands_after("aggregate"))
 
 

@@ -72,8 +72,8 @@ class Reach(Record):
     Attributes:
         nothing: Whether no robot reaches any POI.
         robots: Robots that reach no POI.
-        pois: POIs that no robot reaches.
-        missed: POIs that a robot doesn't reach, for robots with any.
+        pois: POIs that no robot reaches, of those that would earn some robot something.
+        missed: POIs that a robot doesn't reach and that would earn it something, for robots with any.
     """
 
     nothing: bool

@@ -41,6 +41,7 @@ def summary_of(grid: Grid, folder: Path, done: frozenset[str] | set[str], failur
         trials=grid.options.trials, fidelity=grid.options.fidelity,
         worlds=tuple(dict.fromkeys(point.world.name for point in grid.points)), seeds=tuple(grid.seeds),
         variants=tuple(dict.fromkeys(point.variant for point in grid.points)), units=tuple(units),
+        settings={point.variant: dict(point.settings) for point in grid.points if point.settings},
         maps=map_rows(units, over_seeds(notes)), aggregate=aggregate(units),
         failed=tuple(failures), reactions=reactions)
 

@@ -14,9 +14,9 @@ from sva_bench.analysis.compared_values import (
     KeyComparison,
     ValueGain,
     ValueRow,
-    settings_in,
+    other_settings,
     shown_value,
-    variant_without,
+    variant_of,
 )
 from sva_bench.analysis.moments import Clusters, Figure, Moments, joined, pooled
 from sva_bench.analysis.over_maps import UnitSummary
@@ -72,6 +72,9 @@ def asked_of(words: Sequence[str], grid: Grid, what: str = "--compare ") -> tupl
         BadInput: If a key is not varied in the grid or is asked for twice, or has no such value.
     """
     varied = values_of(grid)
+    if words and not varied and any(point.variant for point in grid.points):
+        raise BadInput(f"--compare {words[0]}: the manifest of this batch, of an older version, doesn't say the varied "
+                       "settings one by one; run the batch again")
     found: list[Asked] = []
     for word in words:
         key = next((name for name in varied if word == name or word.startswith(f"{name}=")), None)
@@ -119,7 +122,7 @@ def values_of(grid: Grid) -> dict[str, tuple[str, ...]]:
     """The varied keys of a grid, each with its values."""
     found: dict[str, dict[str, None]] = {}
     for point in grid.points:
-        for key, value in settings_in(point.variant).items():
+        for key, value in point.settings.items():
             found.setdefault(key, {})[value] = None
     return {key: tuple(values) for key, values in found.items()}
 
@@ -141,12 +144,13 @@ def _compared(
     asked: Asked, grid: Grid, folder: Path, done: frozenset[str] | set[str], units: Sequence[UnitSummary]
 ) -> KeyComparison:
     values = values_of(grid)[asked.key]
-    maps = {point.world.name for point in grid.points}
+    maps, settings = {point.world.name for point in grid.points}, {p.variant: p.settings for p in grid.points}
     over_maps = len(maps) > 1
     found: dict[tuple[str, str], dict[str, _Place]] = {}
     for unit in units:
         for scenario in unit.scenarios:
-            value, others = settings_in(unit.variant)[asked.key], variant_without(unit.variant, asked.key)
+            mine = settings[unit.variant]
+            value, others = mine[asked.key], variant_of(other_settings(mine, asked.key))
             place = found.setdefault((scenario.name, others), {}).setdefault(value, _Place(unit.variant, {}))
             place.results[unit.world, unit.seed] = scenario
     of_scenario: dict[str, int] = {}

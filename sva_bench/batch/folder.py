@@ -7,6 +7,7 @@ import errno
 import fcntl
 import json
 import os
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -78,7 +79,8 @@ def begin(folder: Path, settings: BatchSettings, *, resume: bool) -> None:
     except OSError as error:
         raise _unwritable(folder, error) from None
     if not stored:
-        content = pretty_json(as_dict(BatchManifest(settings=settings))).encode()
+        command = ("sva-bench", *sys.argv[1:])
+        content = pretty_json(as_dict(BatchManifest(settings=settings, command=command))).encode()
         if len(content) > MOST_BYTES:
             raise BadInput(f"the worlds and variants of this batch take {len(content)} bytes; at most {MOST_BYTES} are "
                            "kept in one folder: cut it into several batches")
@@ -103,6 +105,15 @@ def settings_in(folder: Path) -> tuple[Part, BatchSettings]:
     return Part(document, ("settings",), document.data["settings"]), settings
 
 
+def command_in(folder: Path) -> tuple[str, ...]:
+    """The command line that began a batch; nothing in older folders.
+
+    Raises:
+        BadFile: If its manifest is invalid.
+    """
+    return validate(read_json(folder / "manifest.json", MOST_BYTES), BatchManifest, MANIFEST).command
+
+
 def is_batch(folder: Path) -> bool:
     """Whether a folder is that of a batch, by its manifest."""
     path = folder / "manifest.json"
@@ -117,6 +128,9 @@ def refuse_other_settings(folder: Path, settings: BatchSettings) -> None:
         BadFile: If the settings differ.
     """
     stored, now = settings_in(folder)[0].data, json.loads(json.dumps(as_dict(settings)))
+    for name, point in stored["points"].items():
+        if "settings" not in point:  # of an older folder, whose variants say the same in their names
+            now["points"].get(name, {}).pop("settings", None)
     differences = list(islice(_differences(stored, now), _MOST_NAMED + 1))
     if not differences:
         return

@@ -33,12 +33,14 @@ class Point:
     Attributes:
         world: The world, with its variations.
         planner: How its paths are planned.
-        variant: The varied settings, e.g. ``robots.uv2.fuel_capacity_s=200``; empty without a sweep.
+        variant: The name of its varied settings, e.g. ``robots.uv2.fuel_capacity_s=200``; empty without a sweep.
+        settings: The varied settings: keys, each with its value as JSON; that of a planner is its bare name.
     """
 
     world: World
     planner: PathPlanner
     variant: str = ""
+    settings: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -53,7 +55,7 @@ class Point:
     def entry(self) -> PointEntry:
         """Its entry in the manifest."""
         return PointEntry(variant=self.variant, planner=self.planner, world=world_as_dict(self.world),
-                          files=self.world.digests() or None)
+                          files=self.world.digests() or None, settings=dict(self.settings))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -161,7 +163,8 @@ def grid_of(document: Part, settings: BatchSettings) -> Grid:
     for name, entry in settings.points.items():
         at = ("points", name)
         world = world_of(Part(document, (*at, "world"), entry.world), _map_folder_at(document.path, entry))
-        points.append(Point(world=world, planner=entry.planner, variant=entry.variant))
+        points.append(Point(world=world, planner=entry.planner, variant=entry.variant,
+                            settings=dict(entry.settings)))
         if points[-1].name != name:
             raise document.error(at, f"its world and variant are those of {points[-1].name!r}")
     return checked(Grid(points=points, seeds=settings.seeds, options=options, unit_trials=settings.unit_trials,

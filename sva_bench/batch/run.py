@@ -15,6 +15,7 @@ from sva_bench.batch.compared import Asked, compared
 from sva_bench.batch.conductor import Conductor, Hooks
 from sva_bench.batch.folder import (
     begin,
+    command_in,
     failures_in,
     locked,
     shard_path,
@@ -115,7 +116,7 @@ def _written(grid: Grid, folder: Path, done: set[str], failures: Sequence[GivenU
     summary = replace(summary, compared=compared(compare, grid, folder, done, summary.units))
     write(folder / "summary.json", pretty_json(as_dict(summary)).encode())
     with writing(folder / "report.html") as draft:
-        write_batch_report(draft, summary)
+        write_batch_report(draft, summary, command_in(folder))
     return summary
 
 

@@ -15,7 +15,8 @@ from sva_bench.analysis.summaries import Facts
 from sva_bench.analysis.unseen import EXECUTION_LOSSES
 from sva_bench.choices import ENDS, OWN_PLANS, Fidelity, News, OwnPlan, PathPlanner, PolicyName
 from sva_bench.files.fields import Name, NonNegativeInt, Number, Seed
-from sva_bench.files.records import Record
+from sva_bench.files.records import Record, stands_after
+from sva_bench.storage.manifest import AnyText
 
 MANIFEST: Literal["sva-bench/batch-manifest@1"] = "sva-bench/batch-manifest@1"
 FAILURES: Literal["sva-bench/batch-failures@1"] = "sva-bench/batch-failures@1"
@@ -45,12 +46,13 @@ class OptionsEntry(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class PointEntry(Record):
-    """A point of the grid; its world is validated as any world file."""
+    """A point of the grid; its world is validated as any world file. Older folders have no ``settings``."""
 
     variant: Words
     planner: PathPlanner
     world: Mapping[str, Any]
     files: Mapping[Words, Words] | None = None
+    settings: Mapping[Words, Words] = field(default_factory=dict, metadata=stands_after("variant"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +69,11 @@ class BatchSettings(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class BatchManifest(Record):
-    """``manifest.json`` of a batch."""
+    """``manifest.json`` of a batch; ``command``: the command line that began it, which older folders lack."""
 
     format: Literal["sva-bench/batch-manifest@1"] = MANIFEST
     settings: BatchSettings
+    command: Annotated[tuple[AnyText, ...], Field(max_length=10_000)] = field(default_factory=tuple)
 
 
 @dataclass(frozen=True, kw_only=True)

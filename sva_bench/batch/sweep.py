@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from pydantic import Field
 
 from sva_bench.analysis.calibration import Target, target_of
-from sva_bench.analysis.compared_values import own_value
+from sva_bench.analysis.compared_values import own_value, variant_of
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
 from sva_bench.choices import Departures, FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
@@ -282,16 +282,16 @@ def grid_of(sweep: Sweep, progress: OnProgress = lambda *_: None) -> Grid:
     for number, (world, variant) in enumerate(_worlds_of(sweep, vary)):
         if unfit := misfit(world, options.policies, options.news, anticipate=options.anticipate):
             raise sweep.wrong(unfit.option, (unfit.option,), f"--{unfit.option}", unfit.problem)
-        before = first_with_effect.setdefault(_effective(world, options), "; ".join(variant))
-        if before != "; ".join(variant) and world.name not in from_options:  # once: there may be thousands
+        before = first_with_effect.setdefault(_effective(world, options), variant_of(variant))
+        if before != variant_of(variant) and world.name not in from_options:  # once: there may be thousands
             from_options.add(world.name)
             _log.warning("%s: %s changes nothing against %s: its scenarios, or other keys, say otherwise", world.name,
-                         "; ".join(variant), before)
+                         variant_of(variant), before)
         if count >= _MANY:
             progress("reading worlds", number, count)
         for planner in planners:
-            parts = [*variant, *([f"planner={planner}"] if len(planners) > 1 else [])]
-            points.append(Point(world=world, planner=planner, variant="; ".join(parts)))
+            settings = {**variant, **({"planner": planner} if len(planners) > 1 else {})}
+            points.append(Point(world=world, planner=planner, variant=variant_of(settings), settings=settings))
     for key in sorted(_IN_PHYSICS_ALONE & set(vary)) if options.fidelity == "kinematic" else ():
         _log.warning("%s is varied to no effect: kinematic trials know nothing of it", key)
     return checked(Grid(points=points, seeds=seeds, options=options, unit_trials=unit_trials, own=own))
@@ -316,8 +316,8 @@ def _options_of(sweep: Sweep) -> Options:
         calibrate=sweep.calibrate, evpi=bool(sweep.evpi))
 
 
-def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tuple[World, list[str]]]:
-    """Each world of a sweep with each combination of values, and the variant's parts."""
+def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tuple[World, dict[str, str]]]:
+    """Each world of a sweep with each combination of values, and the variant's settings."""
     files: dict[str, Path] = {}
     from_file: dict[str, World] = {}
     for path in sweep.worlds:
@@ -343,7 +343,7 @@ def _worlds_of(sweep: Sweep, vary: Mapping[str, Sequence[Any]]) -> Iterator[tupl
                                       "given twice; give it once")
             yield (_sharing(adapted(world, sweep.scenarios, sweep.margin, sweep.plan_failure, sweep.execute_failure,
                                     sweep.interaction, sweep.departures), from_file),
-                   [f"{key}={json.dumps(value)}" for key, value in values.items()])
+                   {key: json.dumps(value) for key, value in values.items()})
 
 
 def _effective(world: World, options: Options) -> tuple[int, str]:

@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from sva_bench.analysis.calibration_table import CALIBRATION_COLUMNS, calibration_rows
-from sva_bench.analysis.compared_values import settings_in, shown_value
+from sva_bench.analysis.compared_values import other_settings, shown_value, variant_of
 from sva_bench.analysis.over_maps import BatchSummary
 from sva_bench.analysis.statistics import sample_mean
 from sva_bench.batch.folder import write
@@ -45,11 +45,13 @@ def write_tables(folder: Path, summary: BatchSummary) -> None:
         BadInput: If they cannot be written.
     """
     keys, means = _keys_of(summary), _means_of(summary)
+    settings = summary.settings
     maps = [[row.world, row.variant, row.scenario, row.seeds, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct,
-             *means[row.variant, row.scenario][row.world], *_values(row.variant, keys)] for row in summary.maps]
+             *means[row.variant, row.scenario][row.world], *_values(settings.get(row.variant, {}), keys)]
+            for row in summary.maps]
     over = [[row.variant, row.scenario, row.maps, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct.mean,
-             *_ends(row.vss_pct.ci95), *_over(means[row.variant, row.scenario].values()), *_values(row.variant, keys)]
-            for row in summary.aggregate]
+             *_ends(row.vss_pct.ci95), *_over(means[row.variant, row.scenario].values()),
+             *_values(settings.get(row.variant, {}), keys)] for row in summary.aggregate]
     curves = [[unit.world, unit.variant, unit.seed, *row] for unit in summary.units
               for row in calibration_rows(unit.scenarios)]
     if curves:
@@ -68,11 +70,10 @@ def write_tables(folder: Path, summary: BatchSummary) -> None:
 
 def _keys_of(summary: BatchSummary) -> list[str]:
     """The varied keys, each of which is a column."""
-    return list(dict.fromkeys(key for variant in summary.variants for key in settings_in(variant)))
+    return list(dict.fromkeys(key for settings in summary.settings.values() for key in settings))
 
 
-def _values(variant: str, keys: Sequence[str]) -> list[str]:
-    settings = settings_in(variant)
+def _values(settings: Mapping[str, str], keys: Sequence[str]) -> list[str]:
     return [shown_value(settings[key]) if key in settings else "" for key in keys]
 
 
@@ -103,14 +104,15 @@ def _compared(summary: BatchSummary, keys: Sequence[str]) -> list[list[object]]:
     """A row for each scenario and value of each key that is compared."""
     rows: list[list[object]] = []
     for found in summary.compared:
+        by_place = {(variant_of(other_settings(each, found.key)), each[found.key]): each
+                    for each in summary.settings.values() if found.key in each}
         for row in found.rows:
             figures = [cell for figure in (row.executed, row.vss) for cell in (figure.mean, *_ends(figure.ci95))]
             gains = [cell for gain in (row.gain, row.vss_gain) for cell in ([None] * 5 if gain is None else [
                 gain.mean, *_ends(gain.ci95), *_ends(gain.ci95_adjusted)])]
-            settings = {**settings_in(row.others), found.key: row.value}
             rows.append([found.key, shown_value(found.reference), shown_value(row.value), row.scenario, row.others,
                          found.sample, row.maps, *figures, *gains,
-                         *(shown_value(settings[key]) if key in settings else "" for key in keys)])
+                         *_values(by_place[row.others, row.value], keys)])
     return rows
 
 

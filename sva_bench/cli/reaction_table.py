@@ -9,7 +9,16 @@ from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.summaries import ComparisonSummary, Summary
 from sva_bench.cli.sheets import Column, Sheet, print_sheet
 from sva_bench.report.compared_reactions import given_reacting, reaction_lines
-from sva_bench.report.reaction_shares import doubted, lead_pct, recourse_pct, tell, vss_pct, without_pct
+from sva_bench.report.reaction_shares import (
+    difference_pct,
+    doubted,
+    lead_of,
+    leads,
+    recourse_pct,
+    tell,
+    vss_pct,
+    without_pct,
+)
 from sva_bench.report.reaction_wording import (
     GivenReacting,
     Reacting,
@@ -33,8 +42,8 @@ def print_reactions(summary: Summary, console: Console, *, wide: bool = False) -
         print_sheet(reaction_table([row for row in rows if row.reaction.policy == policy]), console, wide=wide,
                     apart=True)
     console.print("Adds: value of recourse of the stochastic and the deterministic plan; in per cent, of its value "
-                  "without reaction. VSS: in per cent of the stochastic plan's value. Lead: of the best plan tried "
-                  "over the next, in per cent of its own value. All in incentive where the value in question is too "
+                  "without reaction. VSS, and the lead of the best plan tried over the next: in per cent of the "
+                  "stochastic plan's value. All in incentive where the value in question is too "
                   "little for per cent. Orders change: in so many per cent of missions. "
                   f"{DOUBTED}: not distinguishable from zero.", highlight=False)
     for said in (*map(str, reaction_answers(summary)), *reaction_assumptions(summary)):
@@ -90,7 +99,7 @@ def reaction_table(rows: list[Reacting]) -> Sheet:
             cells.append([scenario.name, "none", _vss(reaction, without), *[""] * 5])
         told = reaction.best.over is not None
         cells.append(["", reaction.news, _vss(reaction, vss), _mean(sto), _mean(det),
-                      reaction.best.plan if told else "all alike", _mean(lead) if told else "", changed(reaction)])
+                      _best(reaction), _mean(lead) if told else "", changed(reaction)])
         if number == len(rows) - 1 or rows[number + 1].scenario is not scenario:
             ends.add(len(cells) - 1)
     return Sheet(title=f"If the team re-plans (policy {rows[0].reaction.policy}), {unit}", rows=cells,
@@ -103,10 +112,17 @@ def reaction_table(rows: list[Reacting]) -> Sheet:
 
 def _figures(reaction: ReactionResult) -> list[tuple[Estimate | None, Estimate]]:
     """VSS with and without reaction, what it adds to the two plans, and the lead: in per cent, and in incentive."""
-    gains, best = reaction.value_of_recourse, reaction.best
+    gains, ahead = reaction.value_of_recourse, lead_of(reaction)
     return [(vss_pct(reaction), reaction.vss.executed), (without_pct(reaction), reaction.vss_without_reaction),
             *((recourse_pct(reaction, name), gains[name]) for name in ("stochastic", "deterministic")),
-            (lead_pct(reaction), Estimate(mean=best.mean, ci95=best.ci95))]
+            (difference_pct(reaction, ahead), ahead)]
+
+
+def _best(reaction: ReactionResult) -> str:
+    """The best plan tried, where it leads distinguishably."""
+    if reaction.best.over is None:
+        return "all alike"
+    return reaction.best.plan if leads(reaction) or reaction.best.ci95 is None else "undecided"
 
 
 def _vss(reaction: ReactionResult, found: Estimate | None) -> str:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 
 from sva_bench.analysis.calibration import Calibration, Tried
 from sva_bench.analysis.results import Estimate, Share
 from sva_bench.analysis.scenarios import ScenarioSummary
 from sva_bench.analysis.summaries import Summary
 from sva_bench.files.printable import counted
-from sva_bench.interrupts import holding_back_ctrl_c
-from sva_bench.report.page import figure, heading, note, table
-from sva_bench.report.wording import per_cent, with_interval
+from sva_bench.palette import PLANS, hex_of
+from sva_bench.report.page import details, heading, note, table
+from sva_bench.report.panels import Axes, Panel, Point, panels
+from sva_bench.report.wording import listed, per_cent, with_interval
 
 CALIBRATION_HEAD = ("scenario", "made for costs at", "promised", "executed by the twin", "missions that go wrong [%]",
                     "noise draws", "")
@@ -24,34 +25,52 @@ def calibration_lines(summary: Summary) -> list[str]:
             for scenario in summary.scenarios if (found := scenario.calibration) is not None]
 
 
-def against_nominal(scenario: ScenarioSummary) -> str:
-    """In one sentence: what the calibrated plan promises and earns against the nominal one; nothing without one."""
-    found = scenario.calibration
-    if found is None:
+def calibration_told(summary: Summary) -> str:
+    """In which scenarios the share that was asked for is met, and in which it is missed; nothing without one."""
+    found = [(s, s.calibration) for s in summary.scenarios if s.calibration is not None]
+    if not found:
         return ""
-    if found.is_nominal:
-        return "The nominal plan is the calibrated one." if found.reached else \
-            f"The share asked for, {share_pct(found)}, is not reached; the plan shown in its place is the nominal one."
-    plan, nominal = scenario.plans["calibrated"].executed, scenario.stochastic.executed
-    what = "The calibrated plan promises" if found.reached else \
-        f"The share asked for, {share_pct(found)}, is not reached; the plan shown in its place promises"
-    return (f"{what} {found.promised:.1f} in place of the nominal plan's {found.nominal.promised:.1f}, and earns, "
-            f"executed, {with_interval(plan)} in place of {with_interval(nominal)}.")
+    goal = share_pct(found[0][1])
+    if not goal:
+        return "Plans were made for the greatest executed value by the twin."
+    by_verdict: dict[str, list[str]] = {}
+    for scenario, calibration in found:
+        by_verdict.setdefault(verdict_of(scenario, calibration), []).append(scenario.name)
+    told = "; ".join(f"{verdict} in {listed(names)}" for verdict, names in by_verdict.items())
+    return f"At most {goal} of missions were to go wrong though nobody fails: {told}."
+
+
+MET, MISSED = "met", "missed"
+_AS_EXECUTED = "met by the twin, missed as executed"
+
+
+def verdict_of(scenario: ScenarioSummary, found: Calibration) -> str:
+    """Whether a plan keeps the share that was asked for: by the twin, and as it was executed."""
+    if found.share is None:
+        return "greatest value"
+    if not found.reached:
+        return MISSED
+    bad = scenario.plans["calibrated"].bad
+    return MET if bad is None or bad.share <= found.share else _AS_EXECUTED
 
 
 def _executed_otherwise(summary: Summary, scenario: ScenarioSummary, found: Calibration) -> str:
     """Where more missions went wrong than were asked for though the twin proves the share: how that may be."""
     bad = scenario.plans["calibrated"].bad
-    if bad is None or found.share is None or not found.reached or bad.share <= found.share:
+    if bad is None or found.share is None or verdict_of(scenario, found) != _AS_EXECUTED:
         return ""
+    return (f" Executed, {per_cent(100 * bad.share)} of missions go wrong, more than the {share_pct(found)} asked for: "
+            f"{_why_otherwise(summary, found.share)}.")
+
+
+def _why_otherwise(summary: Summary, share: float) -> str:
     one, reasons = 1 / summary.rollouts, []
-    if one > found.share:
+    if one > share:
         reasons.append(f"this run has {counted(summary.rollouts, 'noise draw')}, of which a single bad one is "
                        f"{per_cent(100 * one)} of missions")
     if summary.fidelity != "kinematic":
         reasons.append("physics may do what the twin doesn't see")
-    return (f" Executed, {per_cent(100 * bad.share)} of missions go wrong, more than the {share_pct(found)} asked for: "
-            f"{'; and '.join(reasons) or 'this run has other noise draws than those that prove the share'}.")
+    return "; and ".join(reasons) or "this run has other noise draws than those that prove the share"
 
 
 def _told(found: Calibration) -> str:
@@ -119,20 +138,75 @@ def _remark(found: Calibration, tried: Tried) -> str:
 
 def calibration_section(summary: Summary) -> list[str]:
     """The section of the page; nothing where no plan was calibrated."""
-    scenarios = summary.scenarios
-    if not any(scenario.calibration for scenario in scenarios):
+    found = [(s, s.calibration) for s in summary.scenarios if s.calibration is not None]
+    if not found:
         return []
-    with holding_back_ctrl_c():
-        from sva_bench.report import charts  # matplotlib takes its time to load
+    tried = details("What was tried, on the noise draws by which the plan was chosen", table(
+        CALIBRATION_HEAD[1:], [row[1:] for row in curve_rows(summary.scenarios)], words=(0, 5),
+        sections=[s.name for s, calibration in found for _ in calibration.curve])
+        + note("By the noisy twin, under noise draws of its own. A plan that can't prove the share any more is left "
+               "early, so it has fewer draws."))
+    return [heading("Calibrated plans"), _verdicts(found), *map(note, _explained(summary, found)),
+            _price(found), tried]
 
-    pictures = [figure(charts.calibration_curve(scenario.name, scenario.calibration),
-                       f"{scenario.name}: each point is a plan; from right to left costs are raised.")
-                for scenario in scenarios if scenario.calibration and len(scenario.calibration.curve) > 1]
-    return [heading("Calibrated plans"), *(note(line) for line in calibration_lines(summary)),
-            *(["<div class=pair>", *pictures, "</div>"] if pictures else []),
-            table(CALIBRATION_HEAD, curve_rows(scenarios), words=(0, 1, 6),
-                  caption="What was tried, on the noise draws by which the plan was chosen"),
-            note("A mission goes wrong where some robot runs out of fuel, is late or gets stuck though none fails by "
-                 "draw. All by the noisy twin, under noise draws of its own; the sentences above are of draws that the "
-                 "plan was not chosen by. A plan that can't prove the share any more is left early, so it has fewer "
-                 "draws.")]
+
+def _verdicts(found: Sequence[tuple[ScenarioSummary, Calibration]]) -> str:
+    """The verdict on each scenario, and the shares that it rests on."""
+    goal = share_pct(found[0][1])
+    rows = [[s.name, *(_both_verdicts(s, c) if goal else ()), _plain(c.bad),
+             "" if (bad := s.plans["calibrated"].bad) is None else _plain(bad),
+             _plain(c.nominal.bad), c.chosen.name, f"{c.promised:.1f}", f"{c.nominal.promised:.1f}"] for s, c in found]
+    head = ["scenario", *(["by the twin", "as executed"] if goal else []), "wrong by the twin [%]",
+            "wrong as executed [%]", "nominal plan, by the twin [%]", "made for costs at", "promises",
+            "nominal plan promises"]
+    asked = f": at most {goal} asked for" if goal else ""
+    return table(head, rows, words=(0, *((1, 2, 6) if goal else (4,))),
+                 caption=f"Missions that go wrong though nobody fails{asked}. In them some robot runs out of fuel, is "
+                         "late or gets stuck; the nominal plan is the stochastic one")
+
+
+def _both_verdicts(scenario: ScenarioSummary, found: Calibration) -> tuple[str, str]:
+    """By the twin, and as executed, where the latter is known."""
+    bad = scenario.plans["calibrated"].bad
+    executed = "" if bad is None or found.share is None else MET if bad.share <= found.share else MISSED
+    return (MET if found.reached else MISSED), executed
+
+
+def _plain(bad: Share) -> str:
+    return with_interval(_in_per_cent(bad))
+
+
+def _explained(summary: Summary, found: Sequence[tuple[ScenarioSummary, Calibration]]) -> Iterator[str]:
+    """What a verdict other than that the share is met is due to."""
+    above = [s.name for s, c in found if verdict_of(s, c) == _AS_EXECUTED]
+    share = found[0][1].share
+    if above and share is not None:
+        yield f"Missed as executed in {listed(above)}: {_why_otherwise(summary, share)}."
+    for scenario, calibration in found:
+        if not calibration.reached:
+            yield f"{scenario.name}: {_told(calibration)}"
+    if nominal := [s.name for s, c in found if c.is_nominal and c.reached]:
+        yield f"In {listed(nominal)} the nominal plan is the one that was asked for."
+
+
+def _price(found: Sequence[tuple[ScenarioSummary, Calibration]]) -> str:
+    """What caution costs: plans by how often they go wrong and what they are worth."""
+    colour = hex_of(PLANS["calibrated"])
+    shown = []
+    for scenario, calibration in found:
+        points: dict[tuple[float, float], list[Point]] = {}
+        for tried in calibration.curve:
+            at = 100 * tried.bad.share
+            said = f"{tried.name}: worth {tried.executed:.1f}, promises {tried.promised:.1f}, {per_cent(at)} go wrong"
+            chosen = tried == calibration.chosen
+            points[at, tried.executed] = [
+                Point(x=at, y=tried.promised, said=said, shape="hollow", colour="var(--soft)"),
+                Point(x=at, y=tried.executed, said=said, colour=colour, ringed=chosen)]
+        if len(points) > 1:
+            shown.append(Panel(title=scenario.name, points=[point for pair in points.values() for point in pair],
+                               aim=None if calibration.share is None else 100 * calibration.share))
+    goal = ", dashed line: the share asked for" if share_pct(found[0][1]) else ""
+    return panels("Value of plans for higher and higher costs, by the share of missions that go wrong",
+                  Axes(x="missions that go wrong [%]", apart=True), shown,
+                  "The price of caution: each full dot is a plan, by how often it goes wrong and what it is worth by "
+                  f"the twin; hollow: what it promises; ring: the plan that was taken{goal}.")

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from sva_bench.analysis.calibration import Calibration
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
-from sva_bench.palette import PLANS, hex_of
 from sva_bench.report.canvas import Axes, chart
 from sva_bench.report.styles import robot_colour
 
@@ -43,38 +41,6 @@ def value_by_robot(scenarios: Sequence[AnyScenario], plan: str, beside: Sequence
 
     return chart(_name("robots", plan), f"Mean value of each robot in each scenario, {plan} plan",
                  (_width(len(scenarios), len(robots)), 3.6), draw)
-
-
-def calibration_curve(scenario: str, found: Calibration) -> str:
-    """Points on a line: what plans promise and what they are worth by how often they go wrong.
-
-    Args:
-        scenario: Its name.
-        found: Its calibration.
-    """
-    bad = [100 * tried.bad.share for tried in found.curve]
-    lines = {"promised": [tried.promised for tried in found.curve],
-             "executed by the twin": [tried.executed for tried in found.curve]}
-
-    def draw(axes: Axes) -> None:
-        for number, (name, values) in enumerate(lines.items()):
-            colour, shape = ("#000000", hex_of(PLANS["calibrated"]))[number], marker(number)
-            # Where both coincide the first must still be seen: thin and dashed over wide, small on large.
-            over = {"linewidth": 1.4, "linestyle": "--", "markersize": 4} if number else {
-                "linewidth": 4.0, "markersize": 9}
-            axes.plot(bad, values, color=colour, marker=shape, label=name, **over)
-        axes.plot(100 * found.chosen.bad.share, found.chosen.executed, marker="o", markersize=14, fillstyle="none",
-                  color="black", linestyle="none", label="chosen" if found.reached else "shown")
-        if found.share is not None:
-            axes.axvline(100 * found.share, color="#444", linewidth=1, linestyle="--", label="asked for")
-        axes.set_xlabel("missions that go wrong [%]")
-        axes.set_ylabel("value [world file's units]")
-        axes.set_title(f"{scenario}: the price of caution")
-        axes.grid(color="#ddd")
-        _legend(axes)
-
-    return chart(_name("calibration", scenario), f"{scenario}: promised and executed value of plans for higher and "
-                 "higher costs, by the share of missions that go wrong", (4.8, 3.6), draw)
 
 
 def legs_driven(planned_s: FloatArray, driven_s: FloatArray, robots: Sequence[str], order: Sequence[str]) -> str:
@@ -156,11 +122,6 @@ _LEGEND_MARGIN_IN = 1.5  # the axis beside it, and its mark
 
 def _offset(number: int, of: int) -> float:
     return 0.8 * ((number + 0.5) / of - 0.5)
-
-
-def marker(number: int) -> str:
-    """Shape of the points of a series."""
-    return _MARKERS[number % len(_MARKERS)]
 
 
 def _hatch(number: int) -> str:

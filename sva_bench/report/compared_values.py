@@ -64,6 +64,15 @@ def compared_table(found: KeyComparison) -> tuple[list[str], tuple[int, ...], li
     return head, tuple(range(2 + others)), cells
 
 
+def values_table(found: KeyComparison) -> tuple[list[str], list[list[str]]]:
+    """Headings and cells of a page's table, whose rows stand below their scenario."""
+    counts = len({row.maps for row in found.rows}) > 1
+    head = ["value", "more [95 %]", "executed [95 %]", "VSS, more [95 %]", "VSS [95 %]", *(["maps"] if counts else [])]
+    cells = [[shown_value(row.value), _gain(found, row, row.gain), with_interval(row.executed),
+              _gain(found, row, row.vss_gain), with_interval(row.vss), str(row.maps)][:len(head)] for row in found.rows]
+    return head, cells
+
+
 def _gain(found: KeyComparison, row: ValueRow, gain: ValueGain | None) -> str:
     if row.value == found.reference:
         return "the reference"

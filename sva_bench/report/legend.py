@@ -87,7 +87,7 @@ def _of_meetings(world: World, overlays: Overlays) -> list[Any]:
                                   markeredgecolor="white", label=counted(count, what, MARKS_OF_MANY[kind])))
     if any(mark.stuck for mark in overlays.marks):
         handles.append(Line2D([], [], linestyle="none", marker="o", color="none", markersize=11, markeredgewidth=1.6,
-                              markeredgecolor=MARKS["contact"][1], label="robots ended here"))
+                              markeredgecolor=MARKS["contact"][1], label="a robot got stuck here"))
     return handles
 
 

@@ -22,15 +22,14 @@ def meetings_section(content: Content) -> list[str]:
     parts = [heading("What robots met on their way")]
     if met["contact"]:
         parts.append(table(
-            ["scenario", "plan", "robot", "touched", "contacts", "noise draws", "longest [s]", "stuck there"],
+            ["scenario", "plan", "robot", "touched", "contacts", "noise draws", "longest [s]", "stuck [draws]"],
             _most(_by(met["contact"], ("robot", "solid"), shown, lambda mine: [
-                f"{max(row['lasts_s'] for row in mine):.1f}",
-                str(len(_draws([row for row in mine if row["stuck"]])))])),
+                f"{max(row['lasts_s'] for row in mine):.1f}", _stuck(mine)])),
             words=(0, 1, 2, 3), caption="Obstacles that hulls touched, numbered as in the world file"))
     if met["collision"]:
         parts.append(table(
-            ["scenario", "plan", "robots", "collisions", "noise draws", "ended a robot"],
-            _most(_by(met["collision"], ("robots",), shown, lambda mine: [str(sum(row["stuck"] for row in mine))])),
+            ["scenario", "plan", "robots", "collisions", "noise draws", "stuck [draws]"],
+            _most(_by(met["collision"], ("robots",), shown, lambda mine: [_stuck(mine)])),
             words=(0, 1, 2), caption="Robots that collided"))
     if met["wait"]:
         parts.append(_waits_table(met["wait"], shown, None if content.world.meets else content.summary.rollouts))
@@ -38,7 +37,13 @@ def meetings_section(content: Content) -> list[str]:
     return [*parts, note("Each leg counts once in each mission that was played; missions alike are played once."
                          if content.world.meets else
                          "Each leg counts once under each noise draw, also one that a robot had to leave to others "
-                         "since its mission had ended before.")]
+                         "since its mission had ended before: a robot may be stuck here that in no mission came so "
+                         'far, and isn\'t under "How the robots ended".')]
+
+
+def _stuck(mine: Rows) -> str:
+    """Under how many noise draws a robot got stuck."""
+    return str(len(_draws([row for row in mine if row["stuck"]])))
 
 
 def _waits_table(waits: Rows, shown: ShownNames, draws: int | None) -> str:

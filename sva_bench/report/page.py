@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -50,7 +51,7 @@ def table(
     def row(cells: Sequence[str], tag: str) -> str:
         scope = ' scope="col"' if tag == "th" else ""
         return "<tr>" + "".join(
-            f"<{tag}{scope}{kind(cell) if k in words else ''}>{text(cell if k in words else _unbroken(cell))}</{tag}>"
+            f"<{tag}{scope}{kind(cell) if k in words else ''}>{text(cell) if k in words else _figures(cell)}</{tag}>"
             for k, cell in enumerate(cells)) + "</tr>"
 
     def kind(cell: str) -> str:
@@ -62,24 +63,34 @@ def table(
         return f'<tr><th scope="rowgroup" class="text section" colspan={len(head)}>{text(sections[k])}</th></tr>'
 
     body = "".join(above(k) + row(cells, "td") for k, cells in enumerate(rows))
-    whole = f"<div class=wide tabindex=0><table><thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table></div>"
+    kept = "<table class=few>" if len(rows) <= _FEW else "<table>"
+    whole = f"<div class=wide tabindex=0>{kept}<thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table></div>"
     # No caption of the table's own: it would be as wide as the table, and scroll out of sight with it.
-    return f"<figure class=rows><figcaption>{text(caption)}</figcaption>{whole}</figure>" if caption else whole
+    return f"<figure class=rows><figcaption>{sentence(caption)}</figcaption>{whole}</figure>" if caption else whole
+
+
+def table_of_html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of words, whose cells are HTML."""
+    above = "".join(f'<th scope="col" class=text>{text(word)}</th>' for word in head)
+    body = "".join("<tr>" + "".join(f"<td class=text>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return (f"<div class=wide tabindex=0><table class=few><thead><tr>{above}</tr></thead><tbody>{body}</tbody></table>"
+            "</div>")
 
 
 CONTENTS = "<!--contents-->"
 """Where a page has its contents."""
+_FEW = 24  # rows that print keeps on one sheet
 _LONG = 40  # letters from which on a name or a route may go on in a second line
 
 
-def _unbroken(cell: str) -> str:
+def _figures(cell: str) -> str:
     """Figures that break nowhere but before an interval or a remark: ``39.0 [36.1, 41.9] (1 map)``."""
-    return re.sub(r"(?<=[0-9]) (?![\[(])|(?<=[0-9],) ", "\u00a0", cell)
+    return text(re.sub(r"(?<=[0-9]) (?![\[(])|(?<=[0-9],) ", "\u00a0", typeset(cell)))
 
 
 def figure(picture: str, caption: str) -> str:
     """A picture (SVG) with what it shows."""
-    return f"<figure>{picture}<figcaption>{text(caption)}</figcaption></figure>"
+    return f"<figure>{picture}<figcaption>{sentence(caption)}</figcaption></figure>"
 
 
 def heading(words: str) -> str:
@@ -112,9 +123,29 @@ def note(words: str) -> str:
     return f"<p class=note>{sentence(words)}</p>"
 
 
+def command(words: Sequence[str]) -> str:
+    """A command line that breaks between its words only, or within one that is longer than a line."""
+    return "<pre><code>" + " ".join(
+        f"<span class=whole>{text(shlex.quote(word))}</span>" for word in words) + "</code></pre>"
+
+
 def sentence(words: str) -> str:
-    """As it stands in a paragraph: a line never begins with a per cent sign."""
-    return text(re.sub(r"(?<=[0-9]) %", "\u00a0%", words))
+    """As it stands in a paragraph: a line never begins with a per cent sign, nor ends within an option's name."""
+    kept = text(typeset(re.sub(r"(?<=[0-9]) %", "\u00a0%", words)))
+    return _WHOLE.sub(r"<span class=whole>\g<0></span>", kept)
+
+
+_WHOLE = re.compile(r"(?<![\w-])--[a-z][a-z-]*|[0-9.]+–[0-9.]+")
+"""Options and ranges break nowhere. Copied from a page, an option must be one still: so no other hyphens in it."""
+
+
+def typeset(words: str) -> str:
+    """Figures with a true minus sign, which a zero never has; names, options and dates keep their hyphens."""
+    return _MINUS.sub("\u2212", _MINUS_ZERO.sub("", words))
+
+
+_MINUS = re.compile(r"(?<![\w.\-/)\]])-(?=\.?[0-9])")
+_MINUS_ZERO = re.compile(r"(?<![\w.\-/)\]])-(?=0(?:\.0+)?(?!\.?[0-9e]))")
 
 
 def text(value: object) -> str:

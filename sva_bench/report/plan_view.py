@@ -18,6 +18,7 @@ from sva_bench.choices import SiteKind
 from sva_bench.recording.meetings import floors_of
 from sva_bench.report.ground import corners, shown_of, tick_step, within
 from sva_bench.report.labels import place_labels
+from sva_bench.report.mark_labels import Box
 from sva_bench.report.page import text
 from sva_bench.report.stands import stands_of
 from sva_bench.report.styles import SITE_KINDS
@@ -80,8 +81,8 @@ class PlanView:
                  incentives: bool = False, drawn: bool = False) -> None:
         self.frame = frame_of(world)
         self._world, self._drawn = world, drawn
-        self._sites = _sites(world, self.frame, list(lines_m), np.empty((0, 2)) if busy is None else busy,
-                             incentives=incentives)
+        self._sites, self.taken = _sites(world, self.frame, list(lines_m), np.empty((0, 2)) if busy is None else busy,
+                                         incentives=incentives)
 
     def picture(self, title: str, inner: str = "", above: str = "") -> str:
         """A map as SVG.
@@ -188,14 +189,16 @@ def _png(occupied: BoolArray) -> bytes:
 
 
 def _sites(world: World, frame: Frame, lines_m: Sequence[FloatArray], busy: FloatArray, *, incentives: bool
-           ) -> str:
-    """Markers of all sites with their tooltips, and their names."""
+           ) -> tuple[str, list[Box]]:
+    """Markers of all sites with their tooltips, and their names; and the room that all of them take."""
     at = frame.at(np.array([[site.x_m, site.y_m] for site in world.sites]))
-    parts = []
+    parts, taken = [], list[Box]()
     for site, (x, y) in zip(world.sites, at.tolist(), strict=True):
+        size = _RADII[site.kind]
+        taken.append((x - size, y - size, x + size, y + size))
         parts.append(f"<g class={site.kind}><title>{text(_told(world, site))}</title>{_marker(site.kind, x, y)}</g>")
     if len(world.sites) > _MOST_LABELS:
-        return "".join(parts)
+        return "".join(parts), taken
     labels = [[site.name, *(_earned(world, site) if incentives and site.kind == "poi" else [])] for site in world.sites]
     sizes = np.array([[max([_LETTER * len(name), *(_SMALL * len(words) for words in small)]), _LINE * (1 + len(small))]
                       for name, *small in labels])
@@ -209,7 +212,9 @@ def _sites(world: World, frame: Frame, lines_m: Sequence[FloatArray], busy: Floa
         top = y - _LINE * len(lines) / 2 + 0.78 * _LINE
         parts += [f'<text x="{_n(x)}" y="{_n(top + k * _LINE)}"{" class=small" if k else ""}>{text(words)}</text>'
                   for k, words in enumerate(lines)]
-    return "".join(parts)
+    taken += [(x - w / 2, y - h / 2, x + w / 2, y + h / 2)
+              for (x, y), (w, h) in zip(centres.tolist(), sizes.tolist(), strict=True)]
+    return "".join(parts), taken
 
 
 def _dense(points: FloatArray, step: float = 6.0) -> FloatArray:

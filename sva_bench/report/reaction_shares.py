@@ -48,14 +48,20 @@ def recourse_pct(reaction: ReactionFigures, plan: str) -> Estimate | None:
     return in_per_cent(gain, value_without(reaction, plan))
 
 
-def of_best_pct(reaction: ReactionResult, gain: Estimate) -> Estimate | None:
-    """A lead of the best plan in per cent of its value."""
-    return in_per_cent(gain, reaction.plans[reaction.best.plan].executed.mean)
+def difference_pct(reaction: ReactionResult, gain: Estimate) -> Estimate | None:
+    """A difference of two plans with the reaction in per cent of the stochastic plan's value, as VSS is."""
+    return in_per_cent(gain, reaction.plans["stochastic"].executed.mean)
 
 
-def lead_pct(reaction: ReactionResult) -> Estimate | None:
-    """Lead of the best plan over the next in per cent of its value."""
-    return of_best_pct(reaction, Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95))
+def lead_of(reaction: ReactionResult) -> Estimate:
+    """How far the best plan tried is ahead of the next."""
+    return Estimate(mean=reaction.best.mean, ci95=reaction.best.ci95)
+
+
+def leads(reaction: ReactionResult) -> bool:
+    """Whether the best plan tried is distinguishably ahead of the next: noise may turn that."""
+    ahead = lead_of(reaction)
+    return reaction.best.over is not None and ahead.mean > 0 and ahead.excludes_zero
 
 
 def tell(found: Iterable[Estimate | None]) -> bool:

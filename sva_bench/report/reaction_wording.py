@@ -11,7 +11,7 @@ from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.summaries import Summary
 from sva_bench.choices import News, PolicyName
 from sva_bench.files.printable import counted
-from sva_bench.report.reaction_shares import MOST_PER_CENT, lead_pct
+from sva_bench.report.reaction_shares import MOST_PER_CENT, difference_pct, lead_of, leads
 from sva_bench.report.wording import listed, per_cent
 
 _MOST_NAMED = 6
@@ -71,20 +71,11 @@ def reaction_answers(summary: Summary) -> list[Answer]:
     News that come to the same, in the digits shown, share an answer; no news has its own.
     """
     found: dict[tuple[PolicyName, bool, tuple[str, ...]], list[News]] = {}
-    beside = None  # the first answer with a VSS without reaction that is another figure than the run's
     for policy, news in dict.fromkeys((row.reaction.policy, row.reaction.news) for row in reacting(summary)):
         rows = [row for row in reacting(summary) if (row.reaction.policy, row.reaction.news) == (policy, news)]
         said = tuple(part for part in (_worth(rows), _recourse(rows), _best(rows), _nothing_made(rows)) if part)
-        key = policy, news == "never", said
-        found.setdefault(key, []).append(news)
-        if beside is None and any(r.histories == "enumerated" and r.vss_without_reaction.excludes_zero
-                                  and amount(r.vss_without_reaction) != per_cent(s.vss.executed_pct) for s, r in rows):
-            beside = key
-    return [Answer(condition(key[0], news), (f"{key[2][0][:-1]}{_WITHOUT}.", *key[2][1:]) if key == beside else key[2])
-            for key, news in found.items()]
-
-
-_WITHOUT = " (without reaction: over all histories; the figures above are of the trials drawn)"
+        found.setdefault((policy, news == "never", said), []).append(news)
+    return [Answer(condition(policy, news), said) for (policy, _, said), news in found.items()]
 
 
 def condition(policy: PolicyName, news: Sequence[News]) -> str:
@@ -149,16 +140,16 @@ def _worth(rows: Sequence[Reacting]) -> str:
     said = []
     if pays:
         said.append("planning for failures is worth " + few_of(
-            [f"{_amount_of_vss(r)} in {s.name}{_without(r)}" for s, r in pays]))
+            [f"{_amount_of_vss(row.reaction)} in {row.scenario.name}{_without(row)}" for row in pays]))
     if loses:
         said.append("the deterministic plan is worth more in " + few_of(
-            [f"{s.name} (VSS {_amount_of_vss(r)}{_without(r)})" for s, r in loses]))
+            [f"{row.scenario.name} (VSS {_amount_of_vss(row.reaction)}{_without(row)})" for row in loses]))
     if even:
         said.append("the value of planning for failures is not distinguishable from zero in " + few_of(
-            [s.name + _where_uneven(r) for s, r in even]))
+            [row.scenario.name + _where_uneven(row) for row in even]))
     if idle := [s.name for s, r in zero if _is_worthless(r)]:
         said.append(f"every plan is worth exactly nothing in {few_of(idle)}, whether the team reacts or not")
-    if level := [s.name + _where_uneven(r) for s, r in zero if not _is_worthless(r)]:
+    if level := [row.scenario.name + _where_uneven(row) for row in zero if not _is_worthless(row.reaction)]:
         said.append(f"both plans are worth exactly the same in {few_of(level)}")
     if unsure:
         said.append("too few noise draws give an interval in " + few_of([s.name for s, _ in unsure]))
@@ -198,23 +189,49 @@ def _is_worthless(reaction: ReactionFigures) -> bool:
         *(Estimate(mean=gain.mean, ci95=gain.ci95) for gain in reaction.value_of_recourse.values())))
 
 
-def _without(reaction: ReactionResult) -> str:
-    """What is to be said of the VSS without reaction, behind that with it."""
+def _without(row: Reacting) -> str:
+    """What is to be said of the VSS without reaction, behind that with it.
+
+    The run has it of its own trials, in another figure if these are other missions: two figures of one thing would
+    only puzzle, so what is said then is whether planning pays.
+    """
+    scenario, reaction = row
     found = reaction.vss_without_reaction
     if found.excludes_zero and amount(found) == _amount_of_vss(reaction):
-        return ", as without reaction"
+        return ", as without reaction" + ("" if _is_the_runs(scenario, reaction) else _ANOTHER.format(
+            "all histories" if reaction.histories == "enumerated" else "the missions played",
+            amount(_of_the_run(scenario))))
     if found.excludes_zero:
-        return f" in place of {amount(found)}"
+        if _is_the_runs(scenario, reaction):
+            return f" in place of {amount(found)}"
+        return ", where it pays without reaction" if found.mean > 0 else ", where it costs without reaction"
     if found.ci95 is None:
         return f" in place of {amount(found)}, which has no interval"
     return " in place of nothing" if found.ci95 == (0.0, 0.0) else \
         ", where without reaction it is not distinguishable from zero"
 
 
-def _where_uneven(reaction: ReactionResult) -> str:
+def _is_the_runs(scenario: ScenarioSummary, reaction: ReactionResult) -> bool:
+    """Whether the VSS without reaction, as it is shown, is the figure that the run's own trials gave."""
+    return amount(reaction.vss_without_reaction) == amount(_of_the_run(scenario))
+
+
+def _of_the_run(scenario: ScenarioSummary) -> Gain:
+    vss = scenario.vss
+    return Gain(mean=vss.executed.mean, ci95=vss.executed.ci95, pct=vss.executed_pct)
+
+
+_ANOTHER = " (that is over {}; the trials drawn gave {})"
+
+
+def _where_uneven(row: Reacting) -> str:
     """The VSS without reaction where that is another than none, in brackets."""
+    scenario, reaction = row
     found = reaction.vss_without_reaction
-    return f" (without reaction {amount(found)})" if found.excludes_zero else ""
+    if not found.excludes_zero:
+        return ""
+    return f" (without reaction {amount(found)})" if _is_the_runs(scenario, reaction) else \
+        f" (without reaction it {'pays' if found.mean > 0 else 'costs'})"
 
 
 def _amount_of_vss(reaction: ReactionResult) -> str:
@@ -252,11 +269,13 @@ def gained(gain: Gain) -> str:
 
 
 def _best(rows: Sequence[Reacting]) -> str:
-    """Which of the plans tried is the best for the reaction, and by how much."""
-    said = [f"{_level(r)} in {s.name}" if r.best.ci95 == (0.0, 0.0) else
-            f"the {r.best.plan} in {s.name} ({lead(r)} {r.best.over})"
-            for s, r in rows if r.best.over is not None and not _is_worthless(r)]
-    return f"The best plan for it, of those tried: {few_of(said)}." if said else ""
+    """Which of the plans tried is the best for the reaction, and by how much; none is where none leads."""
+    told = [(s, r) for s, r in rows if r.best.over is not None and not _is_worthless(r)]
+    said = [f"{_level(r)} in {s.name}" if r.best.ci95 == (0.0, 0.0) else f"the {r.best.plan} in {s.name} ({lead(r)})"
+            for s, r in told if r.best.ci95 == (0.0, 0.0) or leads(r)]
+    even = [s.name for s, r in told if r.best.ci95 not in ((0.0, 0.0), None) and not leads(r)]
+    return " ".join([*([f"The best plan for it, of those tried: {few_of(said)}."] if said else []),
+                     *([f"Which plan is best for it is not distinguishable in {few_of(even)}."] if even else [])])
 
 
 def _level(reaction: ReactionResult) -> str:
@@ -274,21 +293,11 @@ def _nothing_made(rows: Sequence[Reacting]) -> str:
 
 
 def lead(reaction: ReactionResult) -> str:
-    """How far the best plan is ahead of the next, in words that end before the next one's name."""
-    ahead, best = lead_pct(reaction), reaction.best
-    known = Estimate(mean=best.mean, ci95=best.ci95)
-    if not known.excludes_zero:
-        return "not distinguishable from the"
-    pct = None if ahead is None else ahead.mean
-    if (best.plan, best.over) == ("deterministic", "stochastic") and reaction.vss.distinguishable:
-        # It is the VSS just told: in per cent of the other plan it would be another figure.
-        pct = None if reaction.vss.executed_pct is None else -reaction.vss.executed_pct
-    told = pct is not None and abs(pct) <= MOST_PER_CENT
-    return f"{_signed(pct) if told and pct is not None else f'{known.mean:+.1f} of incentive'} over the"
-
-
-def _signed(pct: float) -> str:
-    return f"{'+' if pct > 0 else ''}{per_cent(pct)}"
+    """How far the best plan is ahead of the next, of which it is said that it is distinguishable."""
+    best = reaction.best
+    pct = difference_pct(reaction, lead_of(reaction))
+    told = f"{best.mean:+.1f} of incentive" if pct is None or pct.mean > MOST_PER_CENT else f"+{per_cent(pct.mean)}"
+    return f"{told} over the {best.over}"
 
 
 def few_of(words: Sequence[str], comma: str = ", ") -> str:
@@ -317,13 +326,12 @@ DEFINITIONS: tuple[tuple[str, str], ...] = (
     ("Value of recourse of x", "V(x, π) − V(x, none), by the same failures and noise, in per cent of V(x, none). What "
      "reacting adds to a plan; below zero where re-planning on what is known then turns out worse"),
     ("Best plan for π", "the plan with the greatest V(x, π) if all legs are driven as planned, of those tried: the two "
-     "plans and, with --anticipate, the anticipative one; another plan may be better still. Its lead is "
-     "over the next best of other routes, in per cent of its own value"),
-    ("VSS with recourse", "V(best, π) − V(deterministic, π), in per cent of V(best, π): what planning for failures is "
-     "worth if the plan may be made for the reaction. Not below zero but for noise, as the deterministic plan is among "
-     "those tried"),
-    ("Anticipation", "V(best, π) − V(stochastic, π), in per cent of V(best, π): what knowing of the reaction when "
-     "planning adds to planning for failures"),
+     "plans and, with --anticipate, the anticipative one; another plan may be better still. Its lead is over the next "
+     "best of other routes, as executed; where that holds zero, which plan is best is not distinguishable"),
+    ("VSS with recourse", "V(best, π) − V(deterministic, π): what planning for failures is worth if the plan may be "
+     "made for the reaction. Not below zero but for noise, as the deterministic plan is among those tried"),
+    ("Anticipation", "V(best, π) − V(stochastic, π): what knowing of the reaction when planning adds to planning for "
+     "failures"),
     ("Orders changed", "share of missions in which the orders of some robot change that lives to take them"),
 )
 """What each figure is."""

@@ -55,12 +55,17 @@ def reaction_table(rows: Sequence[ReactionOverMaps], *, narrow: bool
     plans = list(dict.fromkeys(name for row in rows for name in row.value_of_recourse))
     figures = ["VSS", *(f"recourse, {name}" for name in plans), "VSS with recourse", "anticipation"]
     shown = [f"{name}\n[%]" for name in figures] if narrow else [
-        heading for name in figures for heading in (name, f"{name} [%]")]
+        heading for name in figures for heading in ((name, f"{name} [%]") if name not in _OF_BEST else (name,))]
     cells = [[*([row.variant] if varied else []), row.scenario, f"{row.policy}, {row.news}", str(row.maps),
-              *(cell for gain in (row.vss, *(row.value_of_recourse.get(name) for name in plans),
-                                  row.vss_with_recourse, row.anticipation) for cell in _gain(gain, narrow=narrow))]
-             for row in rows]
+              *(cell for name, gain in zip(figures, (
+                  row.vss, *(row.value_of_recourse.get(plan) for plan in plans), row.vss_with_recourse,
+                  row.anticipation), strict=True)
+                for cell in _gain(gain, narrow=narrow)[:1 if name in _OF_BEST else 2])] for row in rows]
     return [*(["variant"] if varied else []), "scenario", "reaction", "maps", *shown], tuple(range(2 + varied)), cells
+
+
+_OF_BEST = ("VSS with recourse", "anticipation")
+"""What is stored in per cent of the best plan's value: beside VSS, of the stochastic one's, that would only puzzle."""
 
 
 def _gain(gain: GainOverMaps | None, *, narrow: bool) -> tuple[str, ...]:

@@ -10,16 +10,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from sva_bench.analysis.plan_names import shown_name
-from sva_bench.analysis.results import Estimate, PlanFigures
+from sva_bench.analysis.reaction_results import ComparedReaction, ReactionResult
+from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import End
 from sva_bench.files.printable import counted
 from sva_bench.palette import ROBOTS, hex_of, plan_color
+from sva_bench.report.mark_labels import place_words
 from sva_bench.report.marks import marks_of, met_in
 from sva_bench.report.overlays import Mark
 from sva_bench.report.page import details, heading, note, sentence, text
 from sva_bench.report.plan_view import PlanView, frame_of, line
+from sva_bench.report.reaction_shares import leads
 from sva_bench.report.styles import MARKS, MARKS_OF_MANY
 from sva_bench.report.wording import listed, per_cent, reliability_told, with_interval
 from sva_bench.storage.run_folder import made_for
@@ -33,10 +36,10 @@ _MOST_BYTES = 500_000  # of all maps of a page
 _MOST_REACTIONS, _MOST_PLANS = 3, 6  # shown of each scenario
 _MOST_MARKS = 40  # shown on a map, the most frequent
 _LANE = 2.6  # how far the lanes of robots lie apart
-_FAINTEST = 0.3  # opacity of a leg that is hardly ever driven
-_ENDED: Mapping[End, str] = {"failed": "failed", "out_of_fuel": "ran out of fuel", "stuck": "got stuck"}
-_CAME: Mapping[End, str] = {"home": "home", "failed": "fails", "out_of_fuel": "out of fuel", "late": "home too late",
-                            "stuck": "stuck"}
+_LOST: frozenset[End] = frozenset(("failed", "out_of_fuel", "stuck"))
+_RING = 6.0
+_CLEAR = 16.0  # farther from others a ring needs not lie
+_ALONG = (0.62, 0.72, 0.52, 0.82, 0.42, 0.92)  # where on its leg a ring may lie, the best first
 _TOUCHED = {"contact": "touched an obstacle", "collision": "two robots collided", "wait": "waited"}
 
 
@@ -50,6 +53,7 @@ class _Shown:
         routes: Route of each robot.
         key: Whose trials tell how often.
         colours: Names of the plan and of those of the same routes, with their positions among the plans compared.
+        beside: Plans that it is not distinguishable from, if there are any to be shown for that.
     """
 
     title: str
@@ -57,6 +61,20 @@ class _Shown:
     routes: Mapping[str, Route]
     key: Key
     colours: Sequence[tuple[str, int]]
+    beside: Sequence[str] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Placed:
+    """A mark: its place and radius in the picture, what it is, its shape, what is said of it, and its word."""
+
+    x: float
+    y: float
+    radius: float
+    kind: str
+    shape: str
+    said: str
+    word: str
 
 
 def route_maps(content: Content) -> list[str]:
@@ -110,14 +128,27 @@ def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
                      worth=scenario.plans[first].executed, routes=content.routes[scenario.name, first],
                      key=(scenario.name, first, "none", "never"), colours=[(name, every.index(name)) for name in names])
     for reaction in itertools.islice((r for r in scenario.reactions or () if r.policy != "none"), _MOST_REACTIONS):
-        best = reaction.best.plan if hasattr(reaction, "best") else reaction.ranking[0].plan
-        plan: PlanFigures | None = reaction.plans.get(best)
-        routes = content.routes.get((scenario.name, best)) or content.routes.get(
-            (scenario.name, made_for(best, reaction.news)))
-        if plan is not None and routes is not None:
-            yield _Shown(title=f"{best}, team re-plans on {reaction.news} news", worth=plan.executed,
-                         routes=routes, key=(scenario.name, best, reaction.policy, reaction.news),
-                         colours=[(best, list(reaction.plans).index(best))])
+        names = _telling_with(reaction)
+        for name in names:
+            routes = content.routes.get((scenario.name, name)) or content.routes.get(
+                (scenario.name, made_for(name, reaction.news)))
+            if routes is not None:
+                yield _Shown(title=f"{name}, team re-plans on {reaction.news} news",
+                             worth=reaction.plans[name].executed, routes=routes,
+                             key=(scenario.name, name, reaction.policy, reaction.news),
+                             colours=[(name, list(reaction.plans).index(name))],
+                             beside=[other for other in names if other != name])
+
+
+def _telling_with(reaction: ReactionResult | ComparedReaction) -> list[str]:
+    """The best plan for a reaction, and where none is distinguishably best the next one too; the one worth more first.
+    """
+    if isinstance(reaction, ComparedReaction):
+        names = [row.plan for row in reaction.ranking if row.rank == 1][:2]
+    else:
+        over = None if leads(reaction) else reaction.best.over
+        names = [reaction.best.plan, *([] if over is None else [over])]
+    return sorted(names, key=lambda name: -reaction.plans[name].executed.mean)
 
 
 class _Maps:
@@ -133,7 +164,8 @@ class _Maps:
         self._frame = frame_of(content.world)
         self._driven = _driven_with_reactions(content)
         self.seen: set[str] = set()  # kinds of marks, for the legend
-        places = np.array([place for plan in plans for _, _, place in self._ended(plan)]).reshape(-1, 2)
+        self._marks = {plan.key: self._placed(plan) for plan in plans}
+        places = np.array([(mark.x, mark.y) for marks in self._marks.values() for mark in marks]).reshape(-1, 2)
         busy = np.concatenate([places + np.array([0.0, up]) for up in (0.0, 3.0, -3.0, -12.0, -15.0)] * 2)
         self._view = PlanView(content.world, content.paths.values(), busy)
 
@@ -141,21 +173,22 @@ class _Maps:
         """The map of one plan, with its title above and its robots below."""
         ended = self._content.counts.ended.get(plan.key, ())
         reacts = plan.key[2] != "none"
-        legs, marks = [], self._ended_marks(plan)
+        legs = []
         for robot, route in plan.routes.items():
             for number, ends in enumerate(itertools.pairwise(route)):
                 if ends[0] != ends[1]:
                     legs.append(self._leg(robot, number, ends, _share_driven(ended, robot, number, reacts)))
         if reacts:
             legs += self._replanned(plan)
-        else:
-            marks = self._met_marks(plan) + marks  # where robots ended lies on top
         colours = ";--other:".join(hex_of(plan_color(name, number)) for name, number in plan.colours[:2])
-        picture = self._view.picture(f"Routes of the {plan.title} plan in {plan.key[0]}", "".join(legs), "".join(marks))
+        picture = self._view.picture(f"Routes of the {plan.title} plan in {plan.key[0]}", "".join(legs),
+                                     self._drawn_marks(plan))
         lines = "".join([*(self._robot(robot, route, ended) for robot, route in plan.routes.items()),
                          *([] if reacts else self._met_told(plan))])
+        worth = f"executed {with_interval(plan.worth)}" + (
+            f", not distinguishable from the {listed(plan.beside)}" if plan.beside else "")
         return (f'<figure class=map><figcaption style="--plan:{colours}"><b>{text(plan.title)}</b> '
-                f"{sentence(f'executed {with_interval(plan.worth)}')}</figcaption>{picture}<ul>{lines}</ul></figure>")
+                f"{sentence(worth)}</figcaption>{picture}<ul>{lines}</ul></figure>")
 
     def legend(self) -> str:
         """What is what on the maps."""
@@ -164,12 +197,12 @@ class _Maps:
         said = [f"Routes are drawn {where}, with an arrow in the middle of each leg; the fainter, the seldomer it is "
                 "driven. ■ base, ▲ refuelling station, ● point of interest; point at a leg, a site or a mark for more."]
         if "ended" in self.seen:
-            said.append("✕ in a ring: robots ended for good on this leg, in so many per cent of missions; where on the "
-                        "leg isn't told: the mark lies past its arrow.")
+            said.append("✕ in a ring: robots failed, ran out of fuel or got stuck on this leg, in so many per cent of "
+                        "missions; where on the leg isn't told.")
         if met := [what for kind, what in _TOUCHED.items() if kind in self.seen]:
             said.append(f"◆ with a number: {' or '.join(met)} there, so many times in all that was driven.")
         if "replanned" in self.seen:
-            said.append("Dotted: legs driven only after re-planning.")
+            said.append("Hollow: legs driven only after re-planning.")
         return " ".join(said)
 
     def _path(self, robot: str, ends: tuple[str, str]) -> FloatArray:
@@ -183,7 +216,7 @@ class _Maps:
     def _leg(self, robot: str, number: int, ends: tuple[str, str], share: float | None) -> str:
         path = self._path(robot, ends)
         often = "" if share is None else f", driven in {per_cent(100 * share)} of missions"
-        faint = "" if share is None or share >= 1 else f' style="opacity:{_FAINTEST + (1 - _FAINTEST) * share:.2f}"'
+        faint = "" if share is None or share >= 1 else f' style="--often:{share:.2f}"'
         kind = self._numbers[robot] % len(ROBOTS)
         return (f'<g class="leg r{kind}"{faint}><title>{text(robot)}, leg {number + 1}: {text(ends[0])} → '
                 f'{text(ends[1])}{often}</title><path d="{line(path)}"/>{_arrow(path)}</g>')
@@ -194,34 +227,37 @@ class _Maps:
         legs = []
         for robot, origin, destination in sorted(self._driven.get(plan.key, set()) - planned):
             self.seen.add("replanned")
+            path = line(self._path(robot, (origin, destination)))
             legs.append(f'<g class="leg replanned r{self._numbers[robot] % len(ROBOTS)}"><title>{text(robot)}, after '
                         f"re-planning: {text(origin)} → {text(destination)}</title>"
-                        f'<path d="{line(self._path(robot, (origin, destination)))}"/></g>')
+                        f'<path d="{path}"/><path class=core d="{path}"/></g>')
         return legs
 
-    def _ended(self, plan: _Shown) -> Iterator[tuple[Ended, tuple[str, str], FloatArray]]:
-        """Missions that ended for good on a leg of a plan that is kept: its ends, and the place of their mark."""
-        on: dict[tuple[str, int], int] = {}  # marks on each leg: they lie one behind the other
-        for found in self._content.counts.ended.get(plan.key, ()) if plan.key[2] == "none" else ():
+    def _placed(self, plan: _Shown) -> list[_Placed]:
+        """All marks of a plan that is kept: what was met where it was, and rings on legs where these leave room."""
+        if plan.key[2] != "none":
+            return []
+        placed = self._met_marks(plan)
+        for found in self._content.counts.ended.get(plan.key, ()):
             route = plan.routes.get(found.robot, ())
-            if found.end in _ENDED and found.left and found.stops + 1 < len(route):
-                before = on[found.robot, found.stops] = on.get((found.robot, found.stops), -1) + 1
-                ends = route[found.stops], route[found.stops + 1]
-                yield found, ends, _along(self._path(found.robot, ends), min(0.62 + 0.16 * before, 1.0))[0]
+            if found.end in _LOST and found.left and found.stops + 1 < len(route):
+                placed.append(self._ring(found, (route[found.stops], route[found.stops + 1]), placed))
+        return placed
 
-    def _ended_marks(self, plan: _Shown) -> list[str]:
-        """A mark on each leg on which robots ended for good."""
-        marks = []
-        for found, ends, (x, y) in self._ended(plan):
-            self.seen.add("ended")
-            marks.append(
-                f"<g class=ended><title>{text(found.robot)} {_ENDED[found.end]} on leg {found.stops + 1}, "
-                f"{text(ends[0])} → {text(ends[1])}: {_often(found.share)} of missions</title>"
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6"/><path d="M{x - 3:.1f} {y - 3:.1f}l6 6m0-6l-6 6"/>'
-                f'<text x="{x:.1f}" y="{y - 8:.1f}">{_often(found.share)}</text></g>')
-        return marks
+    def _ring(self, found: Ended, ends: tuple[str, str], placed: Sequence[_Placed]) -> _Placed:
+        """A mark on a leg on which robots ended away from home."""
+        self.seen.add("ended")
+        path = self._path(found.robot, ends)
+        off = [(mark.x, mark.y) for mark in placed] + self._frame.at(np.array(list(self._places.values()))).tolist()
+        x, y = max((_along(path, share)[0].tolist() for share in _ALONG), key=lambda at: min(
+            [_CLEAR, *(float(np.hypot(at[0] - ox, at[1] - oy)) for ox, oy in off)]))
+        often = _often(found.share)
+        shape = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{_RING:.0f}"/><path d="M{x - 3:.1f} {y - 3:.1f}l6 6m0-6l-6 6"/>'
+        return _Placed(x=x, y=y, radius=_RING, kind="ended", shape=shape, word=often, said=(
+            f"{found.robot} {found.end.replace('_', ' ')} on leg {found.stops + 1}, {ends[0]} → {ends[1]}: {often} of "
+            "missions"))
 
-    def _met_marks(self, plan: _Shown) -> list[str]:
+    def _met_marks(self, plan: _Shown) -> list[_Placed]:
         """Marks where robots touched something, or waited."""
         found: list[Mark] = []
         for kind, rows in self._met.items():
@@ -231,12 +267,21 @@ class _Maps:
             self.seen.add(mark.kind)
             (x, y), = self._frame.at(np.array([[mark.x_m, mark.y_m]])).tolist()
             size = 3.5 + min(2.0, 0.5 * np.log2(mark.count))
-            stuck = ", and one never got away" if mark.stuck else ""
-            marks.append(f'<g class="met {mark.kind}"><title>{_TOUCHED[mark.kind]} here, {counted(mark.count, "time")}'
-                         f'{stuck}</title><path d="M{x:.1f} {y - size:.1f}l{size:.1f} {size:.1f}l{-size:.1f} '
-                         f'{size:.1f}l{-size:.1f} {-size:.1f}z"/><text x="{x + size + 2:.1f}" y="{y + 4:.1f}">'
-                         f"{mark.count}</text></g>")
+            marks.append(_Placed(
+                x=x, y=y, radius=size, kind=f"met {mark.kind}", word=str(mark.count),
+                said=f"{_TOUCHED[mark.kind]} here, {counted(mark.count, 'time')}{', and got stuck' * mark.stuck}",
+                shape=f'<path d="M{x:.1f} {y - size:.1f}l{size:.1f} {size:.1f}l{-size:.1f} {size:.1f}'
+                      f'l{-size:.1f} {-size:.1f}z"/>'))
         return marks
+
+    def _drawn_marks(self, plan: _Shown) -> str:
+        marks, frame = self._marks[plan.key], self._frame
+        words = place_words([(mark.x, mark.y, mark.radius) for mark in marks], [mark.word for mark in marks],
+                            self._view.taken, (0.0, 0.0, frame.width, frame.height))
+        return "".join(
+            f'<g class="{mark.kind}"><title>{text(mark.said)}</title>{mark.shape}'
+            f'<text x="{x:.1f}" y="{y + 3.5:.1f}">{text(mark.word)}</text></g>'
+            for mark, (x, y) in zip(marks, words, strict=True))
 
     def _met_told(self, plan: _Shown) -> list[str]:
         """A line below a map that counts all that was met; nothing where nothing was."""
@@ -251,10 +296,12 @@ class _Maps:
         ends: dict[str, float] = {}
         for found in ended:
             if found.robot == robot:
-                how = _CAME[found.end] if found.left else "isn't there"
+                how = found.end.replace("_", " ") if found.left else f"{found.end.replace('_', ' ')} before it left"
                 ends[how] = ends.get(how, 0.0) + found.share
         told = "" if not stops else ", ".join(f"{how} {_often(share)}" for how, share in ends.items())
-        return (f'<li><i class="k r{self._numbers[robot] % len(ROBOTS)}"></i><b>{text(robot)}</b> '
+        swatch = f'<svg class="k leg r{self._numbers[robot] % len(ROBOTS)}" viewBox="0 0 28 8" aria-hidden=true>' \
+                 '<path d="M0 4h28"/></svg>'
+        return (f"<li>{swatch}<b>{text(robot)}</b> "
                 f"{text(stops) or 'stays home'}{f' <span>({sentence(told)})</span>' if told else ''}</li>")
 
 

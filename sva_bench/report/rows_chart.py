@@ -1,6 +1,7 @@
 """Small charts of rows: a label above each, and below it what was found, on one axis; SVG made by hand.
 
-Labels stand above their rows, not beside them, so that a chart is as legible on a phone as in a wide window.
+Labels stand above their rows, not beside them, so that a chart is as legible on a phone as in a wide window. What is
+found lies on lanes, and the lines of the grid in these alone: none strikes through a label.
 """
 
 from __future__ import annotations
@@ -9,10 +10,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from sva_bench.report.page import text
+from sva_bench.report.page import text, typeset
 
-_WIDTH, _SIDE = 440.0, 14.0
-_LABEL, _ROW, _STEPS, _GROUP, _AXIS = 15.0, 23.0, 38.0, 22.0, 34.0  # heights
+_WIDTH, _SIDE = 356.0, 14.0  # as wide as a phone's page, so that letters are as large there as they are meant
+_LABEL, _ROW, _STEPS, _GROUP, _AXIS, _GAP = 16.0, 17.0, 34.0, 22.0, 32.0, 5.0  # heights
 _MIDDLE, _SECOND = 8.0, 9.0  # where marks lie in their row, and how far below them those behind
 _MOST_TICKS = 6
 _LETTER = 6.6
@@ -80,22 +81,31 @@ def rows_chart(title: str, unit: str, rows: Sequence[Row], *, zero: bool = False
     def x(at: float) -> float:
         return _SIDE + (at - low) / (high - low) * (_WIDTH - 2 * _SIDE)
 
-    parts, y, grid = [], 4.0, []
+    ticks, parts, y = round_ticks(low, high), [], 2.0
     for number, row in enumerate(rows):
         if row.group and (not number or rows[number - 1].group != row.group):
             y += _GROUP if number else 16.0
             parts.append(f'<text class=group x="0" y="{y - 5:.0f}">{text(row.group)}</text>')
-        tall = _STEPS if any(isinstance(mark, Steps) for mark in row.marks) else _ROW + (
-            11 if any(isinstance(mark, Dot) and (mark.below or mark.shape == "hollow") for mark in row.marks) else 0)
-        parts.append(_labels(row, y + _LABEL - 3))
-        parts.append("".join(_drawn(mark, x, y + _LABEL, tall) for mark in row.marks))
-        y += _LABEL + tall
-    for at in _ticks(low, high):
-        grid.append(f'<path class="{"zero" if at == 0 else "grid"}" d="M{x(at):.1f} 0V{y + 4:.0f}"/>')
-        parts.append(f'<text class=tick x="{x(at):.1f}" y="{y + 17:.0f}">{at:g}</text>')
-    parts.append(f'<text class=tick x="{_WIDTH / 2:.0f}" y="{y + _AXIS - 3:.0f}">{text(unit)}</text>')
+        parts.append(_labels(row, y + _LABEL - 4))
+        y += _LABEL * (1 if _beside(row) else 2)
+        tall = _tall(row)
+        parts.append(f'<rect class=lane x="0" y="{y:.0f}" width="{_WIDTH:.0f}" height="{tall:.0f}" rx="2"/>')
+        parts += [f'<path class="{"zero" if at == 0 else "grid"}" d="M{x(at):.1f} {y:.0f}v{tall:.0f}"/>'
+                  for at in ticks]
+        parts += [_drawn(mark, x, y, tall) for mark in row.marks]
+        y += tall + _GAP
+    parts += [f'<text class=tick x="{x(at):.1f}" y="{y + 10:.0f}">{typeset(f"{at:g}")}</text>' for at in ticks]
+    parts.append(f'<text class=tick x="{_WIDTH / 2:.0f}" y="{y + _AXIS - 6:.0f}">{text(unit)}</text>')
     return (f'<svg class=rows role=img aria-label="{text(title)}" viewBox="0 0 {_WIDTH:.0f} {y + _AXIS:.0f}">'
-            f"{''.join(grid)}{''.join(parts)}</svg>")
+            f"{''.join(parts)}</svg>")
+
+
+def _tall(row: Row) -> float:
+    """Height of a row's lane."""
+    if any(isinstance(mark, Steps) for mark in row.marks):
+        return _STEPS
+    return _ROW + (11 if any(isinstance(mark, Dot) and (mark.below or mark.shape == "hollow") for mark in row.marks)
+                   else 0)
 
 
 def _ends(mark: Dot | Span | Steps) -> list[float]:
@@ -104,15 +114,22 @@ def _ends(mark: Dot | Span | Steps) -> list[float]:
     return [mark.low, mark.high] if isinstance(mark, Span) else [min(mark.values), max(mark.values)]
 
 
+def _beside(row: Row) -> bool:
+    """Whether there is room for what a row comes to beside its label, or only below it."""
+    return not row.told or _LETTER * (len(row.label) + len(row.told) + 2) <= _WIDTH
+
+
 def _labels(row: Row, y: float) -> str:
-    room = int((_WIDTH - _LETTER * len(row.told)) / _LETTER) - 2
-    label = row.label if len(row.label) <= room else f"{row.label[:max(room - 1, 1)]}…"
+    room = int(_WIDTH / _LETTER)
+    label = row.label if len(row.label) <= room else f"{row.label[:room - 1]}…"
+    below = y if _beside(row) else y + _LABEL - 1
     return (f'<text x="0" y="{y:.0f}"><title>{text(row.label)}</title>{text(label)}</text>'
-            + (f'<text class=told x="{_WIDTH:.0f}" y="{y:.0f}">{text(row.told)}</text>' if row.told else ""))
+            + (f'<text class=told x="{_WIDTH:.0f}" y="{below:.0f}">{text(typeset(row.told))}</text>' if row.told
+               else ""))
 
 
 def _drawn(mark: Dot | Span | Steps, x: _Scale, top: float, tall: float) -> str:
-    said = f"<title>{text(mark.said)}</title>"
+    said = f"<title>{text(typeset(mark.said))}</title>"
     middle = top + _MIDDLE
     if isinstance(mark, Span):
         width = max(x(mark.high) - x(mark.low), 1.5)
@@ -121,9 +138,10 @@ def _drawn(mark: Dot | Span | Steps, x: _Scale, top: float, tall: float) -> str:
         return (f'<rect x="{x(mark.low):.1f}" y="{middle - height / 2 + down:.1f}" width="{width:.1f}" '
                 f'height="{height:.0f}" style="fill:{mark.colour}" class=span>{said}</rect>')
     if isinstance(mark, Steps):
-        return _steps(mark, x, top + 1, tall - 9)
+        return _steps(mark, x, top + 3, tall - 6)
     at = x(mark.at)
-    below = f'<text class=tick x="{at:.1f}" y="{middle + 19:.0f}">{text(mark.below)}</text>' if mark.below else ""
+    below = f'<text class="tick below" x="{at:.1f}" y="{middle + 17:.0f}">{text(mark.below)}</text>' \
+        if mark.below else ""
     if mark.shape == "tick":
         shape = f'<path d="M{at:.1f} {middle - 9:.1f}v18" style="stroke:{mark.colour};stroke-width:2">{said}</path>'
     elif mark.shape == "down":
@@ -149,8 +167,8 @@ def _steps(mark: Steps, x: _Scale, top: float, tall: float) -> str:
             "</path>")
 
 
-def _ticks(low: float, high: float) -> list[float]:
-    """Round numbers, six at most."""
+def round_ticks(low: float, high: float, most: int = _MOST_TICKS) -> list[float]:
+    """Round numbers between two ends, so many at most."""
     steps = (step * 10.0**power for power in range(-9, 17) for step in (1, 2, 5))
-    step = next((step for step in steps if math.floor(high / step) - math.ceil(low / step) < _MOST_TICKS), high - low)
+    step = next((step for step in steps if math.floor(high / step) - math.ceil(low / step) < most), high - low)
     return [round(k * step, 9) + 0.0 for k in range(math.ceil(low / step), math.floor(high / step) + 1)]

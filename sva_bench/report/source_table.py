@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from sva_bench.analysis.plan_names import shown_name
+from sva_bench.analysis.results import PlanResult, SourceEffect
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.choices import MET_NAMES, SourceName
 from sva_bench.report.page import heading, note, table
+from sva_bench.report.told_columns import NOTHING, difference, told_columns
 from sva_bench.report.wording import listed
 
 SOURCES_HEAD = ("scenario", "plan", "source", "value", "route times [s]")
@@ -27,14 +29,14 @@ def source_rows(scenarios: Scenarios) -> list[list[str]]:
     """
     return [[scenario.name, shown_name(scenario, name), source, _signed(plan.sources[source].incentive),
              _signed(plan.sources[source].seconds)]
-            for scenario in scenarios for order in [_largest_first(scenario)]
+            for scenario in scenarios for order in [_largest_first(scenario.plans.values())]
             for name, plan in scenario.plans.items() for source in order if source in plan.sources]
 
 
-def _largest_first(scenario: ScenarioSummary | ComparedScenario) -> list[SourceName]:
+def _largest_first(plans: Iterable[PlanResult]) -> list[SourceName]:
     """Sources by their effects over plans, as a sum of sizes: what helps one plan and harms another is no small one."""
     sizes: dict[SourceName, tuple[float, float]] = {}
-    for plan in scenario.plans.values():
+    for plan in plans:
         for source, effect in plan.sources.items():
             incentive, seconds = sizes.get(source, (0.0, 0.0))
             sizes[source] = incentive + abs(effect.incentive), seconds + abs(effect.seconds)
@@ -55,16 +57,33 @@ def _met(rows: Sequence[Sequence[str]]) -> bool:
 
 
 def source_section(scenarios: Scenarios) -> list[str]:
-    """The section of the page."""
+    """The section of the page: a column for each source, of those that did anything."""
     rows = source_rows(scenarios)
     if not rows:
         return []
-    return [heading(source_title(rows)), note(costliest(scenarios)), table(SOURCES_HEAD, rows, words=(0, 1, 2)),
+    value, seconds = (_pivoted(scenarios, read) for read in (lambda effect: effect.incentive,
+                                                            lambda effect: effect.seconds))
+    tables = [table(head, cells, sections=[s.name for s in scenarios for plan in s.plans.values() if plan.sources],
+                    caption=caption) for (head, cells), caption in (
+        (value, "Value: with the source less without it"), (seconds, "Route times [s]: how much longer routes take"))
+        if len(head) > 1]
+    if not tables:
+        return [heading(source_title(rows)), note(costliest(scenarios))]
+    return [heading(source_title(rows)), note(costliest(scenarios)), *tables,
             *([note(_OF_OTHERS)] if _met(rows) else []),
-            note("Value: with the source less without it, in the same trials and noise draws, by the noisy twin; of "
-                 "contact, floors and payload, executed less by the twin. Interplay: what is due to no source by "
-                 "itself. The values add up to executed less expected less draws. Route times: how much longer the "
-                 "team's routes take, driven whole, waits included.")]
+            note(f"{NOTHING}: nothing, to the digit shown; sources of nothing else are left out. Value: in the same "
+                 "trials and noise draws, by the noisy twin; of contact, floors and payload, executed less by the "
+                 "twin. Interplay: what is due to no source by itself. The values add up to executed less expected "
+                 "less draws. Route times: of the team's routes, driven whole, waits included.")]
+
+
+def _pivoted(scenarios: Scenarios, read: Callable[[SourceEffect], float]) -> tuple[list[str], list[list[str]]]:
+    """Headings and cells: a row for each scenario and plan, a column for each source that did anything to one."""
+    order = _largest_first([plan for scenario in scenarios for plan in scenario.plans.values()])
+    rows = [[shown_name(scenario, name), *(
+        difference(read(plan.sources[source])) if source in plan.sources else "" for source in order)]
+        for scenario in scenarios for name, plan in scenario.plans.items() if plan.sources]
+    return told_columns(["plan", *order], rows, (0,))
 
 
 def costliest(scenarios: Scenarios) -> str:

@@ -12,6 +12,7 @@ from sva_bench.analysis.results import Comparison, Estimate, PlanFigures, VssFig
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
 from sva_bench.analysis.statistics import POWER, detectable
 from sva_bench.analysis.summaries import AnySummary, ComparisonSummary, Summary
+from sva_bench.choices import FAILURES, FailureProcess
 from sva_bench.files.printable import counted
 from sva_bench.mission.failures import process_of
 from sva_bench.world.model import Scenario, World
@@ -41,14 +42,27 @@ def answer(summary: AnySummary) -> str:
 
 
 def _of_given_plans(summary: ComparisonSummary) -> str:
+    """Which plan is worth more than which, each pair once with all scenarios in which it is."""
     if len(summary.scenarios[0].plans) == 1:
         return "One plan: there is nothing to compare it with."
-    clear = [f"{c.a} against {c.b} in {s.name} ({c.mean:+.1f})" for s in summary.scenarios
-             for c in s.comparisons if c.distinguishable]
-    if len(clear) > _MOST_NAMED:
-        clear[_MOST_NAMED:] = [f"{len(clear) - _MOST_NAMED} more"]
-    return f"Differences that stand out of the noise: {'; '.join(clear)}." if clear else \
-        "No difference between plans stands out of the noise."
+    clear: dict[tuple[str, str], list[str]] = {}
+    for s in summary.scenarios:
+        for c in s.comparisons:
+            if c.distinguishable:
+                pair = (c.a, c.b) if c.mean > 0 else (c.b, c.a)
+                clear.setdefault(pair, []).append(f"{s.name} ({abs(c.mean):.1f})")
+    if not clear:
+        return "No difference between plans stands out of the noise."
+    said = [f"{better} is worth more than {worse} in {_listed_few(where)}" for (better, worse), where in clear.items()]
+    if len(said) > _MOST_NAMED:
+        said[_MOST_NAMED:] = [f"{len(said) - _MOST_NAMED} more pairs differ"]
+    pairs = sum(len(s.comparisons) for s in summary.scenarios)
+    rest = "" if sum(map(len, clear.values())) == pairs else " No other difference stands out of the noise."
+    return f"{'; '.join(said)}.{rest}"
+
+
+def _listed_few(words: Sequence[str]) -> str:
+    return listed(words if len(words) <= _MOST_NAMED else [*words[:_MOST_NAMED], f"{len(words) - _MOST_NAMED} more"])
 
 
 def _of_the_two_plans(summary: Summary) -> str:
@@ -87,10 +101,17 @@ def _share(vss: VssFigures) -> str:
 
 
 def assumed(summary: AnySummary) -> str:
-    """The failure process that was planned for and the one that was executed; given plans were not planned here."""
+    """What failures were planned for and which were executed, in words; given plans were not planned here."""
     failure = summary.failure
-    executed = f"executed under {failure.execute} failures"
-    return executed if isinstance(summary, ComparisonSummary) else f"planned under {failure.plan}, {executed}"
+    if isinstance(summary, ComparisonSummary):
+        return f"failures executed: {_failing(failure.execute)}"
+    if failure.plan == failure.execute:
+        return f"failures planned for and executed: {_failing(failure.execute)}"
+    return f"failures planned for: {_failing(failure.plan)}; executed: {_failing(failure.execute)}"
+
+
+def _failing(process: FailureProcess) -> str:
+    return f"{process} ({FAILURES[process]})"
 
 
 _UNPROVED = "some plans are not proved optimal"
@@ -177,20 +198,30 @@ def _available_together(scenario: Scenario) -> list[tuple[list[str], float]]:
 
 def remarks(summary: AnySummary) -> list[str]:
     """Remarks beside the answer: unreachable POIs, percentages, few noise draws, precision and EVPI."""
-    sentences = beyond_reach(summary.reach)
+    found = named_remarks(summary)
+    if isinstance(summary, Summary) and any(
+            s.vss.executed_pct is not None and not s.vss.same_plan for s in summary.scenarios):
+        found.insert(sum(name == "Out of reach" for name, _ in found), ("VSS", VSS_PCT))
+    return [f"Caution: {said[0].lower()}{said[1:]}" if name == "Caution" else said for name, said in found]
+
+
+def named_remarks(summary: AnySummary) -> list[tuple[str, str]]:
+    """The same, each with the name of what it is about, without what percentages are."""
+    found = [("Out of reach", said) for said in beyond_reach(summary.reach)]
     if isinstance(summary, ComparisonSummary):
-        return [*sentences, *infeasible_plans(summary), *_few_draws(summary)]
-    compared = [s.vss for s in summary.scenarios if not s.vss.same_plan]
-    if any(vss.executed_pct is not None for vss in compared):
-        sentences.append(VSS_PCT)
-    return [*sentences, *(_few_draws(summary) if compared else []), *_precision(summary), *_known_beforehand(summary)]
+        return [*found, *(("Infeasible", said) for said in infeasible_plans(summary)),
+                *(("Caution", said) for said in _few_draws(summary))]
+    compared = not all(s.vss.same_plan for s in summary.scenarios)
+    return [*found, *(("Caution", said) for said in (_few_draws(summary) if compared else [])),
+            *(("Precision", said) for said in _precision(summary)),
+            *(("Perfect information", said) for said in _known_beforehand(summary))]
 
 
 def _few_draws(summary: AnySummary) -> list[str]:
     if not 1 < summary.rollouts < FEW_DRAWS:
         return []
-    return [f"Caution: the intervals rest on only {summary.rollouts} noise draws, and are wide where robots run short "
-            "of fuel or time; more draws (--rollouts) make them narrower."]
+    return [f"The intervals rest on only {summary.rollouts} noise draws, and are wide where robots run short of fuel "
+            "or time; more draws (--rollouts) make them narrower."]
 
 
 def _precision(summary: Summary) -> list[str]:
@@ -299,6 +330,6 @@ def optional(figure: float | None) -> str:
     return "–" if figure is None else f"{figure:.1f}"
 
 
-def listed(words: Sequence[str]) -> str:
+def listed(words: Sequence[str], last: str = "and") -> str:
     """``a, b and c``."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}"

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import csv
+import functools
 import json
+import shutil
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +18,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sva_bench.__main__ import run_command_line
-from sva_bench.analysis.compared_values import numbers_of, own_value, settings_in, shown_value, variant_without
+from sva_bench.analysis.compared_values import (
+    numbers_of,
+    other_settings,
+    own_value,
+    shown_value,
+    variant_of,
+)
+from sva_bench.analysis.over_maps import BatchSummary
 from sva_bench.analysis.statistics import sample_mean
-from sva_bench.batch.grid import Grid
+from sva_bench.batch.compared import values_of
+from sva_bench.batch.folder import refuse_other_settings, settings_in
+from sva_bench.batch.grid import Grid, Point
+from sva_bench.batch.grid import grid_of as grid_from
+from sva_bench.batch.schema import PointEntry
 from sva_bench.batch.sweep import Sweep, grid_of
-from tests.worlds_for_tests import SMALL
+from sva_bench.files.records import as_dict, from_dict
+from sva_bench.report.variant_names import VariantNames
+from sva_bench.study.options import Options
+from sva_bench.world.model import World
+from tests.pages import read
+from tests.worlds_for_tests import SMALL, world_of
 
 KEY = "robots.uv2.fuel_capacity_s"
 QUIET = SMALL.replace("noise: {wheel_gain_sd: 0.01}\n", "")
@@ -245,14 +265,67 @@ words = st.one_of(st.integers(), st.floats(allow_nan=False, allow_infinity=False
                   st.lists(st.text(max_size=5), max_size=3), st.dictionaries(st.text(max_size=5), st.integers()))
 
 
-@given(st.dictionaries(st.from_regex(r"[a-z_]+(\.[a-z_*]+)*", fullmatch=True), words, max_size=4))
-def test_a_variant_is_read_back_whatever_its_values_hold(values: dict[str, Any]) -> None:
+@given(st.dictionaries(st.from_regex(r"[a-z_]+(\.[a-z_*]+)*", fullmatch=True), words, min_size=1, max_size=4))
+def test_settings_are_handed_on_whatever_their_values_hold(values: dict[str, Any]) -> None:
     parts = {key: json.dumps(value) for key, value in values.items()}
-    variant = "; ".join(f"{key}={value}" for key, value in parts.items())
-    assert settings_in(variant) == parts
-    assert settings_in(f"{variant}; planner=fmt" if variant else "planner=fmt")["planner"] == "fmt"
+    grid_now = grid_with([parts, {**parts, next(iter(parts)): '"another; planner=x"'}])
+    assert {key: list(found) for key, found in values_of(grid_now).items()} == {
+        key: list(dict.fromkeys([word, *(['"another; planner=x"'] if not number else [])]))
+        for number, (key, word) in enumerate(parts.items())}
+    stored = json.loads(json.dumps(as_dict(grid_now.points[0].entry())))
+    assert from_dict(PointEntry, stored).settings == parts
     for key in parts:
-        assert settings_in(variant_without(variant, key)) == {k: v for k, v in parts.items() if k != key}
+        assert other_settings(parts, key) == {k: v for k, v in parts.items() if k != key}
+
+
+@functools.cache
+def small_world() -> World:
+    with tempfile.TemporaryDirectory() as folder:
+        return world_of(Path(folder))
+
+
+def grid_with(settings: Sequence[dict[str, str]]) -> Grid:
+    """A grid of these variants of one world."""
+    return Grid(points=[Point(world=small_world(), planner="prmstar", variant=variant_of(each), settings=each)
+                        for each in settings], seeds=[0], options=Options(trials=1), unit_trials=1)
+
+
+def test_a_folder_of_a_version_that_named_its_variants_only_is_reported_and_says_why_it_compares_nothing(
+    batch: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    older = Path(shutil.copytree(batch, tmp_path / "older"))
+    manifest = json.loads((older / "manifest.json").read_text())
+    del manifest["command"]
+    for point in manifest["settings"]["points"].values():
+        del point["settings"]
+    (older / "manifest.json").write_text(json.dumps(manifest))
+    assert run_command_line(["report", str(older)]) == 0
+    assert f"{KEY}=10" in read(older / "report.html")
+    assert run_command_line(["report", str(older), "--compare", KEY]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "doesn't say the varied settings one by one; run the batch again" in said
+    # Its variants are the same by their names, so it can be gone on with.
+    refuse_other_settings(older, grid_from(*settings_in(batch)).settings())
+
+
+def test_a_page_names_variants_by_their_values_and_says_the_key_once(batch: Path) -> None:
+    page = read(batch / "report.html")
+    assert f"VSS over maps, by {KEY}" in page
+    assert f"{KEY}=" not in page.split("How to get the same again")[0]
+    assert "one (x2)" in page  # a map under a variant
+    assert "How to get the same again" in page
+    assert "2 seeds: 0, 1." in page
+
+
+@pytest.mark.parametrize(("settings", "names"), [
+    ([{"a.k": "1"}, {"a.k": '"x2"'}], ["1", "x2"]),
+    ([{"a.k": "1", "margin": "0.1"}, {"a.k": "2", "margin": "0.1"}], ["k 1, margin 0.1", "k 2, margin 0.1"]),
+    ([{"a.k": "1", "b.k": "2"}, {"a.k": "1", "b.k": "3"}], ["a.k 1, b.k 2", "a.k 1, b.k 3"])])
+def test_of_several_keys_as_much_is_said_as_tells_them_apart(settings: list[dict[str, str]], names: list[str]) -> None:
+    found = VariantNames(BatchSummary(
+        trials=1, fidelity="kinematic", worlds=("w",), seeds=(0,), variants=tuple(map(variant_of, settings)), units=(),
+        maps=(), aggregate=(), failed=(), settings={variant_of(each): each for each in settings}))
+    assert [found.short(variant_of(each)) for each in settings] == names
 
 
 def test_values_that_are_numbers_have_their_places_on_an_axis_and_others_have_not() -> None:

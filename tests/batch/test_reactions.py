@@ -33,6 +33,7 @@ from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.batch_page import write_batch_report
 from sva_bench.report.reactions_over_maps import answers_over_maps
 from sva_bench.study.options import Options
+from tests.pages import untypeset
 from tests.results_for_tests import unit
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -126,14 +127,14 @@ def test_the_tables_of_reactions_have_a_row_for_each_figure(folder: Path) -> Non
 
 
 def test_the_page_of_a_batch_shows_its_reactions_and_begins_with_what_vss_is_under_each(folder: Path) -> None:
-    page = html.unescape((folder / "done" / "report.html").read_text()).replace("\u00a0", " ")
+    page = untypeset(html.unescape((folder / "done" / "report.html").read_text()))
     assert "Teams that react" in page
     assert "Who knows what when: " in page
     table = page[page.index("Teams that react"):].split("</table>")[0]
     assert "<th scope=\"col\">VSS [%]</th>" in table
     assert not re.search(r"<td[^>]*>[^<]*%", table)  # incentive and per cent in columns of their own
     first = page[:page.index("<table")]
-    assert "If the team keeps its plan, over these maps" in first
+    assert "If the team keeps its plan, over only 2 maps" in first
     summary = from_dict(BatchSummary, json.loads((folder / "done" / "summary.json").read_text()))
     answers = answers_over_maps(summary.reactions)
     assert answers

@@ -18,16 +18,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sva_bench.analysis.over_maps import BatchSummary, Percentage, UnitSummary
+from sva_bench.analysis.over_maps import BatchSummary, OverMaps, Percentage, UnitSummary
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ScenarioSummary, UnitScenario
 from sva_bench.analysis.summaries import Failures, Summary
 from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.report import batch_page
-from sva_bench.report.batch_page import _over_maps as over_maps_said
 from sva_bench.report.batch_page import write_batch_report
 from sva_bench.report.results_charts import over_maps as over_maps_drawn
+from sva_bench.report.vss_over_maps import headline_over_maps
 from sva_bench.report.wording import (
     answer,
     assumed,
@@ -46,6 +46,7 @@ from sva_bench.study.given_plans import read_plans
 from sva_bench.study.options import Options
 from sva_bench.study.publish import Run, report_again
 from sva_bench.study.run import run
+from tests.pages import read
 from tests.results_for_tests import over_maps
 from tests.results_for_tests import summary as summary_of_test
 from tests.worlds_for_tests import SMALL, world_of
@@ -125,7 +126,7 @@ def test_a_page_loads_nothing_and_every_reference_in_it_is_met(finished: Run) ->
 
 
 def test_page_terminal_and_summary_have_the_same_figures(finished: Run) -> None:
-    text = html.unescape((finished.folder / "report.html").read_text()).replace("\u00a0", " ")
+    text = read(finished.folder / "report.html")
     assert answer(finished.summary) in text
     for scenario in results_of(finished).scenarios:
         assert finding(scenario.vss) in text
@@ -135,7 +136,7 @@ def test_page_terminal_and_summary_have_the_same_figures(finished: Run) -> None:
 
 _PROBE = """<script>window.onerror=m=>{document.title='error '+m};window.onload=()=>{
 document.querySelectorAll('details').forEach(d=>d.open=true);
-const r=[...document.querySelectorAll('svg')].map(s=>s.getBoundingClientRect());
+const r=[...document.querySelectorAll('svg:not(.k)')].map(s=>s.getBoundingClientRect());
 document.title=JSON.stringify({wide:document.documentElement.scrollWidth,
 window:innerWidth,pictures:r.length,empty:r.filter(b=>b.width<100||b.height<60).length,
 answer:document.querySelector('.answer').getBoundingClientRect().bottom})}</script></body>"""
@@ -249,11 +250,16 @@ def over_trials(units: Sequence[UnitSummary]) -> dict[tuple[str, str, str], Esti
             for unit in units for s in unit.scenarios}
 
 
+def headline_of(*rows: OverMaps) -> str:
+    return headline_over_maps(replace(batch_of([]), aggregate=rows, variants=tuple(dict.fromkeys(
+        row.variant for row in rows))))
+
+
 def test_a_batchs_verdict_and_figure_rest_on_the_same_interval() -> None:
     # Large maps with a surely positive VSS, and a small one that makes its percentage anybody's guess.
-    assert over_maps_said([over_maps(5, (2.0, 8.0), (-1.0, 9.0))]) == (
-        "Over these maps planning for failures pays in S3 (VSS 5.0 [2.0, 8.0]).")
-    assert "no scenario shows a value" in over_maps_said([over_maps(5, (-2.0, 8.0), (1.0, 9.0))])
+    assert headline_of(over_maps(5, (2.0, 8.0), (-1.0, 9.0))) == (
+        "Over only 5 maps planning for failures pays in S3 (VSS 5.0 [2.0, 8.0]).")
+    assert "no scenario shows a value" in headline_of(over_maps(5, (-2.0, 8.0), (1.0, 9.0)))
 
 
 def test_a_batch_of_one_map_has_its_page_too(finished: Run, tmp_path: Path) -> None:
@@ -312,13 +318,16 @@ def test_of_plans_that_are_not_proved_the_answer_says_that_nothing_is_settled(fi
 
 
 def test_given_plans_are_not_said_to_be_planned_under_anything(finished: Run, tmp_path: Path) -> None:
-    assert assumed(finished.summary) == "planned under mission, executed under mission failures"
+    said = "mission (one draw for each robot and mission: a robot that fails never leaves)"
+    assert assumed(finished.summary) == f"failures planned for and executed: {said}"
+    other = replace(finished.summary, failure=Failures(plan="hazard", execute="mission"))
+    assert re.fullmatch(rf"failures planned for: hazard \(.*\); executed: {re.escape(said)}", assumed(other))
     plans = {path.stem: path for path in sorted((finished.folder / "plans").glob("half-*"))}
     world = world_of(tmp_path)
     given = execute_plans(world, read_plans(world, plans), Options(trials=10, rollouts=2, fidelity="kinematic"),
                           tmp_path / "runs", None, lambda *_: None, plan_costs(world, "prmstar", lambda *_: None))
-    assert assumed(given.summary) == "executed under mission failures"
-    assert "planned under" not in (given.folder / "report.html").read_text(encoding="utf-8")
+    assert assumed(given.summary) == f"failures executed: {said}"
+    assert "planned for" not in read(given.folder / "report.html")
 
 
 def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished: Run) -> None:

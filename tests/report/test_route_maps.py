@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from PIL import Image
 
@@ -22,9 +24,10 @@ from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.palette import ROBOTS, hex_of, plan_color
+from sva_bench.report.mark_labels import place_words
 from sva_bench.report.page_style import STYLE
 from sva_bench.report.plan_view import PlanView, _coarser, frame_of
-from sva_bench.report.route_maps import beside, route_maps
+from sva_bench.report.route_maps import _telling_with, beside, route_maps
 from sva_bench.storage.leg_paths import _corners
 from sva_bench.storage.stored_run import Content, read_content
 from sva_bench.storage.trial_counts import Counting
@@ -32,6 +35,7 @@ from sva_bench.study.options import Options
 from sva_bench.study.publish import report_again
 from sva_bench.study.run import run
 from sva_bench.world.maps.ros import read_ros_map
+from tests.results_for_tests import reaction
 from tests.world.maps_for_tests import write_ros_map
 from tests.worlds_for_tests import SMALL, world_of
 
@@ -90,7 +94,7 @@ def test_a_leg_is_the_fainter_the_seldomer_it_is_driven(contents: Mapping[str, C
                 if found.robot == "uv2" and found.left)
     figure = maps_of(content)["half", "deterministic"]
     assert 0.2 < share < 0.8
-    assert f'<g class="leg r1" style="opacity:{0.3 + 0.7 * share:.2f}"' in figure
+    assert f'<g class="leg r1" style="--often:{share:.2f}"' in figure
     assert '<g class="leg r0" style' not in figure  # uv1 is always there
 
 
@@ -106,7 +110,7 @@ def test_marks_say_on_which_leg_how_often_robots_ended(
         counts[whose] = counts.get(whose, 0) + 1
     figure = html.unescape(maps_of(content)["safe", "stochastic"])
     assert len(counts) > 2
-    assert figure.count("<g class=ended>") == len(counts)
+    assert figure.count('<g class="ended">') == len(counts)
     for (robot, stops), count in counts.items():
         ends = content.routes["safe", "stochastic"][robot][stops:stops + 2]
         said = re.search(rf"{robot} failed on leg {stops + 1}, {' → '.join(ends)}: ([0-9.]+) % of missions", figure)
@@ -127,6 +131,38 @@ def test_a_team_that_reacts_has_a_map_with_the_legs_driven_only_then(contents: M
                for ends in itertools.pairwise(route)}
     assert driven - planned
     assert reacting.count('<g class="leg replanned') == len(driven - planned)
+    assert reacting.count("<path class=core") == len(driven - planned)  # hollow, whatever the dashes of its robot
+
+
+@pytest.mark.parametrize(("deterministic", "half", "shown"), [
+    (90.0, 0.5, ["stochastic"]),  # ahead by 11, surely
+    (100.0, 5.0, ["stochastic", "deterministic"]),  # ahead by 1, which is within the noise
+    (102.0, 5.0, ["deterministic", "stochastic"]),  # behind as executed: the other one first
+    (110.0, 0.5, ["deterministic", "stochastic"])])  # noise turned what was found without
+def test_the_map_of_a_reaction_is_of_the_best_plan_or_of_both_that_are_not_told_apart(
+        deterministic: float, half: float, shown: list[str]) -> None:
+    found = reaction("report", {"stochastic": (100.0, 101.0), "deterministic": (80.0, deterministic)}, half=half)
+    assert _telling_with(found) == shown
+
+
+@given(st.lists(st.tuples(st.floats(40, 380), st.floats(40, 380)), min_size=1, max_size=8),
+       st.lists(st.sampled_from(["2.0 %", "13 %", "2", "< 0.1 %"]), min_size=8, max_size=8))
+def test_the_word_of_a_mark_is_beside_it_and_hides_another_only_where_there_is_no_room(
+        places: list[tuple[float, float]], words: list[str]) -> None:
+    marks = [(x, y, 6.0) for x, y in places]
+    found = place_words(marks, words[:len(marks)], [], (0.0, 0.0, 420.0, 420.0))
+    for (x, y, radius), (wx, wy), word in zip(marks, found, words, strict=False):
+        assert abs(wx - x) > radius or abs(wy - y) > radius  # off its own
+        assert abs(wx - x) < radius + 3 * len(word) + 12
+        assert abs(wy - y) < radius + 18
+    (alone,) = place_words(marks[:1], words[:1], [], (0.0, 0.0, 420.0, 420.0))
+    assert alone == pytest.approx((marks[0][0], marks[0][1] - 6.0 - 2.0 - 5.5))  # above, where there is room
+
+
+def test_the_share_of_a_ring_gives_way_to_a_diamond_above_it() -> None:
+    (x, y), _ = place_words([(100.0, 100.0, 6.0), (100.0, 86.0, 5.0)], ["2.0 %", "2"], [], (0.0, 0.0, 420.0, 420.0))
+    assert y == pytest.approx(100.0)
+    assert abs(x - 100.0) > 6.0
 
 
 # Paths

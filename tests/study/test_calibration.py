@@ -218,4 +218,4 @@ def test_calibration_stands_in_the_folder(tmp_path: Path, noisy: World) -> None:
     assert "calibration.csv" in {path.name for path in write_csv(done.folder)}
     page = (done.folder / "report.html").read_text(encoding="utf-8")
     assert "Calibrated plans" in page
-    assert "the price of caution" in page
+    assert "The price of caution" in page

@@ -106,6 +106,23 @@ def test_where_all_pois_are_reachable_there_is_no_warning(tmp_path: Path) -> Non
     assert beyond_reach(done.summary.reach) == []
 
 
+def test_pois_at_which_a_robot_would_earn_nothing_are_not_missed(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # Nobody reaches any of the two; uv1 would earn something at p1 alone, and uv2 nowhere.
+    both = {robot: ["p1", "p2"] for robot in ("uv1", "uv2")}
+    found = reached(both, ["uv1", "uv2"], ["p1", "p2", "p3"], {"uv1": ["p1", "p3"]})
+    assert (found.missed, found.pois) == ({"uv1": ("p1",)}, ("p1",))
+    # uv1 has the fuel for the nearest POIs, and earns nothing at those that it doesn't reach.
+    missed = run_of(tmp_path, SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 16", 1)).summary.reach.missed
+    assert missed
+    (robot, pois), = missed.items()
+    text = SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 16", 1)
+    for poi in pois:
+        text = re.sub(rf"({robot}:\n.*?incentives: {{.*?){poi}: \d+", rf"\g<1>{poi}: 0", text, flags=re.DOTALL)
+    for said in told(run_of(tmp_path, text), capsys):
+        assert "within its fuel and limit" not in said
+
+
 def test_many_pois_are_counted_not_listed() -> None:
     pois = [f"p{k}" for k in range(50)]
     said = beyond_reach(reached({"uv1": pois[:40]}, ["uv1", "uv2"], pois))
@@ -151,12 +168,12 @@ def test_an_infeasible_plan_is_marked_before_its_figure(
         "dry": (False, 20), "good": (True, 0)}
     assert plans["good"].ends["failed"] == 20
     terminal, page = told(done, capsys)
+    assert "dry (infeasible, 20 of 40 robot missions lost) " in terminal
+    assert ">dry (infeasible)</td>" in page
     for text in (terminal, page):
-        assert "dry (infeasible, 20 of 40 robot missions lost) " in text
         assert "dry is infeasible: fuel or mission limit would be broken." in text
         assert "good (" not in text.split("dry is infeasible")[0].split("nominal")[0]
     assert "dry (infeasible) 20 of 40" in terminal
-    assert "no: fuel or limit" in page
 
 
 def test_help_says_what_allow_infeasible_covers(tmp_path: Path) -> None:

@@ -1,0 +1,48 @@
+"""What a batch concludes: as much as its intervals allow, for each variant and scenario."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sva_bench.analysis.over_maps import BatchSummary, OverMaps
+from sva_bench.report.vss_over_maps import headline_over_maps, verdicts_of
+from tests.results_for_tests import over_maps
+
+PAYS, LOSES, EVEN, NONE = (1.0, 3.0), (-3.0, -1.0), (-1.0, 3.0), (0.0, 0.0)
+
+
+def row(scenario: str, variant: str, ends: tuple[float, float] | None, maps: int = 12) -> OverMaps:
+    return replace(over_maps(maps, ends), scenario=scenario, variant=variant)
+
+
+def headline(*rows: OverMaps) -> str:
+    return headline_over_maps(BatchSummary(
+        trials=1, fidelity="kinematic", worlds=("a", "b"), seeds=(0,), units=(), maps=(), failed=(), aggregate=rows,
+        variants=tuple(dict.fromkeys(each.variant for each in rows))))
+
+
+@pytest.mark.parametrize(("rows", "said"), [
+    ([row("S1", "", PAYS), row("S2", "", EVEN)], "Over 12 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
+    ([row("S1", "x", PAYS), row("S1", "y", PAYS), row("S2", "x", PAYS), row("S2", "y", EVEN)],
+     "Over 12 maps planning for failures pays for every variant in S1 and for some variants in S2."),
+    ([row("S1", "x", LOSES), row("S1", "y", EVEN)],
+     "Over 12 maps no scenario shows a value of planning for failures beyond doubt."),
+    ([row("S1", "", PAYS, maps=3), row("S2", "", None, maps=2)],
+     "Over at most 3 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
+    ([row("S1", "", PAYS, maps=9)], "Over only 9 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
+    ([row("S1", "", PAYS, maps=1)],
+     "One map can't tell what planning for failures is worth over maps; below is its worth on this one.")])
+def test_a_headline_says_over_how_many_maps_and_for_which_variants(rows: list[OverMaps], said: str) -> None:
+    assert headline(*rows) == said
+
+
+@pytest.mark.parametrize(("ends", "said"), [
+    ([PAYS, PAYS], "pays for any variant (VSS 2.0 to 2.0)"), ([NONE, NONE], "no difference for any variant"),
+    ([PAYS, EVEN], "pays for x (VSS 2.0 [1.0, 3.0]); can't be told for y"),
+    ([EVEN, LOSES], "costs for y (VSS -2.0 [-3.0, -1.0]); can't be told for x"),
+    ([None, PAYS], "pays for y (VSS 2.0 [1.0, 3.0]); no interval for x")])
+def test_each_scenario_has_a_line_of_its_variants_by_their_intervals(
+        ends: list[tuple[float, float] | None], said: str) -> None:
+    assert verdicts_of([row("S", variant, each) for variant, each in zip("xy", ends, strict=True)], str) == said
