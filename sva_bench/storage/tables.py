@@ -25,7 +25,7 @@ MOST_BYTES = 1 << 29
 """Bytes that a column of a row group, and all that is held at a time, may unpack to."""
 MOST_NOTE_BYTES = 10_000_000
 _AGAIN = "run the command in manifest.json again"
-_BATCH = 1 << 14  # rows: with four times as many, a report takes a fifth more memory and is no faster
+_BATCH = 1 << 13  # rows: with eight times as many, a report takes a fifth more memory and is no faster
 
 _WORD, _COUNT, _FIGURE = pa.string(), pa.int64(), pa.float64()
 

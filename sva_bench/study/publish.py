@@ -37,7 +37,6 @@ from sva_bench.storage.run_folder import (
 from sva_bench.storage.stored_run import Content, read_content, run_folder_at
 from sva_bench.storage.trial_counts import Counting
 from sva_bench.study.options import Options, identity_of, settings_of
-from sva_bench.study.recording_files import write_recordings
 from sva_bench.study.recordings import Recorded
 from sva_bench.study.summing import by_case
 from sva_bench.travel.fuel import FuelCosts
@@ -86,6 +85,10 @@ def publish(
                     {"world": resolved, "options": identity_of(world, options), **_digests(world), **(identity or {})})
     stems = {key: stem_of(*key, foreign=foreign) for key in by_case(executed)}
     routes = {key: run.case.plan.routes for key, run in by_case(executed).items()}
+    from sva_bench.study.recording_files import (
+        write_recordings,  # the viewer's library takes memory: no report needs it
+    )
+
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
         (folder / "recordings").mkdir()
