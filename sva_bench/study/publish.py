@@ -85,9 +85,8 @@ def publish(
                     {"world": resolved, "options": identity_of(world, options), **_digests(world), **(identity or {})})
     stems = {key: stem_of(*key, foreign=foreign) for key in by_case(executed)}
     routes = {key: run.case.plan.routes for key, run in by_case(executed).items()}
-    from sva_bench.study.recording_files import (
-        write_recordings,  # the viewer's library takes memory: no report needs it
-    )
+    # The viewer's library takes memory, and no report needs it.
+    from sva_bench.study.recording_files import write_recordings
 
     with run_folder(out, name) as folder:
         (folder / "plans").mkdir()
