@@ -49,7 +49,7 @@ CASES = (
     Case(name="A-60-M4", family="A", pois=60, vehicles=4, limit_s=90),
     Case(name="B-30", family="B", pois=30, vehicles=2, limit_s=4),
     Case(name="B-40", family="B", pois=40, vehicles=2, limit_s=40),
-    Case(name="B-60", family="B", pois=60, vehicles=2, limit_s=120, gap_pct=1.0),
+    Case(name="B-60", family="B", pois=60, vehicles=2, limit_s=300),
     Case(name="C-40-M4", family="C", pois=40, vehicles=4, limit_s=4),
     Case(name="C-60-M4", family="C", pois=60, vehicles=4, limit_s=10),
     Case(name="C-60-M8", family="C", pois=60, vehicles=8, limit_s=180),
