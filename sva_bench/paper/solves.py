@@ -177,10 +177,14 @@ def row_of(case: Case, study: Study, plan: Plan, *, process_s: float, wall_s: fl
 
 
 def warm_up(study: Study) -> None:
-    """Load what is compiled, and let each method meet its libraries, before anything is timed."""
+    """Load what is compiled, and let each method meet its libraries, before anything is timed.
+
+    The own method goes by size and rewards, so it takes several instances to meet all that is compiled.
+    """
     for method in study.methods:
-        plan_stochastic(Case(pois=6, seed=0, fuel_multiple=2.25, availability=0.75, method=method).instance(study.tau),
-                        SolveLimits(time_limit_s=study.time_limit_s), method=method)
+        for pois, availability in ((6, 0.75), *(((20, 1.0), (20, 0.0)) if method == "auto" else ())):
+            case = Case(pois=pois, seed=0, fuel_multiple=2.25, availability=availability, method=method)
+            plan_stochastic(case.instance(study.tau), SolveLimits(time_limit_s=study.time_limit_s), method=method)
 
 
 def run(study: Study, path: Path, on_row: Callable[[int, int, Row], None] = lambda done, of, row: None) -> list[Row]:  # noqa: ARG005

@@ -34,7 +34,7 @@ _ROUNDS = 8  # of cuts at a node
 _STALL = 0.02  # of the node's gap: a round that gains less counts as idle
 _IDLE_ROUNDS = 2
 _SPARE_CUTS = 1.2  # of the model's rows: so many more than after the last purge cause another
-GUIDED = {1: 4, 2: 2, 6: 2, 11: 2}
+GUIDED = {1: 1, 6: 1, 16: 1}
 """Searches of the heuristic at a node, by its number."""
 GUIDED_EVERY = 25
 """Nodes between two searches later on."""
