@@ -20,9 +20,15 @@ CALIBRATION_HEAD = ("scenario", "made for costs at", "promised", "executed by th
 
 
 def calibration_lines(summary: Summary) -> list[str]:
-    """What the calibration of each scenario comes to, in a sentence, and in another what was executed otherwise."""
-    return [f"{scenario.name}: {_told(found)}{_executed_otherwise(summary, scenario, found)}"
-            for scenario in summary.scenarios if (found := scenario.calibration) is not None]
+    """What the calibration of each scenario comes to, in a sentence, and in another what was executed otherwise.
+
+    Scenarios of which the same is to be said share a line.
+    """
+    said: dict[str, list[str]] = {}
+    for scenario in summary.scenarios:
+        if (found := scenario.calibration) is not None:
+            said.setdefault(f"{_told(found)}{_executed_otherwise(summary, scenario, found)}", []).append(scenario.name)
+    return [f"{listed(names)}: {words}" for words, names in said.items()]
 
 
 def calibration_told(summary: Summary) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from sva_bench.analysis.compared_values import KeyComparison, ValueGain, ValueRow, shown_value
 from sva_bench.analysis.results import Estimate
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import with_interval
+from sva_bench.report.wording import listed, with_interval
 
 
 def compared_title(found: KeyComparison) -> str:
@@ -34,12 +34,25 @@ def compared_answers(found: KeyComparison) -> list[str]:
             said.append(f"{where}: no interval; " + ("more maps would tell how maps differ." if found.sample == "maps"
                                                       else "more trials or noise draws would give one."))
         elif not better and not worse:
-            said.append(f"{where}: no value can be told apart from {reference}.")
+            said.append(f"{where}: what the plan collects can't be told apart from that with {reference}"
+                        f"{_vss_all_the_same(rows)}.")
         else:
             said.append(f"{where}: " + "; ".join([
                 *(_worth(row, reference, "more") for row in sorted(better, key=lambda row: -_mean(row))),
                 *(_worth(row, reference, "less") for row in sorted(worse, key=_mean))]) + ".")
     return said
+
+
+def _vss_all_the_same(rows: Sequence[ValueRow]) -> str:
+    """By how much the VSS differs though what the plan collects doesn't distinguishably; nothing where neither does."""
+    told = []
+    for row in rows:
+        gain = row.vss_gain
+        if gain is not None and gain.distinguishable and gain.ci95_adjusted is not None:
+            low, high = sorted(map(abs, gain.ci95_adjusted))
+            told.append(f"{abs(gain.mean):.1f} {'more' if gain.mean > 0 else 'less'} with {shown_value(row.value)} "
+                        f"[{low:.1f}, {high:.1f}]")
+    return f", but planning for failures is worth {listed(told)}" if told else ""
 
 
 def _mean(row: ValueRow) -> float:
