@@ -18,29 +18,34 @@ def compared_title(found: KeyComparison) -> str:
 
 
 def compared_answers(found: KeyComparison) -> list[str]:
-    """For each scenario, which value is worth more than the reference, by the intervals that hold together."""
-    reference = shown_value(found.reference)
-    said = []
+    """For each scenario, which value is worth more than the reference, by the intervals that hold together.
+
+    Scenarios of which the same is to be said share a sentence.
+    """
+    said: dict[str, list[str]] = {}
     for place in dict.fromkeys((row.scenario, row.others) for row in found.rows):
         rows = [row for row in found.rows if (row.scenario, row.others) == place and row.gain is not None]
         where = f"{place[0]} ({place[1]})" if place[1] else place[0]
-        better = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean > 0]
-        worse = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean < 0]
-        if not rows:
-            said.append(f"{where}: nothing to compare with {reference}, of which nothing is done.")
-        elif all(row.gain and row.gain.ci95 is None and row.gain.mean == 0 for row in rows):
-            said.append(f"{where}: no difference from {reference} was met.")
-        elif all(row.gain and row.gain.ci95 is None for row in rows):
-            said.append(f"{where}: no interval; " + ("more maps would tell how maps differ." if found.sample == "maps"
-                                                      else "more trials or noise draws would give one."))
-        elif not better and not worse:
-            said.append(f"{where}: what the plan collects can't be told apart from that with {reference}"
-                        f"{_vss_all_the_same(rows)}.")
-        else:
-            said.append(f"{where}: " + "; ".join([
-                *(_worth(row, reference, "more") for row in sorted(better, key=lambda row: -_mean(row))),
-                *(_worth(row, reference, "less") for row in sorted(worse, key=_mean))]) + ".")
-    return said
+        said.setdefault(_compared(found, rows), []).append(where)
+    return [f"{listed(places)}: {words}." for words, places in said.items()]
+
+
+def _compared(found: KeyComparison, rows: Sequence[ValueRow]) -> str:
+    """What the values are worth in one scenario, beside the reference."""
+    reference = shown_value(found.reference)
+    better = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean > 0]
+    worse = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean < 0]
+    if not rows:
+        return f"nothing to compare with {reference}, of which nothing is done"
+    if all(row.gain and row.gain.ci95 is None and row.gain.mean == 0 for row in rows):
+        return f"no difference from {reference} was met"
+    if all(row.gain and row.gain.ci95 is None for row in rows):
+        return "no interval; " + ("more maps would tell how maps differ" if found.sample == "maps"
+                                  else "more trials or noise draws would give one")
+    if not better and not worse:
+        return f"what the plan collects can't be told apart from that with {reference}{_vss_all_the_same(rows)}"
+    return "; ".join([*(_worth(row, reference, "more") for row in sorted(better, key=lambda row: -_mean(row))),
+                      *(_worth(row, reference, "less") for row in sorted(worse, key=_mean))])
 
 
 def _vss_all_the_same(rows: Sequence[ValueRow]) -> str:

@@ -14,6 +14,7 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 38.0, 10.0, 20.0, 32.0  # about the lane
 _MOST_Y, _MOST_X = 4, 5  # ticks
 _GAP = 5.0  # between the lane and its figures
 _LETTER = 6.2
+_DIGIT, _MINUS = 7.0, 9.3  # widths in wide system fonts, at the size of ticks
 MOST_PANELS = 12
 """Small charts that are shown of one kind."""
 
@@ -87,6 +88,11 @@ def panels(told: str, axes: Axes, shown: Sequence[Panel], caption: str) -> str:
             f"<figcaption>{sentence(caption + more)}</figcaption></figure>")
 
 
+def _wide(figure: str) -> float:
+    """Width of a figure at a tick: a digit takes less than the minus sign, of which an exponent may have another."""
+    return _DIGIT * len(figure) + (_MINUS - _DIGIT) * figure.count("-")
+
+
 def _upright(points: Sequence[Point], *, zero: bool) -> tuple[float, float]:
     ends = [end for point in points for end in (point.y, *(point.interval or ()))]
     return _with_room([*ends, 0.0] if zero else ends)
@@ -110,7 +116,7 @@ class _Reach:
     @property
     def left(self) -> float:
         """Where the lane begins: right of the longest figure at its ticks."""
-        return max([_LEFT, *(_GAP + _LETTER * len(f"{at:g}") for at in self.ticks())])
+        return max([_LEFT, *(_GAP + _wide(f"{at:g}") for at in self.ticks())])
 
     def ticks(self) -> Sequence[float]:
         """Where the upright axis has its figures."""

@@ -36,3 +36,13 @@ EVEN = gain(3.0, 5.0)
     ([(gain(7.0, 1.0), gain(4.0, 1.0))], "S: x2 is worth 7.0 more than x1 [6.0, 8.0].")])
 def test_where_only_the_vss_differs_that_is_said(gains: list[tuple[ValueGain, ValueGain]], answer: str) -> None:
     assert said(*gains) == answer
+
+
+def test_scenarios_of_which_the_same_is_said_share_a_sentence() -> None:
+    plain = Estimate(mean=1.0, ci95=(0.0, 2.0))
+    rows = [ValueRow(scenario=name, others="", value='"x2"', maps=12, executed=plain, vss=plain, gain=own,
+                     vss_gain=EVEN) for name, own in (("S1", EVEN), ("S2", gain(7.0, 1.0)), ("S3", EVEN))]
+    assert compared_answers(KeyComparison(
+        key="k", reference='"x1"', values=('"x1"', '"x2"'), sample="maps", rows=tuple(rows))) == [
+        "S1 and S3: what the plan collects can't be told apart from that with x1.",
+        "S2: x2 is worth 7.0 more than x1 [6.0, 8.0]."]
