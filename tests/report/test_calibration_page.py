@@ -86,6 +86,18 @@ def test_a_plan_in_which_nobody_leaves_is_said_not_to_count() -> None:
     assert "somebody leaves" not in without
 
 
+@pytest.mark.parametrize(("share", "most", "said"), [
+    (0.005, 0.04, True), (0.005, 0.008, False), (0.02, 0.04, False)])  # 1 % was asked for
+def test_a_share_that_is_met_as_executed_and_not_proved_is_said_to_be(share: float, most: float, said: bool) -> None:
+    found = run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True)
+    (scenario,) = found.scenarios
+    plan = replace(scenario.plans["calibrated"], bad=Share(share=share, ci95=(0.0, most)))
+    page = "".join(calibration_section(replace(found, scenarios=(
+        replace(scenario, plans={**scenario.plans, "calibrated": plan}),)))).replace("\u00a0", " ")
+    assert (f"Met as executed, but not proved by 32 noise draws, in {scenario.name}: the interval goes beyond 1 %." in
+            page) == said
+
+
 def test_scenarios_of_which_the_same_is_to_be_said_share_a_line() -> None:
     one = run_of((100.0, 0.5), (80.0, 0.1), chosen=1, reached=False).scenarios[0]
     other = run_of((100.0, 0.5), (90.0, 0.1), chosen=1, reached=False)
