@@ -235,3 +235,4 @@ def test_a_page_that_is_made_of_the_code_is_up_to_date(page: str, made: object, 
     assert callable(made)
     assert (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8") == made(), \
         f"python -m tests.{by} > docs/{page}.md"
+    assert f"`python -m tests.{by} > docs/{page}.md`" in (ROOT / "docs" / "development.md").read_text(encoding="utf-8")

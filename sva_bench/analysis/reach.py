@@ -34,8 +34,12 @@ def reached(
 
 
 def why_nothing(reach: Reach) -> str:
-    """Why no robot reaches any POI, where that is so, and what to change."""
-    return _NOTHING if reach.missed else "the world has no POIs: add some under sites.pois"
+    """Why no robot reaches any POI, where that is so, and what to change.
+
+    Where none of those out of reach would earn anything, or there are none, more fuel is no help.
+    """
+    return _NOTHING if reach.missed else \
+        "no POI earns a robot anything: add some under sites.pois, and give robots incentives there"
 
 
 def beyond_reach(reach: Reach) -> list[str]:

@@ -15,7 +15,7 @@ _GROUPS: Mapping[str, tuple[str, ...]] = {
     "Failures, news and other robots": ("execute_failure", "policy", "news", "anticipate", "interaction", "departures"),
     "Running": ("resume", "dry_run", "workers", "dask", "unit_trials", "unit_time_limit", "memory_mb", "cache"),
     "Output": ("out", "output", "to", "csv", "as_csv", "as_json", "junit", "wide", "verbose", "force", "view",
-               "screenshot", "at", "web", "listed"),
+               "screenshot", "at", "video", "web", "listed"),
 }
 """Options of commands by group; all others stand first, under Options."""
 

@@ -58,6 +58,9 @@ def print_summary(
     _print_plans(summary, robots, console, wide=wide)
     if doubts_told(summary.scenarios):
         console.print(DOUBTED_TOLD, highlight=False)
+    if isinstance(summary, ComparisonSummary):
+        console.print("Robots lost: of so many robot missions, those that left the base and never came back; one that "
+                      "fails at the base is not lost.", highlight=False)
     console.print(f"{counted(travel.pairs, 'travel time')}, {travel.triangle_violations_pct:.1f} % repaired, by up to "
                   f"{travel.max_excess_pct:.1f} %. {processes_told(summary)}", highlight=False)
     for said in dependent_robots(world, summary) if world else ():

@@ -19,6 +19,8 @@ from sva_bench.workers.pool import local_workers
 if TYPE_CHECKING:
     from sva_bench.storage.trial_choice import TrialChoice
 
+_WHICH = "Which recording"
+
 
 def view(
     recording: Annotated[Path, typer.Argument(metavar="RUN-or-RRD", help="Run folder, or one recording.",
@@ -31,11 +33,12 @@ def view(
     at: Annotated[float | None, typer.Option(metavar="S", min=0, help="Mission time of the picture.",
                                              show_default="the end")] = None,
     scenario: Annotated[str | None, typer.Option(help="Of a run: only recordings of this scenario.",
-                                                 show_default="all")] = None,
+                                                 rich_help_panel=_WHICH, show_default="all")] = None,
     planner: Annotated[str | None, typer.Option(help="Of a run: only recordings of this planner's plan.",
-                                                show_default="all")] = None,
+                                                rich_help_panel=_WHICH, show_default="all")] = None,
     trial: Annotated[str | None, typer.Option(metavar=TRIAL_METAVAR, help="Of a run: only this trial, which is played "
-                                              "again if it isn't recorded.", show_default="all")] = None,
+                                              "again if it isn't recorded.", rich_help_panel=_WHICH,
+                                              show_default="all")] = None,
 ) -> None:
     """Open recordings in the Rerun viewer, or draw one.
 

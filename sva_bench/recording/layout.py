@@ -31,7 +31,8 @@ def layout_of(story: Story) -> rrb.Blueprint:
         rrb.Tabs(fuel, speed, active_tab=0) if limited else speed,
         rrb.TimeSeriesView(origin="collected", name="Incentive collected", axis_x=axis,
                            axis_y=_from_zero(float(story.total.value[-1])), plot_legend=rrb.Corner2D.LeftTop)]
-    shares = [3.4 + 0.5 * len(story.views), 3, 3]
+    # Text and legend have a line for each robot, and there is more to say of the marks where one is lost.
+    shares = [3.6 + 0.6 * len(story.views) + 0.9 * bool(story.lost), 3, 2.4 + 0.25 * len(story.views)]
     if story.lanes:
         right.append(rrb.TimeSeriesView(
             origin="news", name="Who was lost, and who learned of it when", axis_x=axis,
@@ -40,7 +41,7 @@ def layout_of(story: Story) -> rrb.Blueprint:
         shares.append(2)
     right.append(_log("events", "Events"))
     left = rrb.Vertical(_map("", story), _states("states", axis), row_shares=[10, _lanes_share(len(story.views))])
-    return _whole(rrb.Horizontal(left, rrb.Vertical(*right, row_shares=[*shares, 4]), column_shares=[13, 7]), story)
+    return _whole(rrb.Horizontal(left, rrb.Vertical(*right, row_shares=[*shares, 3.5]), column_shares=[13, 7]), story)
 
 
 def layout_of_pair(stories: Mapping[str, Story]) -> rrb.Blueprint:

@@ -20,9 +20,15 @@ CALIBRATION_HEAD = ("scenario", "made for costs at", "promised", "executed by th
 
 
 def calibration_lines(summary: Summary) -> list[str]:
-    """What the calibration of each scenario comes to, in a sentence, and in another what was executed otherwise."""
-    return [f"{scenario.name}: {_told(found)}{_executed_otherwise(summary, scenario, found)}"
-            for scenario in summary.scenarios if (found := scenario.calibration) is not None]
+    """What the calibration of each scenario comes to, in a sentence, and in another what was executed otherwise.
+
+    Scenarios of which the same is to be said share a line.
+    """
+    said: dict[str, list[str]] = {}
+    for scenario in summary.scenarios:
+        if (found := scenario.calibration) is not None:
+            said.setdefault(f"{_told(found)}{_executed_otherwise(summary, scenario, found)}", []).append(scenario.name)
+    return [f"{listed(names)}: {words}" for words, names in said.items()]
 
 
 def calibration_told(summary: Summary) -> str:
@@ -182,11 +188,20 @@ def _explained(summary: Summary, found: Sequence[tuple[ScenarioSummary, Calibrat
     share = found[0][1].share
     if above and share is not None:
         yield f"Missed as executed in {listed(above)}: {_why_otherwise(summary, share)}."
+    if share is not None and (unproved := [s.name for s, c in found if _met_without_proof(s, share)]):
+        yield (f"Met as executed, but not proved by {counted(summary.rollouts, 'noise draw')}, in {listed(unproved)}: "
+               f"the interval goes beyond {share_pct(found[0][1])}. The twin proves by draws of its own.")
     for scenario, calibration in found:
         if not calibration.reached:
             yield f"{scenario.name}: {_told(calibration)}"
     if nominal := [s.name for s, c in found if c.is_nominal and c.reached]:
         yield f"In {listed(nominal)} the nominal plan is the one that was asked for."
+
+
+def _met_without_proof(scenario: ScenarioSummary, share: float) -> bool:
+    """Whether the share of missions that went wrong as executed is small enough, and the end of its interval isn't."""
+    bad = scenario.plans["calibrated"].bad
+    return bad is not None and bad.share <= share and bad.ci95 is not None and bad.ci95[1] > share
 
 
 def _price(found: Sequence[tuple[ScenarioSummary, Calibration]]) -> str:

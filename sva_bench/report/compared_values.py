@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from sva_bench.analysis.compared_values import KeyComparison, ValueGain, ValueRow, shown_value
 from sva_bench.analysis.results import Estimate
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import with_interval
+from sva_bench.report.wording import listed, with_interval
 
 
 def compared_title(found: KeyComparison) -> str:
@@ -18,28 +18,46 @@ def compared_title(found: KeyComparison) -> str:
 
 
 def compared_answers(found: KeyComparison) -> list[str]:
-    """For each scenario, which value is worth more than the reference, by the intervals that hold together."""
-    reference = shown_value(found.reference)
-    said = []
+    """For each scenario, which value is worth more than the reference, by the intervals that hold together.
+
+    Scenarios of which the same is to be said share a sentence.
+    """
+    said: dict[str, list[str]] = {}
     for place in dict.fromkeys((row.scenario, row.others) for row in found.rows):
         rows = [row for row in found.rows if (row.scenario, row.others) == place and row.gain is not None]
         where = f"{place[0]} ({place[1]})" if place[1] else place[0]
-        better = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean > 0]
-        worse = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean < 0]
-        if not rows:
-            said.append(f"{where}: nothing to compare with {reference}, of which nothing is done.")
-        elif all(row.gain and row.gain.ci95 is None and row.gain.mean == 0 for row in rows):
-            said.append(f"{where}: no difference from {reference} was met.")
-        elif all(row.gain and row.gain.ci95 is None for row in rows):
-            said.append(f"{where}: no interval; " + ("more maps would tell how maps differ." if found.sample == "maps"
-                                                      else "more trials or noise draws would give one."))
-        elif not better and not worse:
-            said.append(f"{where}: no value can be told apart from {reference}.")
-        else:
-            said.append(f"{where}: " + "; ".join([
-                *(_worth(row, reference, "more") for row in sorted(better, key=lambda row: -_mean(row))),
-                *(_worth(row, reference, "less") for row in sorted(worse, key=_mean))]) + ".")
-    return said
+        said.setdefault(_compared(found, rows), []).append(where)
+    return [f"{listed(places)}: {words}." for words, places in said.items()]
+
+
+def _compared(found: KeyComparison, rows: Sequence[ValueRow]) -> str:
+    """What the values are worth in one scenario, beside the reference."""
+    reference = shown_value(found.reference)
+    better = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean > 0]
+    worse = [row for row in rows if row.gain and row.gain.distinguishable and row.gain.mean < 0]
+    if not rows:
+        return f"nothing to compare with {reference}, of which nothing is done"
+    if all(row.gain and row.gain.ci95 is None and row.gain.mean == 0 for row in rows):
+        return f"no difference from {reference} was met"
+    if all(row.gain and row.gain.ci95 is None for row in rows):
+        return "no interval; " + ("more maps would tell how maps differ" if found.sample == "maps"
+                                  else "more trials or noise draws would give one")
+    if not better and not worse:
+        return f"what the plan collects can't be told apart from that with {reference}{_vss_all_the_same(rows)}"
+    return "; ".join([*(_worth(row, reference, "more") for row in sorted(better, key=lambda row: -_mean(row))),
+                      *(_worth(row, reference, "less") for row in sorted(worse, key=_mean))])
+
+
+def _vss_all_the_same(rows: Sequence[ValueRow]) -> str:
+    """By how much the VSS differs though what the plan collects doesn't distinguishably; nothing where neither does."""
+    told = []
+    for row in rows:
+        gain = row.vss_gain
+        if gain is not None and gain.distinguishable and gain.ci95_adjusted is not None:
+            low, high = sorted(map(abs, gain.ci95_adjusted))
+            told.append(f"{abs(gain.mean):.1f} {'more' if gain.mean > 0 else 'less'} with {shown_value(row.value)} "
+                        f"[{low:.1f}, {high:.1f}]")
+    return f", but planning for failures is worth {listed(told)}" if told else ""
 
 
 def _mean(row: ValueRow) -> float:

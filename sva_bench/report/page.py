@@ -58,15 +58,22 @@ def table(
         return ' class="text long"' if len(cell) > _LONG else " class=text"
 
     def above(k: int) -> str:
-        if not sections or (k and sections[k] == sections[k - 1]):
-            return ""
-        return f'<tr><th scope="rowgroup" class="text section" colspan={len(head)}>{text(sections[k])}</th></tr>'
+        return "" if not sections else \
+            f'<tr><th scope="rowgroup" class="text section" colspan={len(head)}>{text(sections[k])}</th></tr>'
 
-    body = "".join(above(k) + row(cells, "td") for k, cells in enumerate(rows))
-    kept = "<table class=few>" if len(rows) <= _FEW else "<table>"
-    whole = f"<div class=wide tabindex=0>{kept}<thead>{row(head, 'th')}</thead><tbody>{body}</tbody></table></div>"
+    bodies = "</tbody><tbody>".join(  # a body for each section: print breaks between them
+        above(first) + "".join(row(cells, "td") for cells in rows[first:last])
+        for first, last in _sections(sections, len(rows)))
+    kept = "<table class=few>" if len(rows) <= (_FEW_IN_SECTIONS if sections else _FEW) else "<table>"
+    whole = f"<div class=wide tabindex=0>{kept}<thead>{row(head, 'th')}</thead><tbody>{bodies}</tbody></table></div>"
     # No caption of the table's own: it would be as wide as the table, and scroll out of sight with it.
     return f"<figure class=rows><figcaption>{sentence(caption)}</figcaption>{whole}</figure>" if caption else whole
+
+
+def _sections(names: Sequence[str], rows: int) -> list[tuple[int, int]]:
+    """First row and end of each run of rows with the same name."""
+    starts = [k for k in range(rows) if not k or (names and names[k] != names[k - 1])]
+    return list(zip(starts, [*starts[1:], rows], strict=True))
 
 
 def table_of_html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -79,7 +86,7 @@ def table_of_html(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 CONTENTS = "<!--contents-->"
 """Where a page has its contents."""
-_FEW = 24  # rows that print keeps on one sheet
+_FEW, _FEW_IN_SECTIONS = 24, 8  # rows that print keeps on one sheet
 _LONG = 40  # letters from which on a name or a route may go on in a second line
 
 

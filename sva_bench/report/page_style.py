@@ -57,7 +57,7 @@ table{{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92r
 th,td{{padding:.3rem .7rem;text-align:right;border-bottom:1px solid var(--line);vertical-align:top}}
 thead th{{border-bottom:2px solid var(--soft)}}.text{{text-align:left}}td.text{{white-space:nowrap}}
 th.section{{overflow-wrap:anywhere;padding-top:.7rem;background:color-mix(in srgb,var(--ink) 5%,transparent)}}
-tbody tr:first-child .section{{padding-top:.3rem}}
+tbody:first-of-type tr:first-child .section{{padding-top:.3rem}}
 td.long{{white-space:normal;min-width:16rem;overflow-wrap:anywhere}}
 td b{{font-weight:600}}
 figure.rows>figcaption{{padding-bottom:.3rem}}
@@ -117,9 +117,11 @@ gap:.6rem 1.4rem}}
 h2,h3,summary,thead,tr:has(>.section),figure.rows>figcaption:not(:last-child),nav,h2+.note,h2+p,p.legend{{break-after:avoid}}
 details::details-content{{break-before:avoid}}table.few,figure:has(>.wide>.few),figure:has(>.panels),li:not(:has(ul)){{break-inside:avoid}}
 li>b{{break-after:avoid}}li:has(>ul)>ul{{break-before:avoid}}
-details:has(>.pair){{break-inside:avoid}}.panels{{display:block}}
+details:has(>.pair),.pair{{break-inside:avoid}}.panels{{display:block}}
 .panels svg{{display:inline-block!important;width:31%;margin-right:1.5%}}
-nav{{display:none}}tr,.map{{break-inside:avoid}}figure.rows:not(:has(>.wide>.few,>.panels)){{break-inside:auto}}
+nav{{display:none}}tr,.map,table:not(.few) tbody:not(:only-of-type){{break-inside:avoid}}
+.map svg{{max-width:310px!important}}
+figure.rows:not(:has(>.wide>.few,>.panels)){{break-inside:auto}}
 details::details-content{{content-visibility:visible!important;block-size:auto!important;display:block!important}}
 summary{{list-style:none}}
 table{{font-size:8pt}}

@@ -12,7 +12,9 @@ from sva_bench.report.rows_chart import round_ticks
 _WIDTH, _HEIGHT = 260.0, 150.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 38.0, 10.0, 20.0, 32.0  # about the lane
 _MOST_Y, _MOST_X = 4, 5  # ticks
+_GAP = 5.0  # between the lane and its figures
 _LETTER = 6.2
+_DIGIT, _MINUS = 7.0, 9.3  # widths in wide system fonts, at the size of ticks
 MOST_PANELS = 12
 """Small charts that are shown of one kind."""
 
@@ -86,6 +88,11 @@ def panels(told: str, axes: Axes, shown: Sequence[Panel], caption: str) -> str:
             f"<figcaption>{sentence(caption + more)}</figcaption></figure>")
 
 
+def _wide(figure: str) -> float:
+    """Width of a figure at a tick: a digit takes less than the minus sign, of which an exponent may have another."""
+    return _DIGIT * len(figure) + (_MINUS - _DIGIT) * figure.count("-")
+
+
 def _upright(points: Sequence[Point], *, zero: bool) -> tuple[float, float]:
     ends = [end for point in points for end in (point.y, *(point.interval or ()))]
     return _with_room([*ends, 0.0] if zero else ends)
@@ -106,26 +113,35 @@ class _Reach:
     y0: float
     y1: float
 
+    @property
+    def left(self) -> float:
+        """Where the lane begins: right of the longest figure at its ticks."""
+        return max([_LEFT, *(_GAP + _wide(f"{at:g}") for at in self.ticks())])
+
+    def ticks(self) -> Sequence[float]:
+        """Where the upright axis has its figures."""
+        return round_ticks(self.y0, self.y1, _MOST_Y)
+
     def x(self, at: float) -> float:
-        return _LEFT + (at - self.x0) / (self.x1 - self.x0) * (_WIDTH - _LEFT - _RIGHT)
+        return self.left + (at - self.x0) / (self.x1 - self.x0) * (_WIDTH - self.left - _RIGHT)
 
     def y(self, at: float) -> float:
         return _HEIGHT - _BOTTOM - (at - self.y0) / (self.y1 - self.y0) * (_HEIGHT - _TOP - _BOTTOM)
 
 
 def _picture(told: str, axes: Axes, panel: Panel, reach: _Reach) -> str:
-    right, bottom = _WIDTH - _RIGHT, _HEIGHT - _BOTTOM
+    left, right, bottom = reach.left, _WIDTH - _RIGHT, _HEIGHT - _BOTTOM
     parts = [f'<text class=name x="0" y="13"><title>{text(panel.title)}</title>{text(_cut(panel.title))}</text>',
-             f'<rect class=lane x="{_LEFT:.0f}" y="{_TOP:.0f}" width="{right - _LEFT:.0f}" '
+             f'<rect class=lane x="{left:.0f}" y="{_TOP:.0f}" width="{right - left:.0f}" '
              f'height="{bottom - _TOP:.0f}" rx="2"/>']
-    for at in round_ticks(reach.y0, reach.y1, _MOST_Y):
+    for at in reach.ticks():
         kind = "zero" if at == 0 and axes.zero else "grid"
-        parts.append(f'<path class={kind} d="M{_LEFT:.0f} {reach.y(at):.1f}H{right:.0f}"/>'
-                     f'<text class="tick left" x="{_LEFT - 5:.0f}" y="{reach.y(at) + 4:.1f}">{typeset(f"{at:g}")}'
+        parts.append(f'<path class={kind} d="M{left:.0f} {reach.y(at):.1f}H{right:.0f}"/>'
+                     f'<text class="tick left" x="{left - _GAP:.0f}" y="{reach.y(at) + 4:.1f}">{typeset(f"{at:g}")}'
                      "</text>")
     parts += [f'<text class=tick x="{reach.x(at):.1f}" y="{bottom + 13:.0f}"><title>{text(word)}</title>'
               f"{text(typeset(shown))}</text>" for at, word, shown in _places(axes, reach)]
-    parts.append(f'<text class=tick x="{(_LEFT + right) / 2:.0f}" y="{_HEIGHT - 4:.0f}">{text(axes.x)}</text>')
+    parts.append(f'<text class=tick x="{(left + right) / 2:.0f}" y="{_HEIGHT - 4:.0f}">{text(axes.x)}</text>')
     if panel.aim is not None:
         parts.append(f'<path class=aim d="M{reach.x(panel.aim):.1f} {_TOP:.0f}V{bottom:.0f}"/>')
     if axes.joined and len(panel.points) > 1:
@@ -148,7 +164,7 @@ def _places(axes: Axes, reach: _Reach) -> list[tuple[float, str, str]]:
         return [(at, f"{at:g}", f"{at:g}") for at in round_ticks(reach.x0, reach.x1, _MOST_X)]
     kept: list[tuple[float, str, str]] = []
     free = -math.inf
-    room = max(int((_WIDTH - _LEFT) / len(axes.places) / _LETTER), 5)
+    room = max(int((_WIDTH - reach.left) / len(axes.places) / _LETTER), 5)
     for at, word in sorted(axes.places):
         shown = word if len(word) <= room else f"{word[:room - 1]}…"
         half = _LETTER * len(shown) / 2

@@ -140,10 +140,10 @@ def _worth(rows: Sequence[Reacting]) -> str:
     said = []
     if pays:
         said.append("planning for failures is worth " + few_of(
-            [f"{_amount_of_vss(row.reaction)} in {row.scenario.name}{_without(row)}" for row in pays]))
+            [f"{_amount_of_vss(row.reaction)} in {row.scenario.name} ({_without(row)})" for row in pays]))
     if loses:
         said.append("the deterministic plan is worth more in " + few_of(
-            [f"{row.scenario.name} (VSS {_amount_of_vss(row.reaction)}{_without(row)})" for row in loses]))
+            [f"{row.scenario.name} (VSS {_amount_of_vss(row.reaction)}; {_without(row)})" for row in loses]))
     if even:
         said.append("the value of planning for failures is not distinguishable from zero in " + few_of(
             [row.scenario.name + _where_uneven(row) for row in even]))
@@ -190,25 +190,23 @@ def _is_worthless(reaction: ReactionFigures) -> bool:
 
 
 def _without(row: Reacting) -> str:
-    """What is to be said of the VSS without reaction, behind that with it.
-
-    The run has it of its own trials, in another figure if these are other missions: two figures of one thing would
-    only puzzle, so what is said then is whether planning pays.
-    """
+    """What is to be said of the VSS without reaction, behind that with it."""
     scenario, reaction = row
     found = reaction.vss_without_reaction
-    if found.excludes_zero and amount(found) == _amount_of_vss(reaction):
-        return ", as without reaction" + ("" if _is_the_runs(scenario, reaction) else _ANOTHER.format(
-            "all histories" if reaction.histories == "enumerated" else "the missions played",
-            amount(_of_the_run(scenario))))
-    if found.excludes_zero:
-        if _is_the_runs(scenario, reaction):
-            return f" in place of {amount(found)}"
-        return ", where it pays without reaction" if found.mean > 0 else ", where it costs without reaction"
-    if found.ci95 is None:
-        return f" in place of {amount(found)}, which has no interval"
-    return " in place of nothing" if found.ci95 == (0.0, 0.0) else \
-        ", where without reaction it is not distinguishable from zero"
+    if not found.excludes_zero:
+        return f"in place of {amount(found)}, which has no interval" if found.ci95 is None else \
+            "in place of nothing" if found.ci95 == (0.0, 0.0) else "without reaction not distinguishable from zero"
+    if amount(found) != _amount_of_vss(reaction):
+        return _told_without(row)
+    return "as without reaction" + ("" if _is_the_runs(scenario, reaction) else _ANOTHER.format(
+        "all histories" if reaction.histories == "enumerated" else "the missions played",
+        amount(_of_the_run(scenario))))
+
+
+def _told_without(row: Reacting) -> str:
+    """The VSS without reaction. The run's own trials, which other failures were drawn for, may give another one."""
+    same = "" if _is_the_runs(*row) else " in the same missions"
+    return f"in place of {amount(row.reaction.vss_without_reaction)}{same}"
 
 
 def _is_the_runs(scenario: ScenarioSummary, reaction: ReactionResult) -> bool:
@@ -221,17 +219,12 @@ def _of_the_run(scenario: ScenarioSummary) -> Gain:
     return Gain(mean=vss.executed.mean, ci95=vss.executed.ci95, pct=vss.executed_pct)
 
 
-_ANOTHER = " (that is over {}; the trials drawn gave {})"
+_ANOTHER = "; that is over {}, the trials drawn gave {}"
 
 
 def _where_uneven(row: Reacting) -> str:
     """The VSS without reaction where that is another than none, in brackets."""
-    scenario, reaction = row
-    found = reaction.vss_without_reaction
-    if not found.excludes_zero:
-        return ""
-    return f" (without reaction {amount(found)})" if _is_the_runs(scenario, reaction) else \
-        f" (without reaction it {'pays' if found.mean > 0 else 'costs'})"
+    return f" ({_told_without(row)})" if row.reaction.vss_without_reaction.excludes_zero else ""
 
 
 def _amount_of_vss(reaction: ReactionResult) -> str:

@@ -54,13 +54,14 @@ def reaction_table(rows: Sequence[ReactionOverMaps], *, narrow: bool
     varied = any(row.variant for row in rows)
     plans = list(dict.fromkeys(name for row in rows for name in row.value_of_recourse))
     figures = ["VSS", *(f"recourse, {name}" for name in plans), "VSS with recourse", "anticipation"]
-    shown = [f"{name}\n[%]" for name in figures] if narrow else [
+    shown = [name if name in _OF_BEST else f"{name}\n[%]" for name in figures] if narrow else [
         heading for name in figures for heading in ((name, f"{name} [%]") if name not in _OF_BEST else (name,))]
     cells = [[*([row.variant] if varied else []), row.scenario, f"{row.policy}, {row.news}", str(row.maps),
               *(cell for name, gain in zip(figures, (
                   row.vss, *(row.value_of_recourse.get(plan) for plan in plans), row.vss_with_recourse,
                   row.anticipation), strict=True)
-                for cell in _gain(gain, narrow=narrow)[:1 if name in _OF_BEST else 2])] for row in rows]
+                for cell in _gain(gain, narrow=narrow and name not in _OF_BEST)[:1 if name in _OF_BEST else 2])]
+             for row in rows]
     return [*(["variant"] if varied else []), "scenario", "reaction", "maps", *shown], tuple(range(2 + varied)), cells
 
 

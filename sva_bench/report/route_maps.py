@@ -22,7 +22,7 @@ from sva_bench.report.marks import marks_of, met_in
 from sva_bench.report.overlays import Mark
 from sva_bench.report.page import details, heading, note, sentence, text
 from sva_bench.report.plan_view import PlanView, frame_of, line
-from sva_bench.report.reaction_shares import leads
+from sva_bench.report.reaction_shares import leads, value_without
 from sva_bench.report.styles import MARKS, MARKS_OF_MANY
 from sva_bench.report.wording import listed, per_cent, reliability_told, with_interval
 from sva_bench.storage.run_folder import made_for
@@ -54,6 +54,7 @@ class _Shown:
         key: Whose trials tell how often.
         colours: Names of the plan and of those of the same routes, with their positions among the plans compared.
         beside: Plans that it is not distinguishable from, if there are any to be shown for that.
+        kept: What it is worth if the team keeps its plan, in the same missions; ``None`` where it does.
     """
 
     title: str
@@ -62,6 +63,7 @@ class _Shown:
     key: Key
     colours: Sequence[tuple[str, int]]
     beside: Sequence[str] = ()
+    kept: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +118,10 @@ def _said(content: Content, scenario: AnyScenario) -> str:
 
 
 def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
-    """What is shown of a scenario: its plans, those of the same routes once, and the best for each reaction."""
+    """What is shown of a scenario: its plans, those of the same routes once, and the best for each reaction.
+
+    A plan whose orders no reaction ever changes drives what it drives without, and is shown once.
+    """
     alike: dict[tuple[tuple[str, tuple[str, ...]], ...], list[str]] = {}
     for name in scenario.plans:
         routes = content.routes.get((scenario.name, name))
@@ -128,7 +133,7 @@ def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
                      worth=scenario.plans[first].executed, routes=content.routes[scenario.name, first],
                      key=(scenario.name, first, "none", "never"), colours=[(name, every.index(name)) for name in names])
     for reaction in itertools.islice((r for r in scenario.reactions or () if r.policy != "none"), _MOST_REACTIONS):
-        names = _telling_with(reaction)
+        names = [name for name in _telling_with(reaction) if reaction.plans[name].reacted or name not in scenario.plans]
         for name in names:
             routes = content.routes.get((scenario.name, name)) or content.routes.get(
                 (scenario.name, made_for(name, reaction.news)))
@@ -137,7 +142,8 @@ def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
                              worth=reaction.plans[name].executed, routes=routes,
                              key=(scenario.name, name, reaction.policy, reaction.news),
                              colours=[(name, list(reaction.plans).index(name))],
-                             beside=[other for other in names if other != name])
+                             beside=[other for other in names if other != name],
+                             kept=value_without(reaction, name))
 
 
 def _telling_with(reaction: ReactionResult | ComparedReaction) -> list[str]:
@@ -186,6 +192,7 @@ class _Maps:
         lines = "".join([*(self._robot(robot, route, ended) for robot, route in plan.routes.items()),
                          *([] if reacts else self._met_told(plan))])
         worth = f"executed {with_interval(plan.worth)}" + (
+            "" if plan.kept is None else f"; {plan.kept:.1f} without re-planning, in the same missions") + (
             f", not distinguishable from the {listed(plan.beside)}" if plan.beside else "")
         return (f'<figure class=map><figcaption style="--plan:{colours}"><b>{text(plan.title)}</b> '
                 f"{sentence(worth)}</figcaption>{picture}<ul>{lines}</ul></figure>")

@@ -9,6 +9,7 @@ from sva_bench.files.printable import counted
 from sva_bench.report.wording import FEW_MAPS, listed, with_interval
 
 _PAYS, _COSTS, _NONE, _EVEN, _UNSURE = "pays", "costs", "no difference", "can't be told", "no interval"
+_NONE_HERE = "no difference on these maps"
 
 
 def headline_over_maps(summary: BatchSummary) -> str:
@@ -48,7 +49,7 @@ def verdicts_of(rows: Sequence[OverMaps], short: Callable[[str], str]) -> str:
         return f"{verdict} for any variant" + (f" ({_range(rows)})" if verdict in (_PAYS, _COSTS) else "")
     return "; ".join(f"{verdict} for {listed([short(row.variant) for row in said[verdict]])}" + (
         f" ({_range(said[verdict])})" if verdict in (_PAYS, _COSTS) else "")
-        for verdict in (_PAYS, _COSTS, _EVEN, _UNSURE, _NONE) if verdict in said)
+        for verdict in (_PAYS, _COSTS, _EVEN, _UNSURE, _NONE_HERE, _NONE) if verdict in said)
 
 
 def _range(rows: Sequence[OverMaps]) -> str:
@@ -62,7 +63,7 @@ def _range(rows: Sequence[OverMaps]) -> str:
 def _verdict(row: OverMaps) -> str:
     ends = row.vss.ci95
     if ends is None:
-        return _UNSURE
+        return _UNSURE if row.vss.mean or row.maps == 1 else _NONE_HERE
     if ends == (0.0, 0.0):
         return _NONE
     return _PAYS if ends[0] > 0 else _COSTS if ends[1] < 0 else _EVEN

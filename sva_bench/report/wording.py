@@ -251,7 +251,8 @@ def over_few_maps(rows: Sequence[OverMaps]) -> str:
     """A word of caution for the VSS over few maps; nothing where there are enough."""
     fewest = min((row.maps for row in rows), default=FEW_MAPS)
     if any(row.maps > 1 and row.vss.ci95 is None for row in rows):
-        return "Where all maps agree there is no interval: nothing tells how maps differ."
+        return "Where all maps agree there is no interval: nothing tells how maps differ. Only where no robot fails " \
+            "both plans are the same on any map."
     if fewest >= FEW_MAPS:
         return ""
     if fewest == 1:

@@ -31,7 +31,7 @@ from sva_bench.execution import plays, react
 from sva_bench.files.codec import decoded, encoded
 from sva_bench.files.records import as_dict, from_dict
 from sva_bench.report.batch_page import write_batch_report
-from sva_bench.report.reactions_over_maps import answers_over_maps
+from sva_bench.report.reactions_over_maps import answers_over_maps, reaction_table
 from sva_bench.study.options import Options
 from tests.pages import untypeset
 from tests.results_for_tests import unit
@@ -246,6 +246,21 @@ def test_over_maps_the_maps_are_the_sample_and_seeds_are_nested_in_them(tmp_path
         assert gained.pct.mean == pytest.approx(20)
         assert gained.ci95 is not None
         assert gained.ci95[0] < 3 < 7 < gained.ci95[1]
+
+
+@pytest.mark.parametrize("narrow", [True, False])
+def test_no_figure_of_the_best_plan_is_in_per_cent_of_another_base_than_the_vss_beside_it(narrow: bool) -> None:
+    def told(pct: float) -> GainOverMaps:
+        return GainOverMaps(mean=pct / 10, ci95=None, pct=Percentage(mean=pct, ci95=None))
+
+    head, _, (cells,) = reaction_table([ReactionOverMaps(
+        variant="", scenario="S", policy="resolve", news="report", maps=2, vss=told(11.0),
+        value_of_recourse={"stochastic": told(22.0)}, vss_with_recourse=told(33.0), anticipation=told(44.0))],
+        narrow=narrow)
+    assert {"VSS with recourse", "anticipation"} <= set(head)
+    shown = " ".join(cells).split()
+    assert {"1.1", "11.0", "2.2", "22.0", "3.3", "4.4"} <= set(shown)
+    assert not {"33.0", "44.0"} & set(shown)
 
 
 def test_a_job_is_known_by_what_its_result_depends_on(tmp_path: Path) -> None:

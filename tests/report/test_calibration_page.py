@@ -86,6 +86,29 @@ def test_a_plan_in_which_nobody_leaves_is_said_not_to_count() -> None:
     assert "somebody leaves" not in without
 
 
+@pytest.mark.parametrize(("share", "most", "said"), [
+    (0.005, 0.04, True), (0.005, 0.008, False), (0.02, 0.04, False)])  # 1 % was asked for
+def test_a_share_that_is_met_as_executed_and_not_proved_is_said_to_be(share: float, most: float, said: bool) -> None:
+    found = run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True)
+    (scenario,) = found.scenarios
+    plan = replace(scenario.plans["calibrated"], bad=Share(share=share, ci95=(0.0, most)))
+    page = "".join(calibration_section(replace(found, scenarios=(
+        replace(scenario, plans={**scenario.plans, "calibrated": plan}),)))).replace("\u00a0", " ")
+    assert (f"Met as executed, but not proved by 32 noise draws, in {scenario.name}: the interval goes beyond 1 %." in
+            page) == said
+
+
+def test_scenarios_of_which_the_same_is_to_be_said_share_a_line() -> None:
+    one = run_of((100.0, 0.5), (80.0, 0.1), chosen=1, reached=False).scenarios[0]
+    other = run_of((100.0, 0.5), (90.0, 0.1), chosen=1, reached=False)
+    both = replace(other, scenarios=tuple(replace(s, name=name) for name, s in (
+        ("S1", one), ("S2", other.scenarios[0]), ("S3", one))))
+    lines = calibration_lines(both)
+    assert sorted(line.partition(":")[0] for line in lines) in (["S1 and S3", "S2"], ["S1, S2 and S3"])
+    assert calibration_lines(replace(both, scenarios=both.scenarios[:1]))[0].partition(":")[2] == \
+        next(line for line in lines if line.startswith("S1")).partition(":")[2]
+
+
 def test_each_share_is_said_to_be_the_twins_or_executed_and_why_they_differ() -> None:
     above = run_of((100.0, 0.5), (80.0, 0.0), chosen=1, reached=True, executed_bad=1 / 32)
     (line,) = calibration_lines(above)

@@ -266,6 +266,26 @@ def test_panels_share_their_axes_and_say_how_many_are_left_out() -> None:
     assert panels("told", Axes(x="key"), [], "Caption.") == ""
 
 
+@pytest.mark.parametrize("most", [1.0, 900.0, -4000.0, 2.5e5, -3.2e9, 1.5e-7])
+def test_no_figure_beside_a_panel_is_cut(most: float) -> None:
+    drawn = panels("told", Axes(x="key"), [Panel(title="S", points=[
+        Point(x=0.0, y=0.0, said="a"), Point(x=1.0, y=most, said="b")])], "Caption.")
+    figures = re.findall(r'<text class="tick left" x="([^"]+)"[^>]*>([^<]+)</text>', drawn)
+    assert len(figures) > 1
+    for right, figure in figures:
+        signs = figure.count("\u2212")  # 9.2 wide in DejaVu Sans at 11 px, digits 7.0; half a unit is rounded off
+        assert float(right) - 7.0 * (len(figure) - signs) - 9.2 * signs >= -0.5
+
+
+def test_a_long_table_breaks_between_its_sections_in_print() -> None:
+    rows = [[str(k)] for k in range(9)]
+    assert table(["k"], rows, sections=[*"aaa", *"bbb", *"ccc"]).count("<tbody>") == 3
+    assert "class=few" not in table(["k"], rows, sections=[*"aaa", *"bbb", *"ccc"])
+    assert table(["k"], rows).count("<tbody>") == 1
+    assert "class=few" in table(["k"], rows)
+    assert "class=few" in table(["k"], rows[:4], sections="aabb")
+
+
 def test_a_table_scrolls_in_a_box_that_shows_where_it_goes_on() -> None:
     assert table(["a"], [["1"]]).startswith("<div class=wide tabindex=0>")  # by keyboard too
     assert ".wide{overflow-x:auto" in STYLE

@@ -76,14 +76,14 @@ def test_an_answer_says_what_planning_and_re_planning_are_worth_and_which_plan_i
     # VSS 101 - 100 = 1, of 101; recourse 20 of 80 and 1 of 100; the best plan leads by 104 - 101 = 3, of 101 too.
     found = summary_of(reaction("report", PAYS, half=0.5, best="anticipative", over="stochastic"))
     assert said(found) == (
-        "If the team re-plans when a robot misses a report, planning for failures is worth 1.0 % in S in place of "
-        "20 %. Re-planning adds 25 % to the deterministic plan and 1.0 % to the stochastic one in S. The best plan for "
-        "it, of those tried: the anticipative in S (+3.0 % over the stochastic).")
+        "If the team re-plans when a robot misses a report, planning for failures is worth 1.0 % in S (in place "
+        "of 20 %). Re-planning adds 25 % to the deterministic plan and 1.0 % to the stochastic one in S. The best plan "
+        "for it, of those tried: the anticipative in S (+3.0 % over the stochastic).")
 
 
 def test_a_vss_below_zero_is_told_as_the_deterministic_plan_being_worth_more() -> None:
     found = summary_of(reaction("instant", LOSES, half=0.5, best="deterministic", over="stochastic"))
-    assert "the deterministic plan is worth more in S (VSS -8.9 % in place of 20 %)" in said(found)
+    assert "the deterministic plan is worth more in S (VSS -8.9 %; in place of 20 %)" in said(found)
     assert "planning for failures is worth" not in said(found)
 
 
@@ -150,8 +150,8 @@ def test_the_vss_without_reaction_is_by_the_missions_of_the_reaction_and_not_by_
     for shown in (printed(found), page_of(found)):
         assert "10.0 [9.5, 10.5]" in shown
         assert "20.0" not in shown
-    # Beside the run's 20 % another figure of the same thing would only puzzle.
-    assert "worth 1.0 % in S, where it pays without reaction." in said(found)
+    # The run's 20 % stands above: whose the other figure is must be said.
+    assert "worth 1.0 % in S (in place of 10 % in the same missions)." in said(found)
 
 
 def test_no_news_stands_apart_even_where_news_changes_nothing() -> None:
@@ -160,7 +160,7 @@ def test_no_news_stands_apart_even_where_news_changes_nothing() -> None:
     assert [answer.condition for answer in answers] == [
         "If the team re-plans when a robot misses a report,",
         "If the team re-plans on news of failures but never has any,"]
-    assert "worth 20 % in S, as without reaction" in str(answers[0])
+    assert "worth 20 % in S (as without reaction)" in str(answers[0])
 
 
 def test_a_difference_is_told_in_one_percentage_and_not_in_that_of_another_base_too() -> None:

@@ -20,6 +20,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from PIL import Image
 
+from sva_bench.analysis.reaction_results import ReactionResult
+from sva_bench.analysis.summaries import Summary
 from sva_bench.geometry.buckets import clearances
 from sva_bench.geometry.cells import bounds_of, boxes_of
 from sva_bench.geometry.obstacles import Obstacles
@@ -27,6 +29,7 @@ from sva_bench.palette import ROBOTS, hex_of, plan_color
 from sva_bench.report.mark_labels import place_words
 from sva_bench.report.page_style import STYLE
 from sva_bench.report.plan_view import PlanView, _coarser, frame_of
+from sva_bench.report.reaction_shares import value_without
 from sva_bench.report.route_maps import _telling_with, beside, route_maps
 from sva_bench.storage.leg_paths import _corners
 from sva_bench.storage.stored_run import Content, read_content
@@ -132,6 +135,30 @@ def test_a_team_that_reacts_has_a_map_with_the_legs_driven_only_then(contents: M
     assert driven - planned
     assert reacting.count('<g class="leg replanned') == len(driven - planned)
     assert reacting.count("<path class=core") == len(driven - planned)  # hollow, whatever the dashes of its robot
+
+
+def test_the_map_of_a_reaction_says_what_the_plan_is_worth_without_in_the_same_missions(
+        contents: Mapping[str, Content]) -> None:
+    content = contents["a team that reacts"]
+    found = next(s for s in content.summary.scenarios if s.name == "half").reactions[0]  # type: ignore[index]
+    assert isinstance(found, ReactionResult)
+    told = [html.unescape(figure) for (name, _), figure in maps_of(content).items()
+            if name == "half" and "re-plans" in figure]
+    assert f"; {value_without(found, found.best.plan):.1f} without re-planning, in the same missions" in told[0]
+
+
+def test_a_plan_whose_orders_no_reaction_changes_has_one_map(contents: Mapping[str, Content]) -> None:
+    content = contents["a team that reacts"]
+    assert isinstance(content.summary, Summary)
+
+    def changed_in(share: float) -> Content:
+        return replace(content, summary=replace(content.summary, scenarios=tuple(replace(s, reactions=tuple(
+            replace(r, plans={name: replace(plan, reacted=share) for name, plan in r.plans.items()})
+            for r in s.reactions or ())) for s in content.summary.scenarios)))  # type: ignore[arg-type]
+
+    maps = {share: "".join(route_maps(changed_in(share))).count("<figure class=map>") for share in (0.0, 0.5)}
+    assert 0 < maps[0.0] < maps[0.5]
+    assert "re-plans" not in "".join(route_maps(changed_in(0.0)))
 
 
 @pytest.mark.parametrize(("deterministic", "half", "shown"), [

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from sva_bench.analysis.over_maps import BatchSummary, OverMaps
+from sva_bench.analysis.results import Estimate
 from sva_bench.report.vss_over_maps import headline_over_maps, verdicts_of
 from tests.results_for_tests import over_maps
 
@@ -46,3 +47,10 @@ def test_a_headline_says_over_how_many_maps_and_for_which_variants(rows: list[Ov
 def test_each_scenario_has_a_line_of_its_variants_by_their_intervals(
         ends: list[tuple[float, float] | None], said: str) -> None:
     assert verdicts_of([row("S", variant, each) for variant, each in zip("xy", ends, strict=True)], str) == said
+
+
+def test_maps_that_all_show_none_have_no_difference_though_they_have_no_interval() -> None:
+    here = replace(row("S", "x", None), vss=Estimate(mean=0.0, ci95=None))
+    assert verdicts_of([here, row("S", "y", EVEN)], str) == "can't be told for y; no difference on these maps for x"
+    assert verdicts_of([here, replace(here, variant="y")], str) == "no difference on these maps for any variant"
+    assert verdicts_of([replace(here, maps=1)], str) == "no interval for any variant"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached, unused_told
+from sva_bench.analysis.reach import beyond_reach, maps_without_reach, reached, unused_told, why_nothing
 from sva_bench.analysis.summaries import ComparisonSummary, Reach
 from sva_bench.cli.tables import print_summary
 from sva_bench.study.compare import execute_plans
@@ -53,7 +53,7 @@ def test_where_no_poi_is_reachable_table_page_summary_and_check_agree(
 
 
 @pytest.mark.parametrize(("pois", "said"), [
-    (False, "the world has no POIs: add some under sites.pois"),
+    (False, "no POI earns a robot anything: add some under sites.pois, and give robots incentives there"),
     (True, "no robot earns anything where it can go: give it incentives there")])
 def test_where_there_is_nothing_to_earn_it_is_not_for_want_of_fuel(
         pois: bool, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -63,6 +63,14 @@ def test_where_there_is_nothing_to_earn_it_is_not_for_want_of_fuel(
     for told_there in told(run_of(tmp_path, text), capsys):
         assert f"There is nothing to compare, for {said}." in told_there
         assert "fuel or time" not in told_there
+
+
+def test_where_nothing_is_reached_nor_would_earn_anything_more_fuel_is_no_advice() -> None:
+    found = reached({"a": ["p"], "b": ["p"]}, ["a", "b"], ["p"], {"a": [], "b": []})
+    assert found.nothing
+    assert why_nothing(found) == \
+        "no POI earns a robot anything: add some under sites.pois, and give robots incentives there"
+    assert why_nothing(reached({"a": ["p"], "b": ["p"]}, ["a", "b"], ["p"], {"a": [], "b": ["p"]})) == NOTHING
 
 
 @pytest.mark.parametrize("limit", ["mission_limit_s: 120", "fuel_capacity_s: 60"])
