@@ -137,6 +137,7 @@ def test_travel_times_are_shared_by_what_berths_depend_on_and_nothing_else(tmp_p
 # Rows
 
 
+@pytest.mark.long
 def test_rows_of_robots_that_meet_are_the_same_on_any_number_of_workers_and_after_a_crash(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -180,6 +180,7 @@ def played(seed: int) -> tuple[Mapping[SourceName, SourceEffect], list[TeamDrive
     return effects, *found  # type: ignore[return-value]
 
 
+@pytest.mark.long
 def test_robots_that_do_not_meet_drive_and_end_as_each_would_alone_from_its_berth() -> None:
     apart = 0
     for known in filter(None, map(played, range(16))):
@@ -224,6 +225,7 @@ def test_one_robot_has_the_same_rows_shared_and_independent_and_no_source_of_oth
         assert set(plan.sources) == {"wheels", "interplay"}
 
 
+@pytest.mark.long
 def test_missions_are_judged_alike_by_any_number_of_workers_and_again() -> None:
     ready = next(filter(None, (random_mission(seed, process="mission", noisy=True) for seed in range(20, 30))))
     judged = []

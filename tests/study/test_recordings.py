@@ -43,7 +43,7 @@ def of_kind(folder: Path, interaction: Interaction) -> World:
 
 @pytest.mark.parametrize(("interaction", "fidelity"), [
     pytest.param(interaction, fidelity,
-                 marks=[pytest.mark.long] * (fidelity == "physics" and interaction != "independent"))
+                 marks=[pytest.mark.long] * (fidelity == "physics" or interaction == "uncoordinated"))
     for interaction in INTERACTIONS for fidelity in FIDELITIES])
 def test_a_trial_that_is_replayed_gives_its_rows_again(interaction: Interaction, fidelity: Fidelity, tmp_path: Path
                                                        ) -> None:

@@ -333,6 +333,7 @@ def test_a_trial_of_described_robots_is_replayed_from_the_run_folder_alone(examp
         assert str(end_s) in done.stdout
 
 
+@pytest.mark.long
 def test_several_models_in_one_world_are_checked_drawn_and_swept(example: Path) -> None:
     checked = sva_bench("world", "check", "world.yaml", cwd=example)
     assert checked.returncode == 0, checked.stderr

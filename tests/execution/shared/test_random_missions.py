@@ -89,6 +89,7 @@ def test_a_shared_mission_is_the_same_when_it_is_played_again() -> None:
             assert same_missions(played(ready, seed, fate, rollout), played(ready, seed, fate, rollout))
 
 
+@pytest.mark.long
 def test_a_mission_cut_off_at_failures_is_the_mission_played_with_them() -> None:
     cut = 0
     for seed in range(12):
