@@ -1,8 +1,7 @@
 """Column generation: duals from the master program, routes from pricing, until no route has positive reduced value.
 
 Source:
-    Roberti, Mingozzi (2014), "Dynamic ng-path relaxation for the delivery man problem"; Pessoa et al. (2018),
-    "Automation and combination of linear-programming based stabilization techniques in column generation".
+    Roberti, Mingozzi (2014), "Dynamic ng-path relaxation for the delivery man problem".
 """
 
 from __future__ import annotations
@@ -218,7 +217,7 @@ class ColumnGeneration:
                 return Generated(relaxed=solved, bound=best, duals=centre, most=limits, complete=True)
 
     def price_all(self, master: Master, state: BranchState, duals: Duals, compared: int) -> int:
-        """Add the columns of all groups that heuristic pricing finds; how many are new."""
+        """Add the columns of all groups that a quick pricing run finds; how many are new."""
         return sum(self.add(master, number, group, self.price(group, duals, self._threshold(duals, number), compared))
                    for number, group in enumerate(state.groups))
 

@@ -101,13 +101,6 @@ class Duals:
     floor: FloatArray
     cut: FloatArray
 
-    def between(self, other: Duals, share: float) -> Duals:
-        """The convex combination with weight ``share`` on the other."""
-        return Duals(visit=(1 - share) * self.visit + share * other.visit,
-                      group=(1 - share) * self.group + share * other.group,
-                      floor=(1 - share) * self.floor + share * other.floor,
-                      cut=(1 - share) * self.cut + share * other.cut)
-
 
 @dataclass(eq=False, kw_only=True)
 class Master:

@@ -240,13 +240,17 @@ def _ranges(graph: Graph, subgraph: PricingGraph, *, quick: bool) -> tuple[float
 def _nearest(subgraph: PricingGraph, memory: NDArray[np.uint64], most: int) -> NDArray[np.uint64]:
     """The POIs nearest to each site of those that it remembers, as bits, shape (k, words)."""
     found = np.zeros_like(memory)
-    far = np.where(subgraph.legs, subgraph.time_s, np.inf)
-    far = np.minimum(far, far.T)
-    for i, order in enumerate(np.argsort(far, axis=1, kind="stable") if most else ()):
+    for i, order in enumerate(np.argsort(_apart(subgraph), axis=1, kind="stable") if most else ()):
         near = [b for b in subgraph.bit[order] if b >= 0 and memory[i, b >> 6] >> np.uint64(b & 63) & np.uint64(1)]
         for b in near[:most if subgraph.bit[i] >= 0 else 2 * most]:
             found[i, b >> 6] |= np.uint64(1) << np.uint64(b & 63)
     return found
+
+
+def _apart(subgraph: PricingGraph) -> FloatArray:
+    """Time between sites, the shorter way, by legs that are of use [s], shape (k, k)."""
+    far = np.where(subgraph.legs, subgraph.time_s, np.inf)
+    return np.minimum(far, far.T)
 
 
 def _legs(subgraph: PricingGraph, compared: int | None) -> BoolArray:
@@ -254,8 +258,7 @@ def _legs(subgraph: PricingGraph, compared: int | None) -> BoolArray:
     if compared is None or compared > _FEW:
         return subgraph.legs
     refuels = subgraph.bit < 0
-    far = np.where(subgraph.legs, subgraph.time_s, np.inf)
-    far = np.minimum(far, far.T)
+    far = _apart(subgraph)
     far[:, refuels] = np.inf
     near = np.argsort(np.argsort(far, axis=1, kind="stable"), axis=1, kind="stable") < _NEAREST
     found: BoolArray = subgraph.legs & (near | near.T | refuels[:, None] | refuels[None, :])
