@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 
@@ -31,7 +31,8 @@ from sva_bench.interrupts import (
 
 
 def press() -> None:
-    os.kill(os.getpid(), signal.SIGINT)
+    """Press Ctrl-C, in this thread: sent to the process, another thread may take it, and this one hear it later."""
+    signal.raise_signal(signal.SIGINT)
 
 
 @pytest.fixture(autouse=True)
@@ -53,6 +54,23 @@ def test_ctrl_c_waits_until_the_end_of_a_block(block: type[deferring_ctrl_c]) ->
             done.append("inside")
         done.append("after")
     assert done == ["inside", "after"]
+
+
+def test_ctrl_c_that_another_thread_takes_waits_too_where_this_one_masks_it() -> None:
+    done, ended = [], Event()
+    thread = Thread(target=ended.wait)
+    thread.start()
+    try:
+        with pytest.raises(KeyboardInterrupt), holding_back_ctrl_c():  # noqa: PT012
+            os.kill(os.getpid(), signal.SIGINT)
+            until = time.monotonic() + 30
+            while not pressed() and time.monotonic() < until:
+                time.sleep(0.001)
+            done.append(pressed())
+    finally:
+        ended.set()
+        thread.join()
+    assert done == [True]
 
 
 def test_where_it_is_heard_it_comes_at_once_and_not_again_at_the_end() -> None:

@@ -147,7 +147,7 @@ def test_compiled_code_is_loaded_in_a_block_that_defers() -> None:
     # Nothing of what it gives back is lost, but it is given back before Ctrl-C comes.
     got = []
     with pytest.raises(KeyboardInterrupt), deferring_ctrl_c():  # noqa: PT012 - what comes after the key is the point
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
         got.append(counts(np.ones((1, 3), np.bool_), np.ones((1, 3), np.bool_), np.ones(1, np.bool_), np.arange(3)))
     assert got[0].tolist() == [1.0]
 

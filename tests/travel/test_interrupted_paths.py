@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from typing import get_args
 
@@ -37,7 +36,7 @@ def test_ctrl_c_in_a_callback_ends_the_search_and_is_raised_then(
         calls += 1
         try:
             if calls == CALLS:
-                os.kill(os.getpid(), signal.SIGINT)
+                signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
             raised += 1
             raise
