@@ -11,11 +11,11 @@ from sva_bench.files.printable import counted
 from sva_bench.report.calibration_over_maps import calibrated_over_maps
 from sva_bench.report.calibration_page import MET, MISSED, bad_pct
 from sva_bench.report.compared_values import compared_answers, compared_notes, compared_title, values_table
-from sva_bench.report.page import CONTENTS, command, figure, heading, note, sentence, table, write_page
+from sva_bench.report.page import CONTENTS, command, details, figure, heading, note, sentence, table, write_page
 from sva_bench.report.reaction_shares import doubted
 from sva_bench.report.reaction_wording import knows_what_when
 from sva_bench.report.reactions_over_maps import answers_over_maps, reaction_table
-from sva_bench.report.response_chart import response
+from sva_bench.report.response_chart import response, vss_responses
 from sva_bench.report.results_charts import over_maps
 from sva_bench.report.run_answer import facts
 from sva_bench.report.variant_names import VariantNames
@@ -177,6 +177,9 @@ def _pictures(summary: BatchSummary, names: VariantNames) -> list[str]:
             groups.setdefault(row.scenario, {}).setdefault(names.short(row.variant), []).append(row.vss_pct)
     seeds = ", the mean over its seeds" if len(summary.seeds) > 1 else ""
     varied = f" Varied: {', '.join(names.keys)}." if names.keys else ""
-    return [heading("VSS over maps"), figure(over_maps(groups, "VSS [% of the stochastic plan]"),
-            f"Each dot is a map{seeds}; the tick is the mean over maps. Right of zero, planning for failures pays."
-            f"{varied}")] if groups else []
+    if not groups:
+        return []
+    responses = vss_responses(summary, names)
+    dots = figure(over_maps(groups, "VSS [% of the stochastic plan]"), f"Each dot is a map{seeds}; the tick is the "
+                  f"mean over maps. Right of zero, planning for failures pays.{varied}")
+    return [heading("VSS over maps"), *responses, details("Each map by itself", dots) if responses else dots]

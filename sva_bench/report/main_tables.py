@@ -1,4 +1,4 @@
-"""The tables below the answer of a run: what planning for failures is worth, and what each plan is."""
+"""The tables behind the answer of a run: what planning for failures is worth, and what each plan is."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ from sva_bench.world.model import World
 Scenarios = Sequence[ScenarioSummary | ComparedScenario]
 
 
-def main_tables(summary: AnySummary, world: World, counts: TrialCounts) -> list[str]:
-    """What is worth more by how much, then each plan by itself."""
-    first = _vss(summary) if isinstance(summary, Summary) else _pairs(summary)
-    return [*first, *_plans(summary, world, counts)]
+def difference_table(summary: AnySummary) -> list[str]:
+    """What is worth more by how much; nothing where there is only one plan."""
+    return _vss(summary) if isinstance(summary, Summary) else _pairs(summary)
 
 
 def _vss(summary: Summary) -> list[str]:
@@ -64,22 +63,22 @@ def _pairs(summary: ComparisonSummary) -> list[str]:
         caption="Differences, trial by trial; their intervals hold together with 95 %, those by themselves one by one")]
 
 
-def _plans(summary: AnySummary, world: World, counts: TrialCounts) -> list[str]:
+def plans_table(summary: AnySummary, world: World, counts: TrialCounts) -> list[str]:
+    """Each plan by itself."""
     head = ["plan", "executed", "rank", "goes wrong [%]", "robots lost", "expected", "promised"]
-    given, rows = isinstance(summary, ComparisonSummary), []
+    rows: list[list[str]] = []
     for scenario in summary.scenarios:
         ranks = {row.plan: str(row.rank) for row in scenario.ranking} if isinstance(scenario, ComparedScenario) else {}
         rows += [[shown_name(scenario, name) + _infeasible(plan), with_interval(plan.executed), ranks.get(name, ""),
                   _wrong(plan), lost(counts, scenario.name, name), optional(plan.expected),
-                  "" if given else f"{plan.promised:.1f}"] for name, plan in scenario.plans.items()]
+                  f"{plan.promised:.1f}"] for name, plan in scenario.plans.items()]
     shown, cells = told_columns(head, rows, (0, 1, 4))
     meant = {"rank": "Rank: one more than the number of plans that are distinguishably better.",
              "goes wrong [%]": "Goes wrong: in so many missions some robot runs out of fuel, comes home late or gets "
                                "stuck.",
              "robots lost": "Robots lost: how many a mission left the base and never came back, on average."}
     titles = {s.name: f"{s.name} ({reliability_told(world, s.name, summary)})" for s in summary.scenarios}
-    return [table(shown, cells, caption="What the plans are worth",
-                  sections=[titles[s.name] for s in summary.scenarios for _ in s.plans]),
+    return [table(shown, cells, sections=[titles[s.name] for s in summary.scenarios for _ in s.plans]),
             note(" ".join(meant[name] for name in shown if name in meant))]
 
 

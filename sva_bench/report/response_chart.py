@@ -1,11 +1,12 @@
-"""The response figures of a batch: what plans are worth over the values of a varied key, a small chart a scenario."""
+"""The response figures of a batch: what is worth how much over the values of a varied key, a small chart a scenario."""
 
 from __future__ import annotations
 
 from sva_bench.analysis.compared_values import KeyComparison, ValueRow, numbers_of, shown_value
-from sva_bench.analysis.over_maps import labelled
+from sva_bench.analysis.over_maps import BatchSummary, OverMaps, labelled
 from sva_bench.analysis.results import Estimate
 from sva_bench.report.panels import Axes, Panel, Point, panels
+from sva_bench.report.variant_names import VariantNames
 from sva_bench.report.wording import with_interval
 
 
@@ -29,6 +30,32 @@ def response(found: KeyComparison, caption: str, *, more: bool = False) -> str:
     axes = Axes(x=found.key, zero=more, joined=numbers is not None, apart=True,
                 places=[(at[value], shown_value(value)) for value in found.values])
     return panels(f"{told}: means and 95 % intervals", axes, shown, caption)
+
+
+def vss_responses(summary: BatchSummary, names: VariantNames) -> list[str]:
+    """The VSS over the values of each key that varies in numbers; none where none does."""
+    return [picture for key in names.keys if (picture := _vss_over(key, summary, names))]
+
+
+def _vss_over(key: str, summary: BatchSummary, names: VariantNames) -> str:
+    at = numbers_of(tuple(dict.fromkeys(settings[key] for settings in summary.settings.values() if key in settings)))
+    if at is None or len(at) < 2:
+        return ""
+    places: dict[tuple[str, str], list[Point]] = {}
+    for row in summary.aggregate:
+        settings = dict(summary.settings.get(row.variant, {}))
+        if (value := settings.pop(key, None)) is not None:
+            places.setdefault((row.scenario, names.told(settings)), []).append(_vss_point(row, at[value], value))
+    axes = Axes(x=key, zero=True, joined=True, apart=True, places=[(at[value], shown_value(value)) for value in at])
+    return panels(f"VSS over {key}: means over maps and 95 % intervals", axes,
+                  [Panel(title=labelled(*place), points=points) for place, points in places.items()
+                   if any(point.y or point.interval not in (None, (0.0, 0.0)) for point in points)],
+                  f"VSS over {key}: mean over maps, each with its own 95 % interval. Above zero, planning for failures "
+                  "pays. Scenarios without any difference are left out.")
+
+
+def _vss_point(row: OverMaps, at: float, value: str) -> Point:
+    return Point(x=at, y=row.vss.mean, interval=row.vss.ci95, said=f"{shown_value(value)}: {with_interval(row.vss)}")
 
 
 def _point(found: KeyComparison, row: ValueRow, at: float, value: Estimate) -> Point:

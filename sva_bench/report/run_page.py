@@ -18,7 +18,7 @@ from sva_bench.report.calibration_page import calibration_section
 from sva_bench.report.doubts import costless_ends
 from sva_bench.report.interaction_section import interaction_section
 from sva_bench.report.legs_section import legs_section
-from sva_bench.report.main_tables import main_tables, titles_of
+from sva_bench.report.main_tables import difference_table, plans_table, titles_of
 from sva_bench.report.meetings_section import meetings_section
 from sva_bench.report.page import CONTENTS, command, figure, folded, heading, note, table, text, write_page
 from sva_bench.report.plan_view import PlanView
@@ -49,7 +49,7 @@ def write_report(path: Path, content: Content) -> None:
         f"<h1>{text(summary.world)}: {question}, and how sure is that?</h1>",
         *answer_box(content),
         *reactions_answered(summary),
-        *main_tables(summary, content.world, content.counts),
+        *difference_table(summary),
         note(f"{counted(summary.trials, 'trial')} of each plan in each scenario, "
              f"{counted(summary.rollouts, 'noise draw')}, fidelity {summary.fidelity}, seed {summary.seed}; "
              f"{assumed(summary)}. "
@@ -57,6 +57,8 @@ def write_report(path: Path, content: Content) -> None:
              "draws."),
         CONTENTS,
         *maps,
+        heading("What the plans are worth"),
+        *plans_table(summary, content.world, content.counts),
         *_charts(summary),
         *(calibration_section(summary) if isinstance(summary, Summary) else ()),
         *reaction_section(summary),
@@ -81,7 +83,7 @@ def write_report(path: Path, content: Content) -> None:
 
 def _charts(summary: AnySummary) -> list[str]:
     scenarios = summary.scenarios
-    parts = [heading("What the plans are worth"), "<div class=pair>",
+    parts = ["<div class=pair>",
              figure(plans_compared(scenarios), "Executed: mean over all trials, with its 95 % interval.")]
     if isinstance(summary, Summary):
         parts.append(figure(differences(summary.scenarios), "VSS: stochastic less deterministic in the same trials; "

@@ -24,8 +24,10 @@ class VariantNames:
         settings = self._settings.get(variant)
         if not settings:
             return variant
-        if len(self.keys) == 1:
-            return shown_value(settings[self.keys[0]])
+        return shown_value(settings[self.keys[0]]) if len(self.keys) == 1 else self.told(settings)
+
+    def told(self, settings: Mapping[str, str]) -> str:
+        """Settings, each behind the end of its key; empty for none."""
         return ", ".join(f"{_end_of(key, self.keys)} {shown_value(value)}" for key, value in settings.items())
 
     def whole(self, variant: str) -> str:

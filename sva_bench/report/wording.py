@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
@@ -322,8 +323,11 @@ def cell(entry: Statistic, plan: PlanFigures) -> str:
 
 
 def per_cent(figure: float | None) -> str:
-    """``18 %``, and a digit more where that says more."""
-    return "" if figure is None else f"{figure:.0f} %" if abs(figure) >= 9.95 or figure == 0 else f"{figure:.1f} %"
+    """``18 %``, and a digit more where that says more; 42.5 is 43, as readers round it."""
+    if figure is None:
+        return ""
+    whole = math.copysign(math.floor(abs(figure) + 0.5), figure)
+    return f"{whole:.0f} %" if abs(figure) >= 9.95 or figure == 0 else f"{figure:.1f} %"
 
 
 def optional(figure: float | None) -> str:

@@ -10,7 +10,7 @@ import pytest
 from sva_bench.analysis.results import Comparison, GivenPlanResult, Ranked
 from sva_bench.analysis.scenarios import ComparedScenario
 from sva_bench.analysis.summaries import ComparisonSummary
-from sva_bench.report.main_tables import main_tables
+from sva_bench.report.main_tables import difference_table
 from sva_bench.report.run_answer import answer_box, facts, unused
 from sva_bench.report.wording import answer
 from sva_bench.storage.stored_run import Content, read_content
@@ -108,7 +108,7 @@ def test_one_pair_of_plans_is_named_once_above_its_differences_and_several_have_
         found = compared(*pairs)
         scenarios = tuple(replace(each, name=of.name) for each, of in zip(
             found.scenarios, content.summary.scenarios, strict=False))
-        return plain("".join(main_tables(replace(found, scenarios=scenarios), content.world, content.counts)))
+        return plain("".join(difference_table(replace(found, scenarios=scenarios))))
 
     one = shown({("a", "b"): 4.0}, {("a", "b"): 3.0})
     assert one.count("a less b, trial by trial") == 1

@@ -8,6 +8,8 @@ import pytest
 
 from sva_bench.analysis.over_maps import BatchSummary, OverMaps
 from sva_bench.analysis.results import Estimate
+from sva_bench.report.response_chart import vss_responses
+from sva_bench.report.variant_names import VariantNames
 from sva_bench.report.vss_over_maps import headline_over_maps, verdicts_of
 from tests.results_for_tests import over_maps
 
@@ -54,3 +56,32 @@ def test_maps_that_all_show_none_have_no_difference_though_they_have_no_interval
     assert verdicts_of([here, row("S", "y", EVEN)], str) == "can't be told for y; no difference on these maps for x"
     assert verdicts_of([here, replace(here, variant="y")], str) == "no difference on these maps for any variant"
     assert verdicts_of([replace(here, maps=1)], str) == "no interval for any variant"
+
+
+def responses(*settings: dict[str, str]) -> list[str]:
+    variants = {"; ".join(f"{key}={value}" for key, value in each.items()): each for each in settings}
+    rows = [row(scenario, variant, ends) for variant in variants for scenario, ends in (("S1", NONE), ("S2", PAYS))]
+    rows = [replace(each, vss=Estimate(mean=0.0, ci95=NONE)) if each.scenario == "S1" else each for each in rows]
+    summary = BatchSummary(trials=1, fidelity="kinematic", worlds=("a", "b"), seeds=(0,), units=(), maps=(), failed=(),
+                           aggregate=tuple(rows), variants=tuple(variants), settings=variants)
+    return vss_responses(summary, VariantNames(summary))
+
+
+def test_each_key_that_varies_in_numbers_has_its_response_curves() -> None:
+    fuel, both = ({"a.fuel": value} for value in ("200", "300")), [
+        {"a.fuel": fuel, "margin": margin} for fuel in ("200", "300", "400") for margin in ("0.1", "0.2")]
+    (one,) = responses(*fuel)
+    assert one.count("<svg") == 1  # S1 has no difference anywhere
+    assert "S2" in one
+    assert "200: 2.0 [1.0, 3.0]" in one
+    over_fuel, over_margin = responses(*both)
+    assert (over_fuel.count("<svg"), over_margin.count("<svg")) == (2, 3)
+    assert "S2 (margin 0.1)" in over_fuel
+    assert "S2 (fuel 400)" in over_margin
+
+
+@pytest.mark.parametrize("settings", [
+    [{"a.model": '"turtlebot2"'}, {"a.model": '"jackal"'}], [{"a.fuel": "200"}, {"b.fuel": "300"}],
+    [{"a.fuel": "200"}]])
+def test_words_and_single_values_have_no_curve(settings: list[dict[str, str]]) -> None:
+    assert responses(*settings) == []
