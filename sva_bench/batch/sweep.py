@@ -19,11 +19,11 @@ from sva_bench.analysis.compared_values import own_value, variant_of
 from sva_bench.batch.grid import MOST_POINTS, Grid, Point, checked, refuse_too_many
 from sva_bench.choices import Departures, FailureProcess, Fidelity, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput, SvaBenchError, nearest
-from sva_bench.files.complaints import shown
 from sva_bench.files.digest import digest
 from sva_bench.files.documents import Document, Loc, parse_yaml, places_of, read_yaml, validate, value_at
 from sva_bench.files.fields import Name, Number, Section, Seed
 from sva_bench.files.patterns import has_pattern, matching
+from sva_bench.files.printable import shown
 from sva_bench.seeds import MOST_SEED
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.inputs import asked_with

@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 from pydantic import BaseModel, ValidationError
 
 from sva_bench.errors import closest, nearest
-from sva_bench.files.printable import counted
+from sva_bench.files.printable import counted, shown
 
 Loc = tuple[str | int, ...]
 
@@ -192,12 +192,6 @@ def _prefix_in_data(data: Any, loc: Loc) -> tuple[Loc, int]:
             return loc[:depth], depth
         data = data[part]
     return loc, len(loc)
-
-
-def shown(value: object) -> str:
-    """A value as quoted in messages, truncated."""
-    text = "nothing" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _existing(data: Any, loc: Loc) -> Loc:

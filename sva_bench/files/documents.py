@@ -19,10 +19,10 @@ from pydantic import ValidationError
 
 from sva_bench.errors import BadFile, nearest
 from sva_bench.files.complaints import Loc as Loc
-from sva_bench.files.complaints import dotted, first_complaint, shown
+from sva_bench.files.complaints import dotted, first_complaint
 from sva_bench.files.json_lines import json_line
 from sva_bench.files.mistaken import describe_bytes, what_it_is
-from sva_bench.files.printable import counted
+from sva_bench.files.printable import counted, shown
 from sva_bench.files.records import FormT, from_dict
 from sva_bench.files.yaml_text import MAX_DEPTH, Node, compose, line_in, plain_data, written_in
 

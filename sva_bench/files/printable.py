@@ -43,6 +43,12 @@ def all_text(data: Any) -> bool:
     return not isinstance(data, str) or is_text(data)
 
 
+def shown(value: object) -> str:
+    """A value as quoted in messages, truncated."""
+    text = "nothing" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def counted(count: int, noun: str, plural: str | None = None) -> str:
     """``1 map``, ``2 maps``."""
     return f"{count} {noun if count == 1 else plural or noun + 's'}"

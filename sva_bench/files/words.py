@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from sva_bench.errors import BadInput, nearest
-from sva_bench.files.complaints import shown
+from sva_bench.files.printable import shown
 
 Word = TypeVar("Word", bound=str)
 

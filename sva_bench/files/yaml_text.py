@@ -17,8 +17,9 @@ from ruamel.yaml.nodes import Node as Node
 
 from sva_bench.errors import BadFile
 from sva_bench.files.complaints import Loc as Loc
-from sva_bench.files.complaints import dotted, shown
+from sva_bench.files.complaints import dotted
 from sva_bench.files.mistaken import describe_text, describe_yaml_error
+from sva_bench.files.printable import shown
 
 MAX_DEPTH = 32
 MAX_YAML_VALUES = 200_000  # keys and values; a world of 10 000 obstacles has 120 000, which take 5 s to read

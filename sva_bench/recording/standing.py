@@ -8,8 +8,6 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 
-_MOST_ROWS = 12  # of names; those of more robots lie on each other
-
 
 def ranks_of(at_m: Sequence[FloatArray], first: Sequence[bool], near_m: float) -> list[int]:
     """How many robots come before each in the place where it begins; robots that have one for themselves are 0.
@@ -38,7 +36,7 @@ def raised_by(at_m: Sequence[FloatArray], first: Sequence[bool], step_m: float) 
     raised = [0.0] * len(at_m)
     rows: list[FloatArray] = []
     for k in order:
-        for steps in range(_MOST_ROWS):
+        for steps in range(2 * len(rows) + 1):  # each name stands in the way of two at most
             place = at_m[k] + np.array([0.0, steps * step_m])
             apart = [np.abs(other - place) for other in rows]
             if not any(dx < 2 * step_m and dy < 0.99 * step_m for dx, dy in apart):

@@ -10,7 +10,7 @@ import numpy as np
 
 from sva_bench.arrays import FloatArray
 from sva_bench.errors import SvaBenchError
-from sva_bench.files.complaints import shown
+from sva_bench.files.printable import shown
 from sva_bench.robot.body import CASTER_GAP_M, OwnBody, Solid, Vector
 from sva_bench.robot.urdf import Joint, Link, Shape, Urdf, about, rpy_of
 

@@ -16,7 +16,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import SolidKind
 from sva_bench.errors import BadFile, nearest
-from sva_bench.files.complaints import shown
+from sva_bench.files.printable import shown
 from sva_bench.files.xml_text import Element, parse_xml
 
 MAX_BYTES = 5_000_000  # thousands of links

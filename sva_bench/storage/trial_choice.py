@@ -11,7 +11,7 @@ import numpy as np
 from sva_bench.arrays import FloatArray, IntArray
 from sva_bench.choices import RECORDED_WORDS, RecordedKind
 from sva_bench.errors import BadInput, closest
-from sva_bench.files.complaints import shown
+from sva_bench.files.printable import shown
 from sva_bench.storage.agreement import Key
 from sva_bench.storage.manifest import RecordingNote
 from sva_bench.storage.stored_run import last_trial, values_of_trials

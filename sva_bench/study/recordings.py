@@ -15,7 +15,7 @@ from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
 from sva_bench.execution.outcome import Trace
-from sva_bench.files.complaints import shown
+from sva_bench.files.printable import shown
 from sva_bench.storage.trial_choice import nearest_to_median
 from sva_bench.travel.fuel import FuelCosts
 from sva_bench.world.model import World

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Self, get_args
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from sva_bench.choices import NoisePreset
-from sva_bench.files.complaints import shown
 from sva_bench.files.fields import Bounded, Probability, Section
+from sva_bench.files.printable import shown
 from sva_bench.world.noise import REALISTIC, LocalisationError, Noise, Passage, People
 
 _MOST_DELAY_S = 0.15

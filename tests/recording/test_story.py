@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -182,6 +182,8 @@ def test_a_robot_that_fails_as_it_is_sent_out_from_the_base_is_logged_there() ->
 
 @given(st.lists(st.tuples(st.floats(0, 4), st.floats(0, 4), st.booleans()), min_size=1, max_size=8),
        st.floats(0.3, 1.5))
+@example([(0.0, y, gone) for y, gone in ((1, False), (0.5, True), (0, False), (1, True), (0, True), (2, False),
+                                         (1, False), (0, False))], 0.75)
 def test_names_of_robots_that_stand_together_cover_none_and_those_of_lost_ones_are_lowest(
     robots: list[tuple[float, float, bool]], step_m: float
 ) -> None:
