@@ -29,9 +29,7 @@ SOLVER = (
 ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet": ("execution/engines/bullet.py",), "pybullet_data": ("execution/engines/bullet.py",),
     "pybullet_utils": ("execution/engines/bullet.py",), "ompl": ("travel/roadmap.py",),
-    "highspy": ("solver/highs.py",), "rerun": (
-        "recording/rerun.py", "recording/pen.py", "recording/drawn.py", "recording/charts.py", "recording/layout.py",
-        "recording/read_back.py", "recording/live.py"),
+    "highspy": ("solver/highs.py",), "rerun": ("recording/rerun.py",),
     "networkx": ("solver/flow/cuts.py",),
     "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py", "recording/pictures.py", "recording/frames.py",
                                                "recording/video.py"),
