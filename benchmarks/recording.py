@@ -18,7 +18,7 @@ from sva_bench.execution.outcome import Assignment, Driven, Trace, trace_of
 from sva_bench.execution.rules import settle
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.recording.about import About
-from sva_bench.recording.rerun import Side, record, record_pair
+from sva_bench.recording.record import Side, record, record_pair
 from sva_bench.robot.model import BUILT_IN
 from sva_bench.world.model import Robot, Scenario, Site, World
 from sva_bench.world.noise import Noise

@@ -29,12 +29,9 @@ SOLVER = (
 ONLY_IN: dict[str, tuple[str, ...]] = {
     "pybullet": ("execution/engines/bullet.py",), "pybullet_data": ("execution/engines/bullet.py",),
     "pybullet_utils": ("execution/engines/bullet.py",), "ompl": ("travel/roadmap.py",),
-    "highspy": ("solver/highs.py",), "rerun": (
-        "recording/rerun.py", "recording/pen.py", "recording/drawn.py", "recording/charts.py", "recording/layout.py",
-        "recording/read_back.py", "recording/live.py"),
+    "highspy": ("solver/highs.py",), "rerun": ("recording/rerun.py",),
     "networkx": ("solver/flow/cuts.py",),
-    "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py", "recording/pictures.py", "recording/frames.py",
-                                               "recording/video.py"),
+    "ruamel": ("files/yaml_text.py",), "PIL": ("world/maps/images.py", "recording/pictures.py"),
     "av": ("recording/video.py",),
     "distributed": ("workers/dask.py",),
     "mcap_ros2": ("recording/bag.py",),
@@ -126,7 +123,7 @@ def test_each_heavy_library_is_imported_in_one_file(module: str) -> None:
         assert module in homes, f"sva_bench/{module}:{line} imports {name}, which belongs in {', '.join(homes)}"
 
 
-@pytest.mark.parametrize("library", ["pybullet", "ompl", "highspy", "rerun", "networkx", "ruamel", "matplotlib",
+@pytest.mark.parametrize("library", ["pybullet", "ompl", "highspy", "rerun", "networkx", "ruamel", "matplotlib", "PIL",
                                      "distributed"])
 def test_the_file_that_a_heavy_library_belongs_in_does_import_it(library: str) -> None:
     # Else a renamed file would make the rule above hold for nothing.

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import rerun as rr
 
 from sva_bench.recording.colors import ALARM, Color, pale
-from sva_bench.recording.pen import Pen
+from sva_bench.recording.rerun import Pen
 from sva_bench.recording.states import STATE_COLORS
 from sva_bench.recording.story import Series, Story
 
@@ -20,34 +19,28 @@ def write_charts(pen: Pen, story: Story) -> None:
     _write_numbers(pen, story)
     _write_states(pen, story)
     _write_log(pen, story)
-    pen.constant("about", rr.TextDocument(story.text, media_type="text/markdown"))
+    pen.text("about", story.text)
 
 
 def _write_states(pen: Pen, story: Story) -> None:
     """What each robot is doing, from each change on."""
     for lane in story.states:
-        entity = f"states/{lane.robot}"
-        pen.constant(entity, rr.StateConfiguration(
-            values=list(STATE_COLORS), colors=[(*color, 255) for color in STATE_COLORS.values()]))
-        pen.column(entity, lane.time_s, rr.StateChange.columns(state=list(lane.states)))
+        pen.states(f"states/{lane.robot}", lane.time_s, lane.states, STATE_COLORS)
 
 
 def _write_lanes(pen: Pen, story: Story) -> None:
     """A lane for each robot: a cross where it was lost, and a mark each time that it learned of a failure."""
     for lane in story.lanes:
-        for name, times, marker, color in (("lost", lane.lost_s, rr.components.MarkerShape.Cross, ALARM),
-                                           ("learned", lane.learned_s, rr.components.MarkerShape.Diamond, lane.color)):
-            if len(times):
-                entity = f"news/{lane.robot}/{name}"
-                pen.constant(entity, rr.SeriesPoints(
-                    names=f"{lane.robot} {name}", colors=[color], markers=marker, marker_sizes=_MARK_UI))
-                pen.column(entity, times, rr.Scalars.columns(scalars=[lane.height] * len(times)))
+        if len(lane.lost_s):
+            pen.marks(f"news/{lane.robot}/lost", lane.lost_s, lane.height, name=f"{lane.robot} lost", color=ALARM,
+                      marker="cross", size_ui=_MARK_UI)
+        if len(lane.learned_s):
+            pen.marks(f"news/{lane.robot}/learned", lane.learned_s, lane.height, name=f"{lane.robot} learned",
+                      color=lane.color, marker="diamond", size_ui=_MARK_UI)
 
 
 def _line(pen: Pen, entity: str, series: Series, name: str, color: Color, *, steps: bool, width: float = 2.0) -> None:
-    pen.constant(entity, rr.SeriesLines(
-        names=name, colors=[color], widths=width, interpolation_mode="StepAfter" if steps else "Linear"))
-    pen.column(entity, series.time_s, rr.Scalars.columns(scalars=series.value))
+    pen.series(entity, series.time_s, series.value, name=name, color=color, steps=steps, width=width)
 
 
 def _write_numbers(pen: Pen, story: Story) -> None:
@@ -70,6 +63,5 @@ def write_total(pen: Pen, entity: str, story: Story, name: str, color: Color, en
 
 def _write_log(pen: Pen, story: Story) -> None:
     if story.log:
-        pen.column("events", [s.time_s for s in story.log], rr.TextLog.columns(
-            text=[s.text for s in story.log], level=[s.level for s in story.log],
-            color=[pale(s.color) for s in story.log]))
+        pen.log("events", [s.time_s for s in story.log], [s.text for s in story.log], [s.level for s in story.log],
+                [pale(s.color) for s in story.log])

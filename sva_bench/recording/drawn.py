@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import rerun as rr
 from numpy.typing import NDArray
 
 from sva_bench.arrays import FloatArray
+from sva_bench.choices import SolidKind
 from sva_bench.geometry.obstacles import Obstacles
 from sva_bench.recording.colors import ALARM, DISABLED, GREEN, ORANGE, Color, pale
 from sva_bench.recording.hulls import half_of, quaternion_of, top_m
 from sva_bench.recording.meetings import Floor, Gate, Touched, Waiting
-from sva_bench.recording.pen import Pen
 from sva_bench.recording.reactions import Change, Forgone, Lost
+from sva_bench.recording.rerun import Pen
 from sva_bench.recording.story import Marks, RobotView, Story, dashes
 
 _FLOOR: Color = (232, 232, 232)
 _WALLS: Color = (176, 176, 176)
+_HEADING: Color = (255, 255, 255)
 
 _OBSTACLE_M = 0.35  # shown height: low, so that little is hidden behind it
 _FLOOR_M = 0.02  # shown thickness
@@ -71,13 +71,11 @@ def write_drive(pen: Pen, entity: str, time_s: FloatArray, pose: FloatArray, rad
         pose: x, y [m], yaw [rad], shape (n, 3).
         radius_m, color: Its radius and colour.
     """
-    pen.column(f"{entity}/robot", time_s, rr.Transform3D.columns(
-        translation=_deep(pose[:, :2], 0.0), quaternion=_about_z(pose[:, 2])))
-    pen.constant(f"{entity}/robot/body", rr.Cylinders3D(
-        centers=[[0, 0, radius_m]], radii=[radius_m], lengths=[2 * radius_m], colors=[color], fill_mode="solid"))
-    pen.column(f"{entity}/line", time_s[-1:], rr.LineStrips3D.columns(
-        strips=_deep(pose[None, :, :2], _DRIVEN_M)))
-    pen.constant(f"{entity}/line", rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(1.75)))
+    pen.move(f"{entity}/robot", time_s, _deep(pose[:, :2], 0.0), _about_z(pose[:, 2]))
+    pen.solids(f"{entity}/robot/body", "cylinder", np.array([[0.0, 0.0, radius_m]]), np.full((1, 3), radius_m),
+               colors=[color])
+    pen.lines_at(f"{entity}/line", time_s[-1:], _deep(pose[None, :, :2], _DRIVEN_M))
+    pen.lines(f"{entity}/line", colors=[color], width_ui=1.75)
 
 
 def _deep(points: FloatArray, z_m: float) -> NDArray[np.float32]:
@@ -92,20 +90,16 @@ def _about_z(yaw_rad: FloatArray) -> NDArray[np.float32]:
 
 
 def _write_solids(pen: Pen, solids: Obstacles) -> None:
-    x0, y0, x1, y1 = solids.bounds_m.tolist()
-    pen.constant("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    pen.constant("world/floor", rr.Boxes3D(
-        centers=[[(x0 + x1) / 2, (y0 + y1) / 2, -_FLOOR_M / 2]],
-        half_sizes=[[(x1 - x0) / 2, (y1 - y0) / 2, _FLOOR_M / 2]], colors=[_FLOOR], fill_mode="solid"))
-    boxes = solids.boxes
-    pen.constant("world/boxes", rr.Boxes3D(
-        centers=_deep(boxes[:, :2], _OBSTACLE_M / 2),
-        half_sizes=_deep(boxes[:, 2:4], _OBSTACLE_M / 2), quaternions=_about_z(boxes[:, 4]),
-        colors=[_WALLS], fill_mode="solid"))
-    if len(solids.cylinders):
-        pen.constant("world/cylinders", rr.Cylinders3D(
-            centers=_deep(solids.cylinders[:, :2], _OBSTACLE_M / 2), radii=solids.cylinders[:, 2],
-            lengths=[_OBSTACLE_M] * len(solids.cylinders), colors=[_WALLS], fill_mode="solid"))
+    low, high = solids.bounds_m[:2], solids.bounds_m[2:]
+    pen.z_is_up("world")
+    pen.solids("world/floor", "box", _deep((low + high)[None] / 2, -_FLOOR_M / 2),
+               _deep((high - low)[None] / 2, _FLOOR_M / 2), colors=[_FLOOR])
+    boxes, cylinders = solids.boxes, solids.cylinders
+    pen.solids("world/boxes", "box", _deep(boxes[:, :2], _OBSTACLE_M / 2), _deep(boxes[:, 2:4], _OBSTACLE_M / 2),
+               turned=_about_z(boxes[:, 4]), colors=[_WALLS])
+    if len(cylinders):
+        pen.solids("world/cylinders", "cylinder", _deep(cylinders[:, :2], _OBSTACLE_M / 2),
+                   _deep(cylinders[:, [2, 2]], _OBSTACLE_M / 2), colors=[_WALLS])
 
 
 def _write_marks(pen: Pen, marks: Marks, solids: Obstacles) -> None:
@@ -114,18 +108,12 @@ def _write_marks(pen: Pen, marks: Marks, solids: Obstacles) -> None:
     half, thick = max(0.3, max(x1 - x0, y1 - y0) / 60), 0.02  # large enough to be seen in a large world
     n = len(marks.names)
     entity = {"base": "world/base", "station": "world/stations", "poi": "world/pois"}[marks.kind]
-    centers = _deep(marks.at_m, thick / 2)
-    if marks.kind == "poi":
-        pen.constant(entity, rr.Cylinders3D.from_fields(
-            centers=centers, radii=(half * _WIDEST * marks.size).tolist(), lengths=[thick] * n, fill_mode="solid"))
-        colors = rr.Cylinders3D.columns(colors=marks.colors.reshape(-1, 3).astype(np.uint8))
-    else:
-        turn = math.radians(45) if marks.kind == "base" else 0.0
-        pen.constant(entity, rr.Boxes3D.from_fields(
-            centers=centers, half_sizes=[[half, half, thick / 2]] * n, quaternions=_about_z(np.full(n, turn)),
-            fill_mode="solid"))
-        colors = rr.Boxes3D.columns(colors=marks.colors.reshape(-1, 3).astype(np.uint8))
-    pen.column(entity, marks.time_s, colors.partition([n] * len(marks.time_s)))
+    kind: SolidKind = "cylinder" if marks.kind == "poi" else "box"
+    sizes = half * _WIDEST * marks.size if marks.kind == "poi" else np.full(n, half)
+    turned = None if marks.kind == "poi" else _about_z(np.full(n, math.radians(45) if marks.kind == "base" else 0.0))
+    pen.solids(entity, kind, _deep(marks.at_m, thick / 2), _deep(np.stack([sizes, sizes], axis=1), thick / 2),
+               turned=turned)
+    pen.repaint(entity, kind, marks.time_s, marks.colors.reshape(-1, 3).astype(np.uint8), [n] * len(marks.time_s))
     pen.names(f"{entity}/names", marks.names, _deep(marks.at_m - [0.0, half], 0.0))
 
 
@@ -133,31 +121,29 @@ def _write_robot(pen: Pen, robot: RobotView) -> None:
     here, r = f"world/robots/{robot.name}", robot.radius_m
     height = top_m(robot.solids)
     # Place and heading apart: the name goes where the robot goes, but stays north of it.
-    pen.column(here, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.pose[:, :2], 0.0)))
-    pen.column(f"{here}/hull", robot.time_s, rr.Transform3D.columns(quaternion=_about_z(robot.pose[:, 2])))
+    pen.move(here, robot.time_s, _deep(robot.pose[:, :2], 0.0))
+    pen.move(f"{here}/hull", robot.time_s, turned=_about_z(robot.pose[:, 2]))
     _write_name(pen, f"{here}/name", robot, np.array([0.0, r + _NAME_M, height]))
     if robot.rank:
         # Else of hulls in one place now this and now that one would be seen, in patches.
-        pen.constant(f"{here}/hull/body", rr.Transform3D.from_fields(scale=[1.0 - _WITHIN * min(robot.rank, 9)] * 3))
+        pen.scale(f"{here}/hull/body", 1.0 - _WITHIN * min(robot.rank, 9))
     _write_hull(pen, f"{here}/hull/body", robot)
     # A white bar on top, from the centre to the front.
-    pen.constant(f"{here}/hull/heading", rr.Boxes3D(
-        centers=[[r / 2, 0, height]], half_sizes=[[r / 2, r / 6, r / 10]], colors=[(255, 255, 255)], fill_mode="solid"))
+    pen.solids(f"{here}/hull/heading", "box", np.array([[r / 2, 0.0, height]]), np.array([[r / 2, r / 6, r / 10]]),
+               colors=[_HEADING])
     if len(robot.planned):
-        pen.constant(f"world/planned/{robot.name}", rr.LineStrips3D(
-            _deep(robot.planned, _PLANNED_M), colors=[pale(robot.color)], radii=rr.Radius.ui_points(1.0)))
+        pen.lines(f"world/planned/{robot.name}", _deep(robot.planned, _PLANNED_M), colors=[pale(robot.color)],
+                  width_ui=1.0)
     if len(robot.believed):
         # A ring where it believes to be: centimetres beside its hull.
         turns = np.linspace(0.0, 2 * math.pi, 25)
         ring, entity = r * np.stack([np.cos(turns), np.sin(turns)], axis=-1), f"world/believed/{robot.name}"
-        pen.column(entity, robot.time_s, rr.Transform3D.columns(translation=_deep(robot.believed, 0.0)))
-        pen.constant(f"{entity}/ring", rr.LineStrips3D(
-            [_deep(ring, height + _RING_M)], colors=[pale(robot.color)], radii=rr.Radius.ui_points(1.25)))
+        pen.move(entity, robot.time_s, _deep(robot.believed, 0.0))
+        pen.lines(f"{entity}/ring", [_deep(ring, height + _RING_M)], colors=[pale(robot.color)], width_ui=1.25)
     if len(robot.trail):
         entity = f"world/driven/{robot.name}"
-        pen.constant(entity, rr.LineStrips3D.from_fields(
-            colors=[robot.color], radii=rr.Radius.ui_points(1.75)))
-        pen.column(entity, robot.trail_s, rr.LineStrips3D.columns(strips=_deep(robot.trail, _DRIVEN_M)))
+        pen.lines(entity, colors=[robot.color], width_ui=1.75)
+        pen.lines_at(entity, robot.trail_s, _deep(robot.trail, _DRIVEN_M))
 
 
 def _write_name(pen: Pen, entity: str, robot: RobotView, at_m: FloatArray) -> None:
@@ -166,8 +152,8 @@ def _write_name(pen: Pen, entity: str, robot: RobotView, at_m: FloatArray) -> No
     shown = raised.time_s < (math.inf if gone_s is None else gone_s)
     places = (at_m + np.outer(raised.value[shown], [0.0, 1.0, 0.0])).astype(np.float32)
     pen.names(entity, [robot.name])
-    pen.column(entity, [*raised.time_s[shown], *([] if gone_s is None else [gone_s])], rr.Points3D.columns(
-        positions=places).partition([1] * len(places) + [0] * (gone_s is not None)))
+    pen.points_at(entity, [*raised.time_s[shown], *([] if gone_s is None else [gone_s])], places,
+                  counts=[1] * len(places) + [0] * (gone_s is not None))
 
 
 def _write_hull(pen: Pen, entity: str, robot: RobotView) -> None:
@@ -181,20 +167,9 @@ def _write_hull(pen: Pen, entity: str, robot: RobotView) -> None:
     for kind in kinds:
         mine = [solid for solid in robot.solids if solid.kind == kind]
         below = entity if len(robot.solids) == 1 else f"{entity}/{kind}"
-        places: Any = {"centers": [solid.at_m for solid in mine], "fill_mode": "solid",
-                       "quaternions": [quaternion_of(solid) for solid in mine]}
-        halves = [half_of(solid) for solid in mine]
-        if kind == "cylinder":
-            pen.constant(below, rr.Cylinders3D.from_fields(
-                radii=[half[0] for half in halves], lengths=[2 * half[2] for half in halves], **places))
-            painted = rr.Cylinders3D.columns(colors=colors)
-        elif kind == "box":
-            pen.constant(below, rr.Boxes3D.from_fields(half_sizes=halves, **places))
-            painted = rr.Boxes3D.columns(colors=colors)
-        else:
-            pen.constant(below, rr.Ellipsoids3D.from_fields(half_sizes=halves, **places))
-            painted = rr.Ellipsoids3D.columns(colors=colors)
-        pen.column(below, times, painted)
+        pen.solids(below, kind, np.array([solid.at_m for solid in mine]), np.array([half_of(solid) for solid in mine]),
+                   turned=np.array([quaternion_of(solid) for solid in mine]))
+        pen.repaint(below, kind, times, colors)
 
 
 def _write_forgone(pen: Pen, forgone: Forgone) -> None:
@@ -202,21 +177,19 @@ def _write_forgone(pen: Pen, forgone: Forgone) -> None:
     entity, r = f"world/forgone/{forgone.robot}", _FORGONE_M
     cross = np.array([[[-r, -r], [r, r]], [[-r, r], [r, -r]]])
     strips = (forgone.at_m[:, None, None] + cross).reshape(-1, 2, 2)
-    pen.column(entity, [forgone.time_s], rr.LineStrips3D.columns(
-        strips=_deep(strips, _ORDERS_M), colors=[forgone.color] * len(strips)).partition([len(strips)]))
-    pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_NEW_UI)))
+    pen.lines_at(entity, [forgone.time_s], _deep(strips, _ORDERS_M), colors=[forgone.color] * len(strips),
+                 counts=[len(strips)])
+    pen.lines(entity, width_ui=_NEW_UI)
 
 
 def _write_lost(pen: Pen, lost: Lost, robot: RobotView) -> None:
     """A red cross where a robot was lost, from then on, larger than it, and what happened, in the place of its name."""
     entity, r = f"world/lost/{lost.robot}", 2.2 * lost.radius_m
     cross = np.array([[[-r, -r], [r, r]], [[-r, r], [r, -r]]]) + lost.at_m
-    pen.column(entity, [lost.time_s], rr.LineStrips3D.columns(
-        strips=_deep(cross, _LOST_M), colors=[ALARM] * 2).partition([2]))
-    pen.constant(entity, rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(_CROSS_UI)))
+    pen.lines_at(entity, [lost.time_s], _deep(cross, _LOST_M), colors=[ALARM] * 2, counts=[2])
+    pen.lines(entity, width_ui=_CROSS_UI)
     at = lost.at_m + np.array([0.0, robot.radius_m + _NAME_M + float(robot.raised.value[-1])])
-    pen.column(f"{entity}/what", [lost.time_s], rr.Points3D.columns(
-        positions=_deep(at[None], _LOST_M), labels=[lost.what]))
+    pen.points_at(f"{entity}/what", [lost.time_s], _deep(at[None], _LOST_M), names=[lost.what])
     pen.names(f"{entity}/what")
 
 
@@ -224,33 +197,31 @@ def _write_floors(pen: Pen, floors: Sequence[Floor]) -> None:
     """Patches of floor as plates, each with its friction."""
     if floors:
         boxes = np.array([floor.box for floor in floors])
-        pen.constant("world/floors", rr.Boxes3D(
-            centers=_deep(boxes[:, :2], _PATCH_M / 2), half_sizes=_deep(boxes[:, 2:4], _PATCH_M / 2),
-            quaternions=_about_z(boxes[:, 4]), colors=[floor.color for floor in floors], fill_mode="solid"))
+        pen.solids("world/floors", "box", _deep(boxes[:, :2], _PATCH_M / 2), _deep(boxes[:, 2:4], _PATCH_M / 2),
+                   turned=_about_z(boxes[:, 4]), colors=[floor.color for floor in floors])
         pen.names("world/floors/names", [f"friction {floor.friction:g}" for floor in floors],
-                     _deep(boxes[:, :2], 0.0))
+                  _deep(boxes[:, :2], 0.0))
 
 
 def _write_gate(pen: Pen, gate: Gate) -> None:
     """A dashed line across a passage: red while a robot waits before it, green else."""
     entity = f"world/passages/{gate.name}"
     pieces = dashes(gate.ends_m, _BAR_M, _BAR_M)
-    pen.constant(entity, rr.LineStrips3D.from_fields(
-        strips=_deep(pieces, _GATE_M), radii=rr.Radius.ui_points(_GATE_UI)))
+    pen.lines(entity, _deep(pieces, _GATE_M), width_ui=_GATE_UI)
     colors = [list(ALARM if shut else GREEN) for shut in gate.shut for _ in pieces]
-    pen.column(entity, gate.time_s, rr.LineStrips3D.columns(
-        colors=np.array(colors, dtype=np.uint8)).partition([len(pieces)] * len(gate.shut)))
+    pen.lines_at(entity, gate.time_s, colors=np.array(colors, dtype=np.uint8),
+                 counts=[len(pieces)] * len(gate.shut))
     pen.names(f"{entity}/name", [gate.name], _deep(gate.ends_m[1:], _GATE_M))
 
 
 def _write_touched(pen: Pen, touched: Touched) -> None:
     """Red marks where a hull touched something, each from then on, and what it was."""
     entity = f"world/contacts/{touched.robot}"
-    pen.column(entity, touched.time_s, rr.Points3D.columns(positions=_deep(touched.at_m, _LOST_M)))
-    pen.constant(entity, rr.Points3D.from_fields(colors=[ALARM], radii=rr.Radius.ui_points(_MARK_UI)))
+    pen.points_at(entity, touched.time_s, _deep(touched.at_m, _LOST_M))
+    pen.points(entity, colors=[ALARM], size_ui=_MARK_UI)
     named = [k for k, what in enumerate(touched.what) if what]
-    pen.column(f"{entity}/what", touched.time_s[named], rr.Points3D.columns(
-        positions=_deep(touched.at_m[named], _LOST_M), labels=[touched.what[k] for k in named]))
+    pen.points_at(f"{entity}/what", touched.time_s[named], _deep(touched.at_m[named], _LOST_M),
+                  names=[touched.what[k] for k in named])
     pen.names(f"{entity}/what")
 
 
@@ -259,13 +230,11 @@ def _write_waiting(pen: Pen, waiting: Sequence[Waiting]) -> None:
     for robot in dict.fromkeys(wait.robot for wait in waiting):
         mine, entity = [wait for wait in waiting if wait.robot == robot], f"world/waits/{robot}"
         times = [time for wait in mine for time in (wait.since_s, wait.until_s)]
-        at = _deep(np.array([wait.at_m for wait in mine]), _LOST_M)
-        pen.column(entity, times, rr.Points3D.columns(
-            positions=at, colors=[ORANGE] * len(mine)).partition([1, 0] * len(mine)))
-        pen.constant(entity, rr.Points3D.from_fields(radii=rr.Radius.ui_points(_MARK_UI)))
-        pen.column(f"{entity}/what", times, rr.Points3D.columns(positions=at, labels=[
-            f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine]).partition(
-                [1, 0] * len(mine)))
+        at, counts = _deep(np.array([wait.at_m for wait in mine]), _LOST_M), [1, 0] * len(mine)
+        pen.points_at(entity, times, at, colors=[ORANGE] * len(mine), counts=counts)
+        pen.points(entity, size_ui=_MARK_UI)
+        pen.points_at(f"{entity}/what", times, at, counts=counts, names=[
+            f"waits {wait.until_s - wait.since_s:.0f} s for {wait.what}" for wait in mine])
         pen.names(f"{entity}/what")
 
 
@@ -274,9 +243,9 @@ def _write_change(pen: Pen, change: Change) -> None:
     for name, paths, color, width in (("old", change.old, pale(change.color), 1.0),
                                       ("new", change.new, change.color, _NEW_UI)):
         entity = f"world/orders/{change.robot}/{name}"
-        pen.constant(entity, rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(width)))
+        pen.lines(entity, colors=[color], width_ui=width)
         lines = [path for path in paths if len(path) > 1]
         # No line is one too: it takes an earlier one away.
         strips = [_deep(path, _ORDERS_M) if len(path) > 1 else np.zeros((1, 3), dtype=np.float32) for path in paths]
         if lines:
-            pen.column(entity, change.time_s, rr.LineStrips3D.columns(strips=strips))
+            pen.lines_at(entity, change.time_s, strips)

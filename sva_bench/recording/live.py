@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import rerun as rr
-
 from sva_bench.execution.outcome import Driven
 from sva_bench.recording.colors import ROBOT_COLORS
 from sva_bench.recording.drawn import write_drive, write_ground
 from sva_bench.recording.layout import layout_of_drives
-from sva_bench.recording.pen import Pen
+from sva_bench.recording.rerun import Pen, pen_to_viewer
 from sva_bench.recording.story import eye_of, ground_of
 from sva_bench.world.model import World
 
@@ -19,16 +17,14 @@ class Live:
     Hops from site to site come as they are done, in no order; which plan they belong to is decided later.
     """
 
-    def __init__(self, world: World, stream: rr.RecordingStream) -> None:
-        self._pen, self._driven_s = Pen(stream=stream), dict[str, float]()
+    def __init__(self, world: World, pen: Pen) -> None:
+        self._pen, self._driven_s = pen, dict[str, float]()
         named = [(name, robot) for robot in world.robots for name in (robot.name, world.kind_of(robot))]
         self._radii = {name: robot.model.radius_m for name, robot in named}
         names = list(self._radii)
         self._colors = {name: ROBOT_COLORS[k // 2 % len(ROBOT_COLORS)] for k, name in enumerate(names)}
-        stream.set_log_time_enabled(False)
-        stream.set_log_tick_enabled(False)
-        stream.send_blueprint(layout_of_drives(f"{world.name}, as robots drive", names, *eye_of(world)))
-        write_ground(self._pen, *ground_of(world))
+        pen.lay_out(layout_of_drives(f"{world.name}, as robots drive", names, *eye_of(world)))
+        write_ground(pen, *ground_of(world))
 
     def __call__(self, who: str, driven: Driven) -> None:
         """Show a drive of a robot, or of a kind of robots."""
@@ -42,6 +38,4 @@ class Live:
 
 def connected(world: World, port: int) -> Live:
     """What shows drives in the viewer that listens at a port of this machine."""
-    stream = rr.RecordingStream(f"sva-bench {world.name} live")
-    stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
-    return Live(world, stream)
+    return Live(world, pen_to_viewer(f"sva-bench {world.name} live", port))

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 import numpy as np
-from rerun.chunk import RrdReader
 
 from sva_bench.arrays import FloatArray
 from sva_bench.choices import SiteKind
 from sva_bench.errors import BadFile
 from sva_bench.palette import Color
-from sva_bench.recording.pen import TIMELINE
+from sva_bench.recording.rerun import held_in
 
 _SITES: Mapping[SiteKind, str] = {"base": "base", "station": "stations", "poi": "pois"}
 
@@ -123,15 +122,14 @@ class _Entities:
     def __init__(self, path: Path) -> None:
         self.constants: dict[tuple[str, str], object] = {}
         self.steps: dict[tuple[str, str], tuple[list[int], list[object]]] = {}
-        for chunk in RrdReader(path).stream():
-            rows, entity = chunk.to_record_batch(), chunk.entity_path.removeprefix("/")
-            for component in rows.schema.names:
-                if chunk.is_static:
-                    self.constants[entity, component] = rows.column(component)[-1].as_py()
-                elif TIMELINE in rows.schema.names and component != TIMELINE:
-                    times, values = self.steps.setdefault((entity, component), ([], []))
-                    times += rows.column(TIMELINE).cast("int64").to_pylist()
-                    values += rows.column(component).to_pylist()
+        for held in held_in(path):
+            key = held.entity, held.component
+            if held.time_ns is None:
+                self.constants[key] = held.values[-1]
+            else:
+                times, values = self.steps.setdefault(key, ([], []))
+                times += held.time_ns
+                values += held.values
 
     def words(self, entity: str, component: str) -> list[str]:
         """A constant as words."""

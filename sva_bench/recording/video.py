@@ -4,23 +4,22 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from numpy.typing import NDArray
 
 from sva_bench.errors import BadInput, ExitCode, SvaBenchError
 from sva_bench.palette import ALARM, BLACK, GREEN, YELLOW
 from sva_bench.recording.frames import Frames, moments
+from sva_bench.recording.pictures import gif
 from sva_bench.recording.read_back import Shown, read_recording
 
 _RATE = 10  # frames a second; a GIF counts in hundredths of one
 _LAPSE_S = 15.0  # a mission is shown in about this time, a short one in its own
 _HELD_S = 2.0  # the last frame is held
-_COLORS = 64  # of a GIF: what is drawn has few, and their edges
 
 
 class NoVideoEncoder(SvaBenchError):
@@ -68,38 +67,19 @@ def video_of(recording: Path, kind: str, progress: Callable[[int, int], None]) -
     return _WRITERS[kind](read_recording(recording), progress)
 
 
-def _drawn(shown: Shown, progress: Callable[[int, int], None]) -> Iterator[Image.Image]:
-    """The frames one after the other."""
+def _drawn(shown: Shown, progress: Callable[[int, int], None]) -> Iterator[NDArray[np.uint8]]:
+    """The frames one after the other, each of shape (height, width, 3)."""
     frames, count = Frames(shown), max(round(min(shown.end_s, _LAPSE_S) * _RATE), 2)
     for number, time_s in enumerate(moments(shown.end_s, count).tolist()):
         yield frames.at(time_s)
         progress(number + 1, count)
 
 
-def _with_swatches(frame: Image.Image, shown: Shown) -> Image.Image:
-    """A frame beside patches of the colours that mean something: of a small cross alone the palette would have none."""
+def _as_gif(shown: Shown, progress: Callable[[int, int], None]) -> bytes:
+    frames = list(_drawn(shown, progress))
     meant = list(dict.fromkeys([ALARM, YELLOW, GREEN, BLACK, *(
         robot.color for plan in shown.plans for robot in plan.robots)]))
-    side = math.isqrt(frame.width * frame.height // 50)
-    larger = Image.new("RGB", (frame.width + side, max(frame.height, side * len(meant))), (255, 255, 255))
-    larger.paste(frame, (0, 0))
-    for number, color in enumerate(meant):
-        larger.paste(color, (frame.width, number * side, frame.width + side, (number + 1) * side))
-    return larger
-
-
-def _as_gif(shown: Shown, progress: Callable[[int, int], None]) -> bytes:
-    # One palette for all frames: what stands still is the same in each, and only what moves is written again. It is
-    # made from the last frame, which has all colours. Optimised, so that of a frame only what changed is kept.
-    drawn = list(_drawn(shown, progress))
-    palette = _with_swatches(drawn[-1], shown).quantize(
-        _COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in drawn]
-    stream = io.BytesIO()
-    lasts = [round(1000 / _RATE)] * (len(frames) - 1) + [round(1000 * _HELD_S)]
-    frames[0].save(stream, format="GIF", save_all=True, append_images=frames[1:], duration=lasts, loop=0,
-                   optimize=True, disposal=1)
-    return stream.getvalue()
+    return gif(frames, meant, [round(1000 / _RATE)] * (len(frames) - 1) + [round(1000 * _HELD_S)])
 
 
 def _as_mp4(shown: Shown, progress: Callable[[int, int], None]) -> bytes:
@@ -113,12 +93,12 @@ def _as_mp4(shown: Shown, progress: Callable[[int, int], None]) -> bytes:
             if video is None:
                 video = container.add_stream("libx264", rate=Fraction(_RATE), options={
                     "crf": "22", "threads": "1", "tune": "animation"})  # of several threads bytes could differ
-                video.width, video.height, video.pix_fmt = frame.width, frame.height, "yuv420p"
-            container.mux(video.encode(av.VideoFrame.from_ndarray(np.asarray(frame))))
+                (video.height, video.width, _), video.pix_fmt = frame.shape, "yuv420p"
+            container.mux(video.encode(av.VideoFrame.from_ndarray(frame)))
         assert video is not None
         assert frame is not None, "there are two frames at least"
         for _ in range(round(_HELD_S * _RATE)):
-            container.mux(video.encode(av.VideoFrame.from_ndarray(np.asarray(frame))))
+            container.mux(video.encode(av.VideoFrame.from_ndarray(frame)))
         container.mux(video.encode())
     return stream.getvalue()
 

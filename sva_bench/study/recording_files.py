@@ -12,7 +12,7 @@ from sva_bench.execution.outcome import Trace
 from sva_bench.execution.reacted import Reacted
 from sva_bench.execution.team_trace import TeamTrace
 from sva_bench.recording.about import About
-from sva_bench.recording.rerun import Side, record, record_pair
+from sva_bench.recording.record import Side, record, record_pair
 from sva_bench.storage.agreement import Key
 from sva_bench.storage.manifest import RecordingNote
 from sva_bench.storage.run_folder import pair_stem, recording_stem

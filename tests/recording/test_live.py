@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from sva_bench.__main__ import run_command_line
 from sva_bench.execution.outcome import Driven
 from sva_bench.recording.live import Live
+from sva_bench.recording.rerun import Pen
 from sva_bench.study.options import Options
 from sva_bench.study.run import measure
 from tests.recording.test_rerun import rows
@@ -22,7 +23,7 @@ def test_each_drive_of_a_run_is_shown_as_it_is_made_one_after_the_other(tmp_path
     world, path, seen = world_of(tmp_path), tmp_path / "live.rrd", list[tuple[str, Driven]]()
     stream = rr.RecordingStream("live")
     stream.save(path)
-    live = Live(world, stream)
+    live = Live(world, Pen(stream=stream))
 
     def watch(who: str, driven: Driven) -> None:
         live(who, driven)

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sva_bench.execution.outcome import Event, Trace
 from sva_bench.recording.colors import ALARM, GREEN
 from sva_bench.recording.meetings import floors_of, gates_of, tinted, touched_of, waiting_of
-from sva_bench.recording.rerun import record
+from sva_bench.recording.record import record
 from sva_bench.recording.story import story_of
 from sva_bench.recording.viewer import verify
 from sva_bench.world.model import World

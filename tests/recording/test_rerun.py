@@ -11,7 +11,8 @@ from rerun.chunk import RrdReader
 
 from sva_bench.recording.about import About
 from sva_bench.recording.colors import ALARM, BLUE, DISABLED, ROBOT_COLORS, VERMILLION, YELLOW, pale
-from sva_bench.recording.rerun import TIMELINE, Side, end_s, record, record_pair
+from sva_bench.recording.record import Side, record, record_pair
+from sva_bench.recording.rerun import TIMELINE, end_s
 from sva_bench.recording.viewer import program, verify
 from tests.recording.missions import TOUR, WORLD, mission_with_news, trace
 

@@ -18,7 +18,7 @@ from sva_bench.palette import ALARM, GREEN, ROBOTS, YELLOW
 from sva_bench.recording.about import About
 from sva_bench.recording.frames import Frames
 from sva_bench.recording.read_back import Shown, read_recording
-from sva_bench.recording.rerun import Side, record, record_pair
+from sva_bench.recording.record import Side, record, record_pair
 from sva_bench.recording.video import NoVideoEncoder, kind_of, video_of
 from tests.recording.missions import WORLD, trace
 

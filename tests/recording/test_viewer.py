@@ -21,7 +21,7 @@ import pytest
 
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.recording import viewer
-from sva_bench.recording.rerun import record
+from sva_bench.recording.record import record
 from sva_bench.recording.viewer import LAVAPIPE, NoVulkanDriver, ViewerFailed, drawing_environment, recordings_of, view
 from tests.recording.missions import WORLD, trace
 

@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 from sva_bench.choices import Fidelity, Interaction, News, PolicyName, RecordedKind
 from sva_bench.errors import BadInput
 from sva_bench.execution.executed import Executed
-from sva_bench.recording.pen import TIMELINE
+from sva_bench.recording.rerun import TIMELINE
 from sva_bench.storage.stored_run import rows_of_trial
 from sva_bench.study.options import Options
 from sva_bench.study.recordings import Ask, asks_of, typical_trial
