@@ -22,6 +22,7 @@ from sva_bench.cli.options import (
     WorldArgument,
     finite,
 )
+from sva_bench.cli.solving import watched_solve
 from sva_bench.cli.terminal import (
     messages,
     print_hanging,
@@ -110,15 +111,14 @@ def plan(
             raise BadInput("--plan-failure belongs to a world; an instance has its process in it, under failure")
         else:
             instance = read_instance(source)
-        with loading():  # after reading: what is wrong is said at once
-            from sva_bench.solver.two_stage import SolveLimits
-            from sva_bench.study.one_plan import make_plan
+    with loading():  # after reading: what is wrong is said at once
+        from sva_bench.solver.two_stage import SolveLimits
+        from sva_bench.study.one_plan import make_plan
 
-        progress("solving", 0, 1)
-        with deferring_ctrl_c():  # the solver hears it; from there on the plan is written
-            made = make_plan(instance, request, SolveLimits(time_limit_s=time_limit, gap=gap))
-            write_result(output, plan_text(made, output))
-        progress("solving", 1, 1)
+    # Ctrl-C: the solver hears it; from there on the plan is written.
+    with watched_solve() as watch, deferring_ctrl_c():
+        made = make_plan(instance, request, SolveLimits(time_limit_s=time_limit, gap=gap, watch=watch))
+        write_result(output, plan_text(made, output))
     assert made.value is not None
     assert made.bound is not None
     gap_left = made.bound - made.value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,10 +31,12 @@ class SolveLimits:
     Attributes:
         time_limit_s: Wall-clock time for one plan [s]; ``None`` = none.
         gap: Gap, relative to the value, at which a plan counts as optimal.
+        watch: Called as the search for a plan begins, with what it has found whenever that is looked at.
     """
 
     time_limit_s: float | None = None
     gap: float = 1e-6
+    watch: Callable[[Watched], None] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.gap < 0 or (self.time_limit_s is not None and self.time_limit_s < 0):
@@ -48,10 +50,16 @@ class SolveLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class Clock:
-    """Time used and time left, in ``time.monotonic``."""
+    """Time used and time left, in ``time.monotonic``.
+
+    Attributes:
+        started, deadline: When it started, and when time is over.
+        watch: Called as a solve begins, with its progress and the factor between its values and those asked for.
+    """
 
     started: float
     deadline: float
+    watch: Callable[[Progress, float], None] | None = None
 
     def left_s(self) -> float:
         """Time left [s]."""
@@ -213,6 +221,34 @@ class Progress:
         """Least improvement over the incumbent that matters: beyond the gap, the grain and rounding."""
         return max(gap * self._size(), (1 - 1e-5) * self.grain - 2 * self.rounding,
                    self.rounding / 2)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Watched:
+    """What the search for a plan has found by now, in the units of its instance.
+
+    Attributes:
+        objective: What it maximises.
+    """
+
+    objective: str
+    _progress: Progress
+    _unit: float
+
+    @property
+    def value(self) -> float:
+        """Value of the best plan."""
+        return (self._progress.value + self._progress.constants[0]) * self._unit
+
+    @property
+    def bound(self) -> float:
+        """Upper bound on the value of any plan."""
+        return (self._progress.bound + self._progress.constants[0]) * self._unit
+
+    @property
+    def nodes(self) -> int:
+        """Branch-and-bound nodes."""
+        return self._progress.nodes
 
 
 def best_known(goal: Goal, known: Knowledge) -> VisitOrders | None:

@@ -88,6 +88,8 @@ def _solve(
                       recourse=None if recourse is None else recourse.times(factor), cuts=cuts,
                       starts=starts if goal.discounts is None else 1)  # columns find it sooner than further starts
     used = method_for(method, problem)
+    if clock.watch is not None:
+        clock.watch(progress, factor)
     try:
         with hearing_ctrl_c():
             routes = searched(problem)

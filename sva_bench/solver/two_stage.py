@@ -19,7 +19,16 @@ from sva_bench.solver.discounts import Discounts
 from sva_bench.solver.finished import above, certified, finished, orders_of, worst_of
 from sva_bench.solver.flow.recourse import refuse_free_legs, refuse_seldom_available
 from sva_bench.solver.goal import Goal
-from sva_bench.solver.knowledge import Clock, Knowledge, Solution, SolveLimits, knowledge_of, route_over, value_of
+from sva_bench.solver.knowledge import (
+    Clock,
+    Knowledge,
+    Solution,
+    SolveLimits,
+    Watched,
+    knowledge_of,
+    route_over,
+    value_of,
+)
 from sva_bench.solver.methods import keeps_second_stage, serves_discounts
 from sva_bench.solver.outcomes import outcomes_of, possible
 from sva_bench.solver.preprocess import warn_of_unreachable
@@ -33,6 +42,7 @@ __all__ = [
     "DeterministicPlans",
     "Knowledge",
     "SolveLimits",
+    "Watched",
     "knowledge_of",
     "plan_averse",
     "plan_deterministic",
@@ -115,6 +125,7 @@ def plan_averse(
     most = float(incentives_of(own).max(axis=0, initial=0.0).sum())
     target = float(in_unit(np.array([measure.target]), unit)[0])
     in_own = replace(measure, target=min(target, most))
+    clock = _watched(clock, limits, measure.kind, unit)
     solution = solve(own, _averse(own, in_own), known, clock, limits.gap,
                      beyond=measure.weight * (in_own.target - target))
     value = value_of(_averse(instance, measure), known.legs_by_vehicle, solution.orders)
@@ -255,18 +266,26 @@ def _plan(
     if (discounts := discounts_of(terms)) is not None:
         goal = Goal(weights=incentives_of(own) * terms.share[:, None], discounts=replace(
             discounts, departure=in_unit(discounts.departure, unit), home=in_unit(discounts.home, unit)))
-        solution = solve(own, goal, known, clock, limits.gap, method)
+        solution = solve(own, goal, known, _watched(clock, limits, objective, unit), limits.gap, method)
         weights = incentives_of(instance) * terms.share[:, None]
         value = math.fsum(
             value_on(own_legs, route, {j: float(weights[m, j]) for j in solution.orders[m]}, discounts.of(m))
             for m, (own_legs, route) in enumerate(zip(known.legs_by_vehicle, solution.routes, strict=True)))
     else:
+        unit *= float(terms.share.max(initial=0.0))
+        clock = _watched(clock, limits, objective, unit)
         solution = _solve_expected(own, terms.share, known, clock, limits.gap, method, cuts)
         value = sum_of(incentives_of(instance) * terms.share[:, None], solution.orders)
-        unit *= float(terms.share.max(initial=0.0))
     return finished(instance, objective, solution.routes, value=value,
                    bound=value + unit * (solution.bound - solution.value), status=solution.status,
                    solutions=[solution], runtime_s=clock.used_s())
+
+
+def _watched(clock: Clock, limits: SolveLimits, objective: str, unit: float) -> Clock:
+    """The clock of a solve that is watched, if it is to be, in the instance's own units."""
+    watch = limits.watch
+    return clock if watch is None else replace(clock, watch=lambda progress, factor: watch(
+        Watched(objective=objective, _progress=progress, _unit=unit / factor)))
 
 
 def discounts_of(terms: PlanningTerms) -> Discounts | None:
