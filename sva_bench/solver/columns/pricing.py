@@ -31,8 +31,8 @@ class Priced:
     Attributes:
         routes: Sites of the best routes, base to base, best first; ng-routes, which may visit a POI twice.
         best: Reduced value of the first; the threshold if there is none.
-        complete: Whether ``best`` is an upper bound on every route's reduced value: neither labels nor time ran out, and
-            the run was exact.
+        complete: Whether ``best`` is an upper bound on every route's reduced value: neither labels nor time ran out,
+            and the run was exact.
         labels: Labels kept.
     """
 
