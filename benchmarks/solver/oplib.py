@@ -26,6 +26,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.mission.instance import Instance, Vehicle
 
 PATTERNS = ("*.oplib",)
+SECTIONS = ("NODE_COORD_SECTION", "NODE_SCORE_SECTION", "DEPOT_SECTION")
 EARTH_KM = 6378.388  # TSPLIB's
 PI = 3.141592  # TSPLIB's
 
@@ -40,17 +41,33 @@ def read_oplib(path: Path) -> Instance:
     kind = fields.get("EDGE_WEIGHT_TYPE", "none")
     if kind not in COSTS:
         raise NotServed(f"{path.name}: costs of the type {kind}; read are {', '.join(COSTS)}")
+    missing = [part for part, found in (("COST_LIMIT", fields), *((name, sections) for name in SECTIONS))
+               if part not in found]
+    if missing:
+        raise NotServed(f"{path.name}: no {' and no '.join(missing)}")
     try:
         nodes = [int(row[0]) for row in sections["NODE_COORD_SECTION"]]
         at = np.array([[float(row[1]), float(row[2])] for row in sections["NODE_COORD_SECTION"]])
         scores = {int(row[0]): float(row[1]) for row in sections["NODE_SCORE_SECTION"]}
         depot, limit_s = int(sections["DEPOT_SECTION"][0][0]), float(fields["COST_LIMIT"])
-        base = nodes.index(depot)
-        earned = np.array([0.0 if node == depot else scores[node] for node in nodes])
-    except (KeyError, ValueError, IndexError) as error:
-        raise NotServed(f"{path.name}: {type(error).__name__}: {error}") from error
-    if len(nodes) != int(fields.get("DIMENSION", len(nodes))):
-        raise NotServed(f"{path.name}: DIMENSION {fields['DIMENSION']}, but {len(nodes)} nodes")
+        dimension = int(fields.get("DIMENSION", len(nodes)))
+    except ValueError as error:
+        raise NotServed(f"{path.name}: {error}") from error
+    except IndexError as error:
+        raise NotServed(f"{path.name}: a line of a section that ends too soon, or a section without lines") from error
+    if len(nodes) != dimension:
+        raise NotServed(f"{path.name}: DIMENSION {dimension}, but {len(nodes)} nodes")
+    if depot not in nodes:
+        raise NotServed(f"{path.name}: the depot {depot} has no coordinates")
+    for node, place in zip(nodes, at, strict=True):
+        if node != depot and node not in scores:
+            raise NotServed(f"{path.name}: node {node} has no score")
+        if not np.isfinite(place).all() or not math.isfinite(scores.get(node, 0.0)):
+            raise NotServed(f"{path.name}: node {node}: expected finite numbers for coordinates and score")
+    if not limit_s >= 0:
+        raise NotServed(f"{path.name}: expected a COST_LIMIT of 0 or more, found {fields['COST_LIMIT']}")
+    base = nodes.index(depot)
+    earned = np.array([0.0 if node == depot else scores[node] for node in nodes])
     fuel = COSTS[kind](at)
     np.fill_diagonal(fuel, 0.0)
     vehicle = Vehicle(name="v1", fuel_capacity_s=math.inf, mission_limit_s=limit_s, availability=1.0,

@@ -8,7 +8,14 @@ from sva_bench.mission.failures import MODEL
 from sva_bench.mission.instance import Instance
 from sva_bench.mission.plan import Plan
 from sva_bench.solver.risk import RiskMeasure
-from sva_bench.solver.two_stage import SolveLimits, plan_averse, plan_deterministic, plan_stochastic
+from sva_bench.solver.two_stage import (
+    SolveLimits,
+    knowledge_of,
+    plan_averse,
+    plan_deterministic,
+    plan_nominal,
+    plan_stochastic,
+)
 from sva_bench.study.plan_request import PlanRequest
 
 
@@ -21,5 +28,22 @@ def make_plan(instance: Instance, request: PlanRequest, limits: SolveLimits) -> 
             kind=request.risk, **{name: value for name, value in told.items() if value is not None}), limits)
     if request.objective == "stochastic":
         return plan_stochastic(instance, limits, method=request.method, cuts=cuts)
-    stochastic = plan_stochastic(replace(instance, failure=MODEL), limits, method=request.method, cuts=cuts)
-    return plan_deterministic(instance, stochastic, limits, method=request.method, cuts=cuts).plan
+    return _deterministic(instance, request, limits)
+
+
+def _deterministic(instance: Instance, request: PlanRequest, limits: SolveLimits) -> Plan:
+    """The deterministic plan; the time limit is for all of its solves together.
+
+    What is asked for comes first: the stochastic plan, from which the search among ties starts, gets what time is left.
+    """
+    clock, instance, cuts = limits.clock(), replace(instance, failure=MODEL), request.cuts or "single"
+    known = knowledge_of(instance)
+
+    def left() -> SolveLimits:
+        return limits if limits.time_limit_s is None else replace(limits, time_limit_s=clock.left_s())
+
+    nominal = plan_nominal(instance, left(), known=known, method=request.method, cuts=cuts)
+    stochastic = plan_stochastic(instance, left(), known=known, method=request.method, cuts=cuts)
+    plan = plan_deterministic(
+        instance, stochastic, left(), nominal=nominal, known=known, method=request.method, cuts=cuts).plan
+    return replace(plan, runtime_s=clock.used_s())

@@ -24,7 +24,7 @@ from sva_bench.mission.instance import Instance
 from sva_bench.mission.instance_file import write_instance
 from sva_bench.mission.plan import Plan
 from sva_bench.mission.plan_file import read_plan
-from sva_bench.solver.columns import column_generation
+from sva_bench.solver.columns import column_generation, pricing
 from sva_bench.solver.columns.graph import graph_of, neighbours
 from sva_bench.solver.columns.listing import counts
 from sva_bench.solver.columns.pricing import Priced, price
@@ -141,6 +141,26 @@ def test_labels_stop_growing_when_ctrl_c_is_pressed_or_time_is_up() -> None:
     with pytest.raises(KeyboardInterrupt), deferring_ctrl_c():
         labels(math.inf)
     assert time.process_time() - began < 60
+
+
+def test_labels_that_time_is_up_for_are_joined_to_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Both ends have grown in time: with none left, the join is what is cut short.
+    instance = hard(pois=8)
+    vehicle = instance.vehicles[1]
+    graph = graph_of(instance, scope_of(instance, vehicle, vehicle.incentives > 0), Discount())
+    n, clock_s = len(instance.sites), iter((0.0, 0.0, 0.0, 60.0))
+    assert not graph.symmetric
+
+    def joined() -> Priced:
+        return price(graph, np.array(vehicle.incentives), np.zeros(n), 0.0, neighbours(graph, instance.pois),
+                     threshold=0.0, compared=None, most_routes=5, most_labels=10**9,
+                     cut_duals=cut_duals_of((), np.zeros(0), 0, n), left_s=59.0)
+
+    assert joined().complete
+    monkeypatch.setattr(pricing, "monotonic", lambda: next(clock_s))
+    cut_short = joined()
+    assert not cut_short.complete
+    assert cut_short.labels > 1
 
 
 def test_compiled_code_is_loaded_in_a_block_that_defers() -> None:

@@ -89,10 +89,16 @@ def test_the_other_costs_of_tsplib_are_as_computed_by_hand() -> None:
 
 @pytest.mark.parametrize(("old", "new", "complaint"), [
     ("EUC_2D", "EXPLICIT", "costs of the type EXPLICIT"),
-    ("COST_LIMIT : 10\n", "", "COST_LIMIT"),
+    ("COST_LIMIT : 10\n", "", "no COST_LIMIT$"),
+    ("COST_LIMIT : 10", "COST_LIMIT : nan", "a COST_LIMIT of 0 or more, found nan"),
+    ("NODE_SCORE_SECTION\n", "", "no NODE_SCORE_SECTION"),
+    ("3 4\n", "3 nan\n", "node 3: expected finite numbers"),
+    ("2 3.4 0.0", "2 inf 0.0", "node 2: expected finite numbers"),
+    ("2 3.4 0.0", "2 3.4", "ends too soon"),
+    ("2 1\n", "2 many\n", "could not convert string to float: 'many'"),
     ("DIMENSION : 4", "DIMENSION : 5", "DIMENSION 5, but 4 nodes"),
-    ("3 4\n4 9\n", "3 4\n", "KeyError: 4"),
-    ("DEPOT_SECTION\n1\n", "DEPOT_SECTION\n7\n", "7 is not in list"),
+    ("3 4\n4 9\n", "3 4\n", "node 4 has no score"),
+    ("DEPOT_SECTION\n1\n", "DEPOT_SECTION\n7\n", "the depot 7 has no coordinates"),
 ])
 def test_a_broken_file_of_oplib_is_refused_with_the_reason(tmp_path: Path, old: str, new: str, complaint: str) -> None:
     assert old in OPLIB

@@ -25,6 +25,7 @@ from sva_bench.solver.polling import POLL_EVERY, now_s, poll
 CHUNK = 32  # labels of a site that are tested for dominance together
 KEYS = 5  # POIs by which a site's labels are grouped: only those with a subset of a label's can dominate it
 BUCKETS = 256  # of time, in whose order labels are extended
+POLL_STEPS = 100_000  # legs and pairs of labels between two polls of the join: each takes nanoseconds
 _EPSILON = 1e-9
 
 
@@ -333,25 +334,30 @@ def _taller(array, size):
 
 @njit(cache=True)
 def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold, discounted, survival, high, home,
-                at_first_visit, cut_dual, stop, t, q, x, y, mask, cut_state, of_site, t_b, q_b, x_b, y_b, mask_b,
-                cut_state_b, of_site_b):
+                at_first_visit, cut_dual, stop, left_s, t, q, x, y, mask, cut_state, of_site, t_b, q_b, x_b, y_b,
+                mask_b, cut_state_b, of_site_b):
     """For each forward label the backward label that completes it to the best route above the threshold.
 
     Long because compiled: nested loops over arrays that each part would need.
 
     Returns:
-        Value, forward label, and backward label or -1 for a leg straight to the base; of each route found.
+        Value, forward label, and backward label or -1 for a leg straight to the base; of each route found. Then whether
+        time ran out, and there may be more.
     """
     begin, by_site = of_site
     begin_b, by_site_b = of_site_b
     n, words = len(legs), mask.shape[1]
     number = len(by_site)
     value, left, right = np.zeros(number), np.zeros(number, np.int64), np.full(number, -1, np.int64)
-    found = 0
+    found, steps, end_s = 0, POLL_STEPS, now_s() + left_s
     for i in range(n):
         for k in range(begin[i], begin[i + 1]):
-            if k % POLL_EVERY == 0 and poll(stop):
-                return value[:0], left[:0], right[:0]
+            # By pairs, not by labels: a label has up to as many partners as there are labels.
+            if steps >= POLL_STEPS:
+                if poll(stop) or now_s() > end_s:
+                    return value[:found], left[:found], right[:found], True
+                steps = 0
+            steps += n
             label = by_site[k]
             best, partner = threshold, -2
             if legs[i, base] and t[label] + time[i, base] <= limit and q[label] + fuel[i, base] <= capacity:
@@ -372,6 +378,7 @@ def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold
                 refund = sum_of(cut_dual, at_first_visit & ~cut_state[label])
                 chance = y[label] * survival[i, j]
                 for k_b in range(begin_b[j], begin_b[j + 1]):
+                    steps += 1
                     other = by_site_b[k_b]
                     most = x_b[other]
                     if discounted:
@@ -398,4 +405,4 @@ def join_labels(legs, time, fuel, charge, base, half, capacity, limit, threshold
             if partner > -2:
                 value[found], left[found], right[found] = best, label, partner
                 found += 1
-    return value[:found], left[:found], right[:found]
+    return value[:found], left[:found], right[:found], False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,8 @@ class Priced:
     Attributes:
         routes: Sites of the best routes, base to base, best first; ng-routes, which may visit a POI twice.
         best: Reduced value of the first; the threshold if there is none.
-        complete: Whether ``best`` is an upper bound on every route's reduced value: labels did not overflow, and the
-            run was exact.
+        complete: Whether ``best`` is an upper bound on every route's reduced value: neither labels nor time ran out,
+            and the run was exact.
         labels: Labels kept.
     """
 
@@ -68,6 +69,7 @@ def price(
     Source:
         Righini, Salani (2006), "Symmetry helps: bounded bi-directional dynamic programming".
     """
+    end_s = monotonic() + left_s
     plain, cost, home = graph.is_plain, graph.discount.departure, graph.discount.home
     if len(cut_duals.dual) and not plain:
         raise ValueError("discounted labels can't account for the duals of cuts")
@@ -87,22 +89,23 @@ def price(
         following, count, time, fuel, subgraph.bit, memory, weighed, subgraph.reward, subgraph.dual, charge, not plain,
         survival, low, high, 0.0 if plain else -cost, base, half, graph.capacity_s, graph.limit_s,
         ahead_bound, step, threshold, True, most_labels, subgraph.in_cut, subgraph.in_memory,
-        cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
+        cut_duals.at_first_visit, cut_duals.dual, stop, end_s - monotonic())
     if not graph.symmetric:
         following, count = _adjacent(legs.T)
         behind = extend_labels(
             following, count, time.T.copy(), fuel.T.copy(), subgraph.bit, memory, weighed, subgraph.reward,
             subgraph.dual, charge, not plain, survival.T.copy(), least, most, 0.0 if plain else home, base,
             graph.limit_s - half, graph.capacity_s, graph.limit_s, behind_bound, step, threshold, plain, most_labels,
-            subgraph.in_cut, subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop, left_s)
-    value, left, right = join_labels(
+            subgraph.in_cut, subgraph.in_memory, cut_duals.at_first_visit, cut_duals.dual, stop,
+            end_s - monotonic())
+    value, left, right, cut_short = join_labels(
         legs, time, fuel, charge, base, half, graph.capacity_s, graph.limit_s, threshold, not plain, survival,
-        subgraph.arrival, home, cut_duals.at_first_visit, cut_duals.dual, stop, *ahead[1:7], ahead[8],
-        *behind[1:7], behind[8])
+        subgraph.arrival, home, cut_duals.at_first_visit, cut_duals.dual, stop, end_s - monotonic(),
+        *ahead[1:7], ahead[8], *behind[1:7], behind[8])
     order = np.argsort(-value, kind="stable")[:most_routes]
     routes = [_route(subgraph, _chain(ahead, int(left[k])), _chain(behind, int(right[k]))) for k in order]
     return Priced(routes=tuple(dict.fromkeys(routes)), best=float(value[order[0]]) if len(order) else threshold,
-                  complete=exact and not ahead[9] and not behind[9], labels=len(ahead[0]))
+                  complete=exact and not (ahead[9] or behind[9] or cut_short), labels=len(ahead[0]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
