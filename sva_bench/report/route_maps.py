@@ -24,7 +24,7 @@ from sva_bench.report.page import details, heading, note, sentence, text
 from sva_bench.report.plan_view import PlanView, frame_of, line
 from sva_bench.report.reaction_shares import leads, value_without
 from sva_bench.report.styles import MARKS, MARKS_OF_MANY
-from sva_bench.report.wording import adjusted, listed, per_cent, reliability_told, with_interval
+from sva_bench.report.wording import adjusted, listed, per_cent, reliability_told, vss_verdict, with_interval
 from sva_bench.storage.run_folder import made_for
 from sva_bench.storage.stored_run import Content
 from sva_bench.storage.trial_counts import Ended, Key
@@ -115,7 +115,7 @@ def _said(content: Content, scenario: AnyScenario) -> str:
     if isinstance(scenario, ComparedScenario):
         one = scenario.comparisons[0] if len(scenario.comparisons) == 1 else None
         return known if one is None else f"{known}: {'' if one.same_plan else 'difference '}{adjusted(one)}"
-    return f"{known}: " + ("the same plan" if scenario.vss.same_plan else f"VSS {with_interval(scenario.vss.executed)}")
+    return f"{known}: " + ("the same plan" if scenario.vss.same_plan else f"VSS {vss_verdict(scenario.vss)}")
 
 
 def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:

@@ -286,7 +286,7 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
     text = (tmp_path / "report.html").read_text()
     assert ">variant<" in text
     assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
-    assert "all maps agree there is no interval" in text
+    assert "Where all maps show the same VSS there is no interval" in text
     # Scenarios are groups, and variants are rows in them.
     assert {name: {variant: len(points) for variant, points in rows.items()} for name, rows in drawn.items()} == {
         name: {f"x={x}": 2 for x in (1, 2)} for name in ("half", "safe")}
@@ -336,7 +336,10 @@ def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished
     ten, nine = over_maps(10, (0.0, 2.0)), over_maps(9, (0.0, 2.0))
     assert over_few_maps([ten]) == ""
     assert "Over 9 maps only" in over_few_maps([ten, nine])
-    assert "all maps agree" in over_few_maps([over_maps(2, None)])
+    agree = over_few_maps([over_maps(2, None)])
+    assert agree.startswith("Where all maps show the same VSS there is no interval: take it for these maps only")
+    both = over_few_maps([nine, over_maps(9, None)])
+    assert both == f"{over_few_maps([nine])} {agree}"
 
 
 def test_a_percentage_over_fewer_maps_gives_their_number() -> None:
