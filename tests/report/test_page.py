@@ -26,6 +26,7 @@ from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.report import batch_page
 from sva_bench.report.batch_page import write_batch_report
+from sva_bench.report.results_charts import _with_room
 from sva_bench.report.results_charts import over_maps as over_maps_drawn
 from sva_bench.report.vss_over_maps import headline_over_maps
 from sva_bench.report.wording import (
@@ -377,3 +378,10 @@ def test_robots_that_are_available_together_are_told_so(
     world = world_of(tmp_path, SMALL.replace("{uv2: 0.5}", f"{{joint: [{joint}]}}"))
     found = replace(summary_of_test((1.0, 2.0), 10.0), failure=Failures(plan="mission", execute="mission"))
     assert reliability_told(world, "half", found) == told
+
+
+def test_shares_below_dots_keep_clear_of_each_other_by_their_length() -> None:
+    said = {0.0: "90 %", 11.0: "5.5 %", 20.5: "5.0 %"}
+    counts = [(0.0, 180), (11.0, 11), (20.5, 10)]
+    assert _with_room(counts, said, 2.0) == {0.0, 11.0}
+    assert _with_room(counts, said, 1.0) == {0.0, 11.0, 20.5}
