@@ -11,7 +11,7 @@ import typer
 from sva_bench.choices import EXPORT_FORMATS, TRIAL_FORMATS, AnyFormat, ExportFormat, TrialFormat
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import TRIAL_METAVAR, InteractionOption, Verbose, WorkerCount
-from sva_bench.cli.terminal import progress_bars, set_up_logging
+from sva_bench.cli.terminal import progress_bars, say_written, set_up_logging
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_output, write_result
 from sva_bench.study.libraries import PRELOAD, load_libraries
@@ -70,6 +70,7 @@ def export(
         with progress_bars() as progress, local_workers(workers, PRELOAD) as executor:
             bag = export_trial(source, wanted, kind, executor, progress)
         write_result(output, bag)
+        say_written(output)
         return
     _refuse(to, of_trials, "a plan is no trial of a run")
     if source.is_dir():
@@ -105,3 +106,4 @@ def _export_plan(plan: Path, world: Path, to: ExportFormat, output: Path | None,
         check_plans(loaded, costs, {"plan": read}, {"plan": plan}, allow_infeasible=True)
         content = EXPORTS[to](Exported(world=loaded, costs=costs, plan=read, robot=robot))
     write_result(output, content)
+    say_written(output)

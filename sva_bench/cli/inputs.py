@@ -29,6 +29,7 @@ from sva_bench.cli.terminal import (
     progress_bars,
     refuse_closed_output,
     results,
+    say_written,
     set_up_logging,
 )
 from sva_bench.cli.usage import PlainCommand, PlainGroup
@@ -243,6 +244,7 @@ def make_world_from_map(
         for file in files:  # before the world that names them
             write_beside(output, file.name, file.content)
         write_result(output, sealed(text))
+    say_written(output)
 
 
 @world_app.command("example", cls=PlainCommand)

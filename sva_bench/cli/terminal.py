@@ -9,14 +9,17 @@ import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.logging import RichHandler
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.segment import Segment
 
 from sva_bench.errors import BadInput
+from sva_bench.files.outputs import is_standard_output
 from sva_bench.files.printable import printable
 from sva_bench.files.streams import CLOSED, output_is_closed
 from sva_bench.interrupts import holding_back_ctrl_c
@@ -118,3 +121,9 @@ def progress_bars() -> Iterator[OnProgress]:
         yield show
     finally:
         bars.stop()
+
+
+def say_written(path: Path | None) -> None:
+    """Name the file that a result was written to; nothing where that is standard output."""
+    if path is not None and not is_standard_output(path):
+        messages.print(f"written to [bold]{escape(str(path))}[/bold]", highlight=False, soft_wrap=True)

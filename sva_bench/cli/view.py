@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from sva_bench.cli.loading import loading
 from sva_bench.cli.options import TRIAL_METAVAR, AsCsv, CompareKeys, Verbose, Wide
-from sva_bench.cli.terminal import messages, progress_bars, results, set_up_logging
+from sva_bench.cli.terminal import messages, progress_bars, results, say_written, set_up_logging
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder, check_output, write_result
 from sva_bench.study.libraries import PRELOAD, load_libraries
@@ -73,6 +73,7 @@ def view(
         return
     open_viewer(files, web=web, screenshot=screenshot, at_s=at,
                 say=lambda text: messages.print(text, highlight=False, markup=False, soft_wrap=True))
+    say_written(screenshot)
 
 
 def _played(folder: Path, scenario: str, planner: str | None, choice: TrialChoice) -> tuple[Path, ...]:

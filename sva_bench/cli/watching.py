@@ -23,7 +23,7 @@ from sva_bench.files.printable import counted
 from sva_bench.report.calibration_over_maps import calibrated_over_maps
 from sva_bench.report.compared_values import compared_answers, compared_notes, compared_table, compared_title
 from sva_bench.report.reactions_over_maps import reaction_table
-from sva_bench.report.wording import over_few_maps, percentage, verdict, with_interval
+from sva_bench.report.wording import over_few_maps, percentage, same_draws, verdict, with_interval
 
 _LINE_S = 10.0
 """Time between two plain lines [s]."""
@@ -142,8 +142,8 @@ def print_batch(summary: BatchSummary, console: Console | None = None, *, wide: 
     print_compared(summary.compared, console, wide=wide)
     if summary.reactions:
         print_sheet(reactions_over_maps(summary.reactions), console, wide=wide)
-    if said := over_few_maps(summary.aggregate):
-        console.print(said, highlight=False)
+    for said in filter(None, (over_few_maps(summary.aggregate), same_draws(summary))):
+        console.print(said, highlight=False, markup=False)
     for said in calibrated_over_maps(summary.units):
         console.print(said, highlight=False, markup=False)
     for said in maps_without_reach([unit.label for unit in summary.units if unit.reach.nothing]):

@@ -27,6 +27,7 @@ from sva_bench.report.wording import (
     optional,
     over_few_maps,
     percentage,
+    same_draws,
     vss_verdict,
     with_interval,
 )
@@ -47,7 +48,8 @@ def write_batch_report(path: Path, summary: BatchSummary, command: Sequence[str]
         *_answer(summary, names),
         _main_table(summary, names),
         note(f"{DOUBTED_TOLD} {VSS_PCT} {counted(summary.trials, 'trial')} of each plan in each scenario, fidelity "
-             f"{summary.fidelity}; 95 % intervals in brackets. Over maps, the maps are the sample."),
+             f"{summary.fidelity}; 95 % intervals in brackets. Over maps, the maps are the sample. "
+             f"{same_draws(summary)}".rstrip()),
         CONTENTS,
         *_compared(summary),
         *_reactions(summary, names),
@@ -137,7 +139,8 @@ def _calibrated(summary: BatchSummary, names: VariantNames) -> list[str]:
 
 
 _MEANS = "Executed value of the stochastic plan: means, each with its own 95 % interval."
-_DIFFERENCES = "Paired differences: intervals that hold together with 95 %. They may be sure where means are not."
+_DIFFERENCES = "Paired differences: intervals that hold together with 95 %. What both values share cancels, so a " \
+    "difference may be clear of zero though the intervals of the means overlap."
 
 
 def _compared(summary: BatchSummary) -> list[str]:

@@ -61,7 +61,7 @@ def add_legend(figure: Figure, frame: Frame, world: World, overlays: Overlays) -
     box = legend.get_window_extent(figure.canvas.get_renderer())  # type: ignore[attr-defined]
     names = " | ".join(robot.name for robot in world.robots)
     robots = [f"{robot.name}: {_limits(robot.fuel_capacity_s, robot.mission_limit_s)}" for robot in world.robots]
-    lines = ["Incentives below a point of interest:", *textwrap.wrap(names, 36), "", *robots]
+    lines = ["Incentives below the name of a POI:", *textwrap.wrap(names, 36), "", *robots]
     figure.text(left / frame.width_in, box.y0 / DPI / frame.height_in - 0.18 / frame.height_in, "\n".join(lines),
                 va="top", fontsize=8, linespacing=1.45)
 

@@ -69,7 +69,7 @@ def plans_table(summary: AnySummary, world: World, counts: TrialCounts) -> list[
     rows: list[list[str]] = []
     for scenario in summary.scenarios:
         ranks = {row.plan: str(row.rank) for row in scenario.ranking} if isinstance(scenario, ComparedScenario) else {}
-        rows += [[shown_name(scenario, name) + _infeasible(plan), with_interval(plan.executed), ranks.get(name, ""),
+        rows += [[named(scenario, name), with_interval(plan.executed), ranks.get(name, ""),
                   _wrong(plan), lost(counts, scenario.name, name), optional(plan.expected),
                   f"{plan.promised:.1f}"] for name, plan in scenario.plans.items()]
     shown, cells = told_columns(head, rows, (0, 1, 4))
@@ -86,9 +86,11 @@ def _wrong(plan: PlanResult) -> str:
     return "" if plan.bad is None else f"{100 * plan.bad.share:.1f}"
 
 
-def _infeasible(plan: PlanResult) -> str:
-    """Beside the name, so before any figure."""
-    return " (infeasible)" if isinstance(plan, GivenPlanResult) and not plan.feasible else ""
+def named(scenario: ComparedScenario | ScenarioSummary, name: str) -> str:
+    """The shown name of a plan; what breaks fuel or limit is marked beside its name, so before any figure."""
+    plan = scenario.plans[name]
+    marked = isinstance(plan, GivenPlanResult) and not plan.feasible
+    return shown_name(scenario, name) + (" (infeasible)" if marked else "")
 
 
 def lost(counts: TrialCounts, scenario: str, planner: str) -> str:

@@ -25,7 +25,10 @@ def meetings_section(content: Content) -> list[str]:
             ["scenario", "plan", "robot", "touched", "contacts", "noise draws", "longest [s]", "stuck [draws]"],
             _most(_by(met["contact"], ("robot", "solid"), shown, lambda mine: [
                 f"{max(row['lasts_s'] for row in mine):.1f}", _stuck(mine)])),
-            words=(0, 1, 2, 3), caption="Obstacles that hulls touched, numbered as in the world file"))
+            words=(0, 1, 2, 3), caption="Obstacles that hulls touched" + (
+                # The file of a world on an occupancy grid names no boxes.
+                ", numbered as in the world file" if content.world.map_source is None else
+                "; boxes are pieces of the map's occupied area, and the maps of the plans show where")))
     if met["collision"]:
         parts.append(table(
             ["scenario", "plan", "robots", "collisions", "noise draws", "stuck [draws]"],

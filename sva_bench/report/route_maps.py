@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sva_bench.analysis.plan_names import shown_name
 from sva_bench.analysis.reaction_results import ComparedReaction, ReactionResult
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -17,6 +16,7 @@ from sva_bench.arrays import FloatArray
 from sva_bench.choices import End
 from sva_bench.files.printable import counted
 from sva_bench.palette import ROBOTS, hex_of, plan_color
+from sva_bench.report.main_tables import named
 from sva_bench.report.mark_labels import place_words
 from sva_bench.report.marks import marks_of, met_in
 from sva_bench.report.overlays import Mark
@@ -24,7 +24,7 @@ from sva_bench.report.page import details, heading, note, sentence, text
 from sva_bench.report.plan_view import PlanView, frame_of, line
 from sva_bench.report.reaction_shares import leads, value_without
 from sva_bench.report.styles import MARKS, MARKS_OF_MANY
-from sva_bench.report.wording import adjusted, listed, per_cent, reliability_told, with_interval
+from sva_bench.report.wording import adjusted, listed, per_cent, reliability_told, vss_verdict, with_interval
 from sva_bench.storage.run_folder import made_for
 from sva_bench.storage.stored_run import Content
 from sva_bench.storage.trial_counts import Ended, Key
@@ -115,7 +115,7 @@ def _said(content: Content, scenario: AnyScenario) -> str:
     if isinstance(scenario, ComparedScenario):
         one = scenario.comparisons[0] if len(scenario.comparisons) == 1 else None
         return known if one is None else f"{known}: {'' if one.same_plan else 'difference '}{adjusted(one)}"
-    return f"{known}: " + ("the same plan" if scenario.vss.same_plan else f"VSS {with_interval(scenario.vss.executed)}")
+    return f"{known}: " + ("the same plan" if scenario.vss.same_plan else f"VSS {vss_verdict(scenario.vss)}")
 
 
 def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
@@ -130,7 +130,7 @@ def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
             alike.setdefault(tuple((robot, tuple(route)) for robot, route in routes.items()), []).append(name)
     for names in itertools.islice(alike.values(), _MOST_PLANS):
         first, every = names[0], list(scenario.plans)
-        yield _Shown(title=listed([shown_name(scenario, name) for name in names]),
+        yield _Shown(title=listed([named(scenario, name) for name in names]),
                      worth=scenario.plans[first].executed, routes=content.routes[scenario.name, first],
                      key=(scenario.name, first, "none", "never"), colours=[(name, every.index(name)) for name in names])
     for reaction in itertools.islice((r for r in scenario.reactions or () if r.policy != "none"), _MOST_REACTIONS):
@@ -148,14 +148,16 @@ def _plans(content: Content, scenario: AnyScenario) -> Iterator[_Shown]:
 
 
 def _telling_with(reaction: ReactionResult | ComparedReaction) -> list[str]:
-    """The best plan for a reaction, and where none is distinguishably best the next one too; the one worth more first.
+    """The best plan for a reaction, and where none is distinguishably best the next one too.
+
+    They stand in the order of the plans, as in any other row of maps: the stochastic one to the left.
     """
     if isinstance(reaction, ComparedReaction):
         names = [row.plan for row in reaction.ranking if row.rank == 1][:2]
     else:
         over = None if leads(reaction) else reaction.best.over
         names = [reaction.best.plan, *([] if over is None else [over])]
-    return sorted(names, key=lambda name: -reaction.plans[name].executed.mean)
+    return sorted(names, key=list(reaction.plans).index)
 
 
 class _Maps:
@@ -211,6 +213,8 @@ class _Maps:
             said.append(f"◆ with a number: {' or '.join(met)} there, so many times in all that was driven.")
         if "replanned" in self.seen:
             said.append("Hollow: legs driven only after re-planning.")
+        if self.seen & {"ended", *_TOUCHED} and any(key[2] != "none" for key in self._marks):
+            said.append("Maps of teams that re-plan leave these marks out.")
         return " ".join(said)
 
     def _path(self, robot: str, ends: tuple[str, str]) -> FloatArray:

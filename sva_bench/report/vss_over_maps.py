@@ -9,6 +9,8 @@ from sva_bench.files.printable import counted
 from sva_bench.report.wording import FEW_MAPS, listed, with_interval
 
 _PAYS, _COSTS, _NONE, _EVEN, _UNSURE = "pays", "costs", "no difference", "can't be told", "no interval"
+_ALIKE = "the same on all maps"
+"""Maps that agree on a VSS other than nothing: no interval, yet often the clearest result of a batch."""
 _NONE_HERE = "no difference on these maps"
 
 
@@ -26,17 +28,33 @@ def _headline(rows: Sequence[OverMaps], *, variants: int) -> str:
     most = max((row.maps for row in rows), default=0)
     few = "at most " if len({row.maps for row in rows}) > 1 else "only " if most < FEW_MAPS else ""
     over = f"Over {few}{counted(most, 'map')}"
-    pays = [row for row in rows if _verdict(row) == _PAYS]
-    if not pays:
+    pays, alike = ([row for row in rows if _verdict(row) == verdict] for verdict in (_PAYS, _ALIKE))
+    same = f"on {_all(alike)} the VSS is the same {_where(alike, variants)}, which has no interval over maps" \
+        if alike else ""
+    if pays:
+        return f"{over} planning for failures pays {_where(pays, variants)}." + (f" O{same[1:]}." if alike else "")
+    if not alike:
         return f"{over} no scenario shows a value of planning for failures beyond doubt."
+    # It is a finding of these maps, and none that an interval over maps could confirm.
+    rest = "" if {row.scenario for row in rows} == {row.scenario for row in alike} else \
+        "; no other scenario shows a value of planning for failures beyond doubt"
+    return f"O{same[1:]}{rest}."
+
+
+def _where(rows: Sequence[OverMaps], variants: int) -> str:
+    """In which scenarios, with their VSS, or where settings vary for how many variants of which scenarios."""
     if not variants:  # the interval that is shown is the one that the verdict rests on
-        where = listed([f"{row.scenario} (VSS {with_interval(row.vss)})" for row in pays])
-        return f"{over} planning for failures pays in {where}."
-    count = {name: sum(row.scenario == name for row in pays) for name in dict.fromkeys(row.scenario for row in pays)}
+        return f"in {listed([f'{row.scenario} (VSS {with_interval(row.vss)})' for row in rows])}"
+    count = {name: sum(row.scenario == name for row in rows) for name in dict.fromkeys(row.scenario for row in rows)}
     every, some = ([name for name in count if (count[name] == variants) == all_of] for all_of in (True, False))
-    said = [*([f"for every variant in {listed(every)}"] if every else []),
-            *([f"for some variants in {listed(some)}"] if some else [])]
-    return f"{over} planning for failures pays {' and '.join(said)}."
+    return " and ".join([*([f"for every variant in {listed(every)}"] if every else []),
+                         *([f"for some variants in {listed(some)}"] if some else [])])
+
+
+def _all(rows: Sequence[OverMaps]) -> str:
+    """``all 3 maps``."""
+    numbers = {row.maps for row in rows}
+    return "all maps" if len(numbers) > 1 else "both maps" if numbers == {2} else f"all {max(numbers)} maps"
 
 
 def verdicts_of(rows: Sequence[OverMaps], short: Callable[[str], str]) -> str:
@@ -46,10 +64,15 @@ def verdicts_of(rows: Sequence[OverMaps], short: Callable[[str], str]) -> str:
         said.setdefault(_verdict(row), []).append(row)
     if len(said) == 1:
         ((verdict, _),) = said.items()
-        return f"{verdict} for any variant" + (f" ({_range(rows)})" if verdict in (_PAYS, _COSTS) else "")
-    return "; ".join(f"{verdict} for {listed([short(row.variant) for row in said[verdict]])}" + (
-        f" ({_range(said[verdict])})" if verdict in (_PAYS, _COSTS) else "")
-        for verdict in (_PAYS, _COSTS, _EVEN, _UNSURE, _NONE_HERE, _NONE) if verdict in said)
+        return _told(verdict, rows, "any variant")
+    return "; ".join(_told(verdict, said[verdict], listed([short(row.variant) for row in said[verdict]]))
+                     for verdict in (_PAYS, _COSTS, _ALIKE, _EVEN, _UNSURE, _NONE_HERE, _NONE) if verdict in said)
+
+
+def _told(verdict: str, rows: Sequence[OverMaps], which: str) -> str:
+    if verdict == _ALIKE:
+        return f"the same on {_all(rows)} for {which} ({_range(rows)})"
+    return f"{verdict} for {which}" + (f" ({_range(rows)})" if verdict in (_PAYS, _COSTS) else "")
 
 
 def _range(rows: Sequence[OverMaps]) -> str:
@@ -57,13 +80,14 @@ def _range(rows: Sequence[OverMaps]) -> str:
     if len(rows) == 1:
         return f"VSS {with_interval(rows[0].vss)}"
     means = [row.vss.mean for row in rows]
-    return f"VSS {min(means):.1f} to {max(means):.1f}"
+    least, most = f"{min(means):.1f}", f"{max(means):.1f}"
+    return f"VSS {least}" if least == most else f"VSS {least} to {most}"
 
 
 def _verdict(row: OverMaps) -> str:
     ends = row.vss.ci95
     if ends is None:
-        return _UNSURE if row.vss.mean or row.maps == 1 else _NONE_HERE
+        return _UNSURE if row.maps == 1 else _ALIKE if row.vss.mean else _NONE_HERE
     if ends == (0.0, 0.0):
         return _NONE
     return _PAYS if ends[0] > 0 else _COSTS if ends[1] < 0 else _EVEN

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from sva_bench.analysis.catalogue import Statistic
-from sva_bench.analysis.over_maps import OverMaps, Percentage
+from sva_bench.analysis.over_maps import BatchSummary, OverMaps, Percentage
 from sva_bench.analysis.reach import beyond_reach, infeasible_plans, warned, why_nothing
 from sva_bench.analysis.results import Comparison, Estimate, PlanFigures, VssFigures
 from sva_bench.analysis.scenarios import ComparedScenario, ScenarioSummary
@@ -250,16 +250,25 @@ def _known_beforehand(summary: Summary) -> list[str]:
 
 def over_few_maps(rows: Sequence[OverMaps]) -> str:
     """A word of caution for the VSS over few maps; nothing where there are enough."""
-    fewest = min((row.maps for row in rows), default=FEW_MAPS)
+    fewest, alike = min((row.maps for row in rows), default=FEW_MAPS), ""
     if any(row.maps > 1 and row.vss.ci95 is None for row in rows):
-        return "Where all maps agree there is no interval: nothing tells how maps differ. Only where no robot fails " \
-            "both plans are the same on any map."
-    if fewest >= FEW_MAPS:
-        return ""
+        alike = "Where all maps show the same VSS there is no interval: take it for these maps only, for others may " \
+            "show another."
+        rows = [row for row in rows if row.vss.ci95 is not None]
+    if fewest >= FEW_MAPS or not rows:
+        return alike
     if fewest == 1:
         return "From one map there is no interval over maps, however many seeds it has: nothing tells how maps differ."
     return f"Over {fewest} maps only: the interval is wide, even where the VSS of each is positive, and what one map " \
-        "in ten shows may not be among them."
+        f"in ten shows may not be among them. {alike}".rstrip()
+
+
+def same_draws(summary: BatchSummary) -> str:
+    """That maps of one seed share their draws of failures; nothing where there are more seeds, or one map."""
+    if len(summary.seeds) != 1 or all(row.maps < 2 for row in summary.aggregate):
+        return ""
+    return "All maps were run with one seed, and so met the very same draws of failures: an interval over maps " \
+        "leaves out what chance did to all of them alike, which more trials (--trials) or seeds (--seeds) make smaller."
 
 
 def assumption_rows(scenarios: Sequence[ScenarioSummary]) -> list[list[str]]:

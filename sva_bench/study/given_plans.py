@@ -32,8 +32,10 @@ class InfeasiblePlan(SvaBenchError):
         return _infeasible, (self.which, self.reasons, self.undrivable)
 
     def __str__(self) -> str:
-        never = "\n  no robot could drive that, even where infeasible plans are allowed" if self.undrivable else ""
-        return f"{self.which}: the plan is infeasible:\n  " + "\n  ".join(self.reasons) + never
+        change = "no robot could drive that, even where infeasible plans are allowed: mend the plan" \
+            if self.undrivable else "mend the plan, raise the limits in the world file, or drive it all the same " \
+            "with --allow-infeasible (allow_infeasible=True in Python)"
+        return f"{self.which}: the plan is infeasible:\n  " + "\n  ".join([*self.reasons, change])
 
 
 def _infeasible(which: Path | str, reasons: Sequence[str], undrivable: bool) -> InfeasiblePlan:

@@ -257,9 +257,10 @@ def check_plans(
     for name, plan in plans.items():
         certificate = certify(instance, replace(plan, value=None))
         if not certificate.feasible:
-            never = certify(unlimited(instance), replace(plan, value=None)).reasons if allow_infeasible else ()
+            never = certify(unlimited(instance), replace(plan, value=None)).reasons
             if never or not allow_infeasible:
-                raise InfeasiblePlan(paths[name], never or certificate.reasons, undrivable=bool(never))
+                raise InfeasiblePlan(paths[name], never if allow_infeasible else certificate.reasons,
+                                     undrivable=bool(never))
             _log.warning("%s is infeasible, and used all the same: %s", paths[name], "; ".join(certificate.reasons))
 
 

@@ -26,6 +26,7 @@ from sva_bench.batch.aggregates import aggregate, map_rows
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.report import batch_page
 from sva_bench.report.batch_page import write_batch_report
+from sva_bench.report.results_charts import _with_room
 from sva_bench.report.results_charts import over_maps as over_maps_drawn
 from sva_bench.report.vss_over_maps import headline_over_maps
 from sva_bench.report.wording import (
@@ -286,7 +287,7 @@ def test_a_swept_batch_names_its_variants_and_each_map_is_one_point(
     text = (tmp_path / "report.html").read_text()
     assert ">variant<" in text
     assert text.count(">b (x=2)<") == 1  # a map's name stands above its rows
-    assert "all maps agree there is no interval" in text
+    assert "Where all maps show the same VSS there is no interval" in text
     # Scenarios are groups, and variants are rows in them.
     assert {name: {variant: len(points) for variant, points in rows.items()} for name, rows in drawn.items()} == {
         name: {f"x={x}": 2 for x in (1, 2)} for name in ("half", "safe")}
@@ -336,7 +337,10 @@ def test_an_interval_from_few_noise_draws_or_few_maps_carries_a_caution(finished
     ten, nine = over_maps(10, (0.0, 2.0)), over_maps(9, (0.0, 2.0))
     assert over_few_maps([ten]) == ""
     assert "Over 9 maps only" in over_few_maps([ten, nine])
-    assert "all maps agree" in over_few_maps([over_maps(2, None)])
+    agree = over_few_maps([over_maps(2, None)])
+    assert agree.startswith("Where all maps show the same VSS there is no interval: take it for these maps only")
+    both = over_few_maps([nine, over_maps(9, None)])
+    assert both == f"{over_few_maps([nine])} {agree}"
 
 
 def test_a_percentage_over_fewer_maps_gives_their_number() -> None:
@@ -374,3 +378,10 @@ def test_robots_that_are_available_together_are_told_so(
     world = world_of(tmp_path, SMALL.replace("{uv2: 0.5}", f"{{joint: [{joint}]}}"))
     found = replace(summary_of_test((1.0, 2.0), 10.0), failure=Failures(plan="mission", execute="mission"))
     assert reliability_told(world, "half", found) == told
+
+
+def test_shares_below_dots_keep_clear_of_each_other_by_their_length() -> None:
+    said = {0.0: "90 %", 11.0: "5.5 %", 20.5: "5.0 %"}
+    counts = [(0.0, 180), (11.0, 11), (20.5, 10)]
+    assert _with_room(counts, said, 2.0) == {0.0, 11.0}
+    assert _with_room(counts, said, 1.0) == {0.0, 11.0, 20.5}

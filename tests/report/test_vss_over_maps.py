@@ -11,6 +11,7 @@ from sva_bench.analysis.results import Estimate
 from sva_bench.report.response_chart import vss_responses
 from sva_bench.report.variant_names import VariantNames
 from sva_bench.report.vss_over_maps import headline_over_maps, verdicts_of
+from sva_bench.report.wording import same_draws
 from tests.results_for_tests import over_maps
 
 PAYS, LOSES, EVEN, NONE = (1.0, 3.0), (-3.0, -1.0), (-1.0, 3.0), (0.0, 0.0)
@@ -33,7 +34,14 @@ def headline(*rows: OverMaps) -> str:
     ([row("S1", "x", LOSES), row("S1", "y", EVEN)],
      "Over 12 maps no scenario shows a value of planning for failures beyond doubt."),
     ([row("S1", "", PAYS, maps=3), row("S2", "", None, maps=2)],
-     "Over at most 3 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
+     "Over at most 3 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0]). On both maps the VSS is the same in "
+     "S2 (VSS 1.0), which has no interval over maps."),
+    ([row("S1", "", None, maps=3)],
+     "On all 3 maps the VSS is the same in S1 (VSS 1.0), which has no interval over maps."),
+    ([row("S1", "x", None, maps=3), row("S1", "y", EVEN, maps=3), row("S2", "x", EVEN, maps=3),
+      row("S2", "y", EVEN, maps=3)],
+     "On all 3 maps the VSS is the same for some variants in S1, which has no interval over maps; no other scenario "
+     "shows a value of planning for failures beyond doubt."),
     ([row("S1", "", PAYS, maps=9)], "Over only 9 maps planning for failures pays in S1 (VSS 2.0 [1.0, 3.0])."),
     ([row("S1", "", PAYS, maps=1)],
      "One map can't tell what planning for failures is worth over maps; below is its worth on this one.")])
@@ -42,10 +50,11 @@ def test_a_headline_says_over_how_many_maps_and_for_which_variants(rows: list[Ov
 
 
 @pytest.mark.parametrize(("ends", "said"), [
-    ([PAYS, PAYS], "pays for any variant (VSS 2.0 to 2.0)"), ([NONE, NONE], "no difference for any variant"),
+    ([PAYS, PAYS], "pays for any variant (VSS 2.0)"), ([NONE, NONE], "no difference for any variant"),
     ([PAYS, EVEN], "pays for x (VSS 2.0 [1.0, 3.0]); can't be told for y"),
     ([EVEN, LOSES], "costs for y (VSS -2.0 [-3.0, -1.0]); can't be told for x"),
-    ([None, PAYS], "pays for y (VSS 2.0 [1.0, 3.0]); no interval for x")])
+    ([None, PAYS], "pays for y (VSS 2.0 [1.0, 3.0]); the same on all 12 maps for x (VSS 1.0)"),
+    ([None, None], "the same on all 12 maps for any variant (VSS 1.0)")])
 def test_each_scenario_has_a_line_of_its_variants_by_their_intervals(
         ends: list[tuple[float, float] | None], said: str) -> None:
     assert verdicts_of([row("S", variant, each) for variant, each in zip("xy", ends, strict=True)], str) == said
@@ -56,6 +65,14 @@ def test_maps_that_all_show_none_have_no_difference_though_they_have_no_interval
     assert verdicts_of([here, row("S", "y", EVEN)], str) == "can't be told for y; no difference on these maps for x"
     assert verdicts_of([here, replace(here, variant="y")], str) == "no difference on these maps for any variant"
     assert verdicts_of([replace(here, maps=1)], str) == "no interval for any variant"
+
+
+def test_batches_of_one_seed_say_that_their_maps_share_the_draws_of_failures() -> None:
+    summary = BatchSummary(trials=1, fidelity="kinematic", worlds=("a", "b"), seeds=(0,), units=(), maps=(), failed=(),
+                           aggregate=(row("S1", "", PAYS),), variants=("",))
+    assert "met the very same draws of failures" in same_draws(summary)
+    assert same_draws(replace(summary, seeds=(0, 1))) == ""
+    assert same_draws(replace(summary, aggregate=(row("S1", "", PAYS, maps=1),))) == ""
 
 
 def responses(*settings: dict[str, str]) -> list[str]:

@@ -178,6 +178,8 @@ def test_an_infeasible_plan_is_marked_before_its_figure(
     terminal, page = told(done, capsys)
     assert "dry (infeasible, 20 of 40 robot missions lost) " in terminal
     assert ">dry (infeasible)</td>" in page
+    assert "<b>dry (infeasible)</b>" in page  # over its map
+    assert "</title>dry (infeasible)</text>" in page  # at its bars
     for text in (terminal, page):
         assert "dry is infeasible: fuel or mission limit would be broken." in text
         assert "good (" not in text.split("dry is infeasible")[0].split("nominal")[0]
