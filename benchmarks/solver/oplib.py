@@ -41,8 +41,7 @@ def read_oplib(path: Path) -> Instance:
     kind = fields.get("EDGE_WEIGHT_TYPE", "none")
     if kind not in COSTS:
         raise NotServed(f"{path.name}: costs of the type {kind}; read are {', '.join(COSTS)}")
-    missing = [part for part, found in (("COST_LIMIT", fields), *((name, sections) for name in SECTIONS))
-               if part not in found]
+    missing = [part for part in ("COST_LIMIT", *SECTIONS) if part not in fields and part not in sections]
     if missing:
         raise NotServed(f"{path.name}: no {' and no '.join(missing)}")
     try:

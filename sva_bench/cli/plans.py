@@ -145,6 +145,7 @@ def certify(
         from sva_bench.mission.instance_file import read_instance
         from sva_bench.mission.plan_file import read_plan
 
+    set_up_logging(verbose=False)
     refuse_closed_output()
     problem = read_instance(instance)
     candidate = read_plan(plan, problem)
