@@ -134,7 +134,7 @@ def test_the_page_of_a_batch_shows_its_reactions_and_begins_with_what_vss_is_und
     assert "<th scope=\"col\">VSS [%]</th>" in table
     assert not re.search(r"<td[^>]*>[^<]*%", table)  # incentive and per cent in columns of their own
     first = page[:page.index("<table")]
-    assert "If the team keeps its plan, over only 2 maps" in first
+    assert "If the team keeps its plan, on both maps the VSS is the same" in first
     summary = from_dict(BatchSummary, json.loads((folder / "done" / "summary.json").read_text()))
     answers = answers_over_maps(summary.reactions)
     assert answers
