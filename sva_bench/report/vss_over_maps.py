@@ -54,7 +54,7 @@ def _where(rows: Sequence[OverMaps], variants: int) -> str:
 def _all(rows: Sequence[OverMaps]) -> str:
     """``all 3 maps``."""
     numbers = {row.maps for row in rows}
-    return "all maps" if len(numbers) > 1 else "both maps" if numbers == {2} else f"all {max(numbers)} maps"
+    return "all maps" if len(numbers) > 1 else "both maps" if numbers == {2} else f"all {counted(max(numbers), 'map')}"
 
 
 def verdicts_of(rows: Sequence[OverMaps], short: Callable[[str], str]) -> str:
