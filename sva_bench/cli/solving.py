@@ -12,6 +12,7 @@ from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TimeEla
 from rich.text import Text
 
 from sva_bench.cli.terminal import messages
+from sva_bench.files.printable import counted
 from sva_bench.interrupts import holding_back_ctrl_c
 
 _EVERY_S = 10.0  # between lines where standard error is no terminal
@@ -56,7 +57,7 @@ def said(found: Found) -> str:
     value, bound = found.value, found.bound
     gap = (bound - value) / abs(value) if value else math.inf
     known = f", bound {bound:.6g}, gap {100 * max(gap, 0.0):.2g} %" if math.isfinite(gap) else ""
-    return f"{found.objective}: value {value:.6g}{known}, {found.nodes} node{'' if found.nodes == 1 else 's'}"
+    return f"{found.objective}: value {value:.6g}{known}, {counted(found.nodes, 'node')}"
 
 
 class _Told(ProgressColumn):

@@ -262,11 +262,11 @@ def _address(port: int) -> str:
 
 
 def _blueprint(layout: Layout) -> rrb.Blueprint:
-    played: dict[str, Any] = {"play_state": "following"} if layout.speed is None else {
-        "play_state": "playing", "playback_speed": layout.speed}
     return rrb.Blueprint(
         _panel(layout.panel), rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, **played), auto_layout=False, auto_views=False)
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, playback_speed=layout.speed,
+                      play_state="following" if layout.speed is None else "playing"),
+        auto_layout=False, auto_views=False)
 
 
 def _panel(panel: Panel) -> rrb.View | rrb.Container:

@@ -47,11 +47,12 @@ def _vss_over(key: str, summary: BatchSummary, names: VariantNames) -> str:
         if (value := settings.pop(key, None)) is not None:
             places.setdefault((row.scenario, names.told(settings)), []).append(_vss_point(row, at[value], value))
     axes = Axes(x=key, zero=True, joined=True, apart=True, places=[(at[value], shown_value(value)) for value in at])
-    return panels(f"VSS over {key}: means over maps and 95 % intervals", axes,
-                  [Panel(title=labelled(*place), points=points) for place, points in places.items()
-                   if any(point.y or point.interval not in (None, (0.0, 0.0)) for point in points)],
+    shown = [Panel(title=labelled(*place), points=points) for place, points in places.items()
+             if any(point.y or point.interval not in (None, (0.0, 0.0)) for point in points)]
+    left_out = " Scenarios without any difference are left out." if len(shown) < len(places) else ""
+    return panels(f"VSS over {key}: means over maps and 95 % intervals", axes, shown,
                   f"VSS over {key}: mean over maps, each with its own 95 % interval. Above zero, planning for failures "
-                  "pays. Scenarios without any difference are left out.")
+                  f"pays.{left_out}")
 
 
 def _vss_point(row: OverMaps, at: float, value: str) -> Point:

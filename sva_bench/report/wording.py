@@ -268,7 +268,7 @@ def same_draws(summary: BatchSummary) -> str:
     if len(summary.seeds) != 1 or all(row.maps < 2 for row in summary.aggregate):
         return ""
     return "All maps were run with one seed, and so met the very same draws of failures: an interval over maps " \
-        "leaves out what chance did to all of them alike, which more trials (--trials) or seeds (--seeds) make smaller."
+        "leaves out what chance did to all of them alike, which more trials (--trials) or seeds (--seed) make smaller."
 
 
 def assumption_rows(scenarios: Sequence[ScenarioSummary]) -> list[list[str]]:
