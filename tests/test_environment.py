@@ -54,9 +54,10 @@ MORE = [["report", "RUN"], ["replay", "RUN", "--trial", "0", "--scenario", "half
         ["execute", "small.yaml", "PLAN", *QUICK, "--fidelity", "kinematic", "--out", "runs2"]]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("program", "commands"), [
     pytest.param([sys.executable, "-m", "sva_bench"], [RUN, BATCH], id="-m"),
-    pytest.param([str(BESIDE)], [RUN, BATCH, *MORE], id="sva-bench", marks=pytest.mark.long)])
+    pytest.param([str(BESIDE)], [RUN, BATCH, *MORE], id="sva-bench")])
 def test_no_command_runs_code_of_the_current_folder(
     program: list[str], commands: list[list[str]], trapped: Path
 ) -> None:

@@ -35,7 +35,8 @@ def test_every_script_is_run() -> None:
     assert {path.name for path in EXAMPLES.glob("*.py")} == set(SAID)
 
 
-@pytest.mark.parametrize("script", sorted(SAID))
+@pytest.mark.parametrize("script", [
+    pytest.param(script, marks=[pytest.mark.long] * (script != "own_plan.py")) for script in sorted(SAID)])
 def test_a_script_runs_and_says_what_it_should(script: str, folder: Path) -> None:
     done = subprocess.run([sys.executable, f"examples/{script}"], cwd=folder, text=True, capture_output=True,
                           timeout=600, check=False)
@@ -51,6 +52,7 @@ def said(notebook: nbformat.NotebookNode) -> list[str]:
             for cell in notebook.cells if cell.cell_type == "code"]
 
 
+@pytest.mark.long
 def test_the_notebook_runs_and_prints_what_is_stored_in_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = folder / "examples" / "mission_value.ipynb"
     stored, run = (nbformat.read(path, as_version=4) for _ in range(2))

@@ -105,6 +105,7 @@ def test_details_of_a_plan_are_free_but_must_be_text(tmp_path: Path) -> None:
         read_instance(tmp_path / "i.json")
 
 
+@pytest.mark.long
 def test_a_run_in_folders_whose_names_are_no_utf8_is_made_and_reported(tmp_path: Path) -> None:
     folder = tmp_path / os.fsdecode(b"caf\xe9\x1b[31m")
     try:

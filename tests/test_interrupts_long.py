@@ -191,10 +191,8 @@ def moments(draw: random.Random, count: int, whole_s: float) -> list[float]:
     return [draw.uniform(0, SOON_S) for _ in range(soon)] + [draw.uniform(0, whole_s) for _ in range(count - soon)]
 
 
-LONG = [pytest.param(name, MOMENTS, marks=pytest.mark.long) for name in COMMANDS]
-
-
-@pytest.mark.parametrize(("name", "count"), [("run, rollout", 1), ("batch", 1), *LONG])
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "count"), [(name, MOMENTS) for name in COMMANDS])
 def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
     name: str, count: int, tmp_path: Path
 ) -> None:
@@ -228,7 +226,8 @@ def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
     finish(command, folder, alone)
 
 
-@pytest.mark.parametrize(("name", "count"), [("plan", 2), *LONG])
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "count"), [(name, MOMENTS) for name in COMMANDS])
 def test_a_kill_at_any_moment_leaves_a_complete_result_or_none_and_no_lock(
     name: str, count: int, tmp_path: Path
 ) -> None:

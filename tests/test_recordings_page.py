@@ -56,8 +56,9 @@ def test_the_entities_that_are_listed_are_there_and_no_others(run: Path) -> None
         assert f"`{state}`" in PAGE
 
 
-@pytest.mark.parametrize("command", re.findall(r"^\$ sva-bench ((?:view|replay|export) .*?)(?: +#.*)?$", PAGE,
-                                               re.MULTILINE))
+@pytest.mark.parametrize("command", [
+    pytest.param(command, marks=[pytest.mark.long] * command.endswith(".mp4")) for command in re.findall(
+        r"^\$ sva-bench ((?:view|replay|export) .*?)(?: +#.*)?$", PAGE, re.MULTILINE)])
 def test_its_commands_are_understood(command: str, run: Path, tmp_path: Path) -> None:
     here = {"S3": "half", "runs/recorded/four-rooms-*": str(run)}
     words = [here.get(word, word) for word in shlex.split(command)]

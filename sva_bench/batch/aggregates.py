@@ -18,11 +18,12 @@ from sva_bench.analysis.over_maps import (
     OverMaps,
     UnitSummary,
 )
-from sva_bench.analysis.results import Estimate, VssFigures
+from sva_bench.analysis.results import Estimate
+from sva_bench.analysis.scenarios import UnitScenario
 from sva_bench.analysis.statistics import estimate
 from sva_bench.batch.folder import shard_path
 from sva_bench.batch.grid import Grid
-from sva_bench.batch.map_samples import over, percentage_of
+from sva_bench.batch.map_samples import in_per_cent, over_maps, percentage_over_maps
 from sva_bench.batch.reactions_over_maps import reactions_over_maps
 from sva_bench.batch.shards import Note, read_note, unit_of
 from sva_bench.batch.tallies import join, scenario_of
@@ -82,8 +83,9 @@ def unit_summary(note: Note) -> UnitSummary:
 def aggregate(units: Sequence[UnitSummary]) -> tuple[OverMaps, ...]:
     """VSS over maps, for each variant and scenario: the maps are the sample, seeds and trials are nested in them.
 
-    The interval is that of the mean over maps, of each map's mean over its seeds. A map on which the
-    stochastic plan collects nothing has no percentage; the number of maps with one is then given.
+    The interval is that of the mean over maps, of each map's mean over its seeds, and allows for the draws that maps
+    share (``map_samples.over_maps``). A map on which the stochastic plan collects nothing has no percentage; the number
+    of maps with one is then given.
     Where every robot is certain, both plans are equal on any map; otherwise maps with equal values don't show
     how maps vary, and there is no interval.
     """
@@ -92,12 +94,11 @@ def aggregate(units: Sequence[UnitSummary]) -> tuple[OverMaps, ...]:
     rows = []
     for (variant, scenario), by_map in _by_map(units).items():
         certain = (variant, scenario) not in doubtful
-        vss = [float(np.mean([seed.executed.mean for seed in seeds])) for seeds in by_map.values()]
-        shares = [[seed.executed_pct for seed in seeds if seed.executed_pct is not None] for seeds in by_map.values()]
-        pcts = [float(np.mean(pct)) for pct in shares if pct]
-        rows.append(OverMaps(
-            variant=variant, scenario=scenario, maps=len(by_map), vss=over(vss, sure=certain),
-            vss_pct=percentage_of(pcts, len(by_map), sure=certain)))
+        vss = [[seed.vss.executed for seed in seeds] for seeds in by_map.values()]
+        shares = [[in_per_cent(seed.vss.executed, seed.vss.executed_pct, seed.stochastic.executed.mean)
+                   for seed in seeds] for seeds in by_map.values()]
+        rows.append(OverMaps(variant=variant, scenario=scenario, maps=len(by_map), vss=over_maps(vss, sure=certain),
+                             vss_pct=percentage_over_maps(shares, sure=certain)))
     return tuple(rows)
 
 
@@ -126,19 +127,19 @@ def map_rows(units: Sequence[UnitSummary], executed: Mapping[Key, Estimate]) -> 
     for (variant, scenario), by_map in _by_map(units).items():
         for world, seeds in by_map.items():
             found = executed[variant, scenario, world]
-            pct = [seed.executed_pct for seed in seeds if seed.executed_pct is not None]
+            pct = [seed.vss.executed_pct for seed in seeds if seed.vss.executed_pct is not None]
             rows.append(MapRow(
                 variant=variant, world=world, scenario=scenario, seeds=len(seeds), vss_pct=float(np.mean(pct)) if pct
-                else None, vss=MapVss(mean=found.mean, ci95=found.ci95, same_plan=all(s.same_plan for s in seeds))))
+                else None, vss=MapVss(mean=found.mean, ci95=found.ci95, same_plan=all(s.vss.same_plan for s in seeds))))
     worlds, variants = ({name: number for number, name in enumerate(dict.fromkeys(names))} for names in (
         [unit.world for unit in units], [unit.variant for unit in units]))
     return tuple(sorted(rows, key=lambda row: (worlds[row.world], variants[row.variant])))
 
 
-def _by_map(units: Sequence[UnitSummary]) -> dict[tuple[str, str], dict[str, list[VssFigures]]]:
-    """The VSS seed by seed, by variant and scenario, then by map."""
-    found: dict[tuple[str, str], dict[str, list[VssFigures]]] = {}
+def _by_map(units: Sequence[UnitSummary]) -> dict[tuple[str, str], dict[str, list[UnitScenario]]]:
+    """Results seed by seed, by variant and scenario, then by map."""
+    found: dict[tuple[str, str], dict[str, list[UnitScenario]]] = {}
     for unit in units:
         for scenario in unit.scenarios:
-            found.setdefault((unit.variant, scenario.name), {}).setdefault(unit.world, []).append(scenario.vss)
+            found.setdefault((unit.variant, scenario.name), {}).setdefault(unit.world, []).append(scenario)
     return found

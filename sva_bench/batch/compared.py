@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -22,17 +23,19 @@ from sva_bench.analysis.moments import Clusters, Figure, Moments, joined, pooled
 from sva_bench.analysis.over_maps import UnitSummary
 from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.scenarios import UnitScenario
-from sva_bench.analysis.statistics import estimate, sample_mean
+from sva_bench.analysis.statistics import estimate
 from sva_bench.arrays import FloatArray
 from sva_bench.batch.folder import shard_path
 from sva_bench.batch.grid import Grid, Point
-from sva_bench.batch.map_samples import over
+from sva_bench.batch.map_samples import over_maps
 from sva_bench.batch.shards import Note, read_note, unit_of
 from sva_bench.batch.sweep import Sweep
 from sva_bench.errors import BadInput, nearest
 from sva_bench.storage.tables import SHARDS, pieces_of
 
-Read = Callable[[UnitScenario], float]
+_COMPARED = ("stochastic", "deterministic")
+_MOST_HELD = 20_000_000
+"""Values of trials kept in memory; further ones are read again."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,115 +148,121 @@ def _compared(
 ) -> KeyComparison:
     values = values_of(grid)[asked.key]
     maps, settings = {point.world.name for point in grid.points}, {p.variant: p.settings for p in grid.points}
-    over_maps = len(maps) > 1
+    several = len(maps) > 1
     found: dict[tuple[str, str], dict[str, _Place]] = {}
     for unit in units:
         for scenario in unit.scenarios:
             mine = settings[unit.variant]
             value, others = mine[asked.key], variant_of(other_settings(mine, asked.key))
             place = found.setdefault((scenario.name, others), {}).setdefault(value, _Place(unit.variant, {}))
-            place.results[unit.world, unit.seed] = scenario
+            place.results.setdefault(unit.world, []).append(scenario)
     of_scenario: dict[str, int] = {}
     for (name, _), places in found.items():
         if asked.reference in places:
             of_scenario[name] = of_scenario.get(name, 0) + len(places) - 1
     rows = []
     trials = _Trials(grid, folder, done)
+    # Map by map, so that few shards are in memory at a time.
+    gains = {(world, name, others, value): trials.gains(
+        name, world, place.variant, places[asked.reference].variant, max(of_scenario.get(name, 1), 1))
+        for world in dict.fromkeys(unit.world for unit in units)
+        for (name, others), places in found.items() if world in places.get(asked.reference, _NOWHERE).results
+        for value, place in places.items() if value != asked.reference and world in place.results}
     for (name, others), places in found.items():
-        reference = places.get(asked.reference)
         for value in (value for value in values if value in places):
             place, pairs = places[value], max(of_scenario.get(name, 1), 1)
-            other = None if value == asked.reference else reference
-            if over_maps:
-                executed, vss = place.over_maps(_value), place.over_maps(_vss)
-                gains = [None, None] if other is None else [
-                    place.gain_over_maps(other, read, pairs) for read in (_value, _vss)]
-            else:
-                executed, vss = trials.at(name, place.variant)
-                gains = [None, None] if other is None else trials.gains(name, place.variant, other.variant, pairs)
-            rows.append(ValueRow(scenario=name, others=others, value=value, executed=executed, vss=vss, gain=gains[0],
-                                 vss_gain=gains[1], maps=len({world for world, _ in place.results})))
+            on_maps = [met for world in place.results if (met := gains.get((world, name, others, value), ()))]
+            executed, vss = (place.over_maps(_value), place.over_maps(_vss)) if several else trials.at(
+                name, next(iter(place.results)), place.variant)
+            gain, vss_gain = (_gain([met[number] for met in on_maps], pairs, several=several) if on_maps else None
+                              for number in (0, 1))
+            rows.append(ValueRow(scenario=name, others=others, value=value, executed=executed, vss=vss, gain=gain,
+                                 vss_gain=vss_gain, maps=len(place.results)))
     return KeyComparison(key=asked.key, reference=asked.reference, values=values, rows=tuple(rows),
-                         sample="maps" if over_maps else "trials")
+                         sample="maps" if several else "trials")
 
 
-def _value(scenario: UnitScenario) -> float:
-    return scenario.stochastic.executed.mean
+def _value(scenario: UnitScenario) -> Estimate:
+    return scenario.stochastic.executed
 
 
-def _vss(scenario: UnitScenario) -> float:
-    return scenario.vss.executed.mean
+def _vss(scenario: UnitScenario) -> Estimate:
+    return scenario.vss.executed
 
 
 @dataclass(frozen=True)
 class _Place:
-    """One variant under one scenario: its results by map and seed."""
+    """One variant under one scenario: its results by map, seed by seed."""
 
     variant: str
-    results: dict[tuple[str, int], UnitScenario]
+    results: dict[str, list[UnitScenario]]
 
-    def over_maps(self, read: Read) -> Estimate:
+    def over_maps(self, read: Callable[[UnitScenario], Estimate]) -> Estimate:
         """The mean over maps, of each map's mean over its seeds."""
-        return over(_by_map({key: read(found) for key, found in self.results.items()}),
-                    sure=all(p >= 1 for found in self.results.values() for p in found.availability.values()))
-
-    def gain_over_maps(self, other: _Place, read: Read, pairs: int) -> ValueGain | None:
-        """The same of the difference against another variant, over the maps and seeds that both have."""
-        means = _by_map({key: read(found) - read(other.results[key]) for key, found in self.results.items()
-                         if key in other.results})
-        return _gain(sample_mean(means), sample_mean(means, comparisons=pairs)) if means else None
+        return over_maps([[read(seed) for seed in seeds] for seeds in self.results.values()], sure=all(
+            p >= 1 for seeds in self.results.values() for found in seeds for p in found.availability.values()))
 
 
-def _by_map(figures: Mapping[tuple[str, int], float]) -> list[float]:
-    seeds: dict[str, list[float]] = {}
-    for (world, _), figure in figures.items():
-        seeds.setdefault(world, []).append(figure)
-    return [float(np.mean(figures)) for figures in seeds.values()]
+_NOWHERE = _Place("", {})
 
 
-def _gain(single: Estimate, adjusted: Estimate) -> ValueGain:
+@dataclass(frozen=True, kw_only=True)
+class _MapGain:
+    """A difference on one map over its trials: with an interval of its own, and one that holds with others."""
+
+    single: Estimate
+    adjusted: Estimate
+
+
+def _gain(maps: Sequence[_MapGain], pairs: int, *, several: bool) -> ValueGain:
+    """The difference over maps, or that on the only map that there is."""
+    single, adjusted = maps[0].single, maps[0].adjusted
+    if several:
+        single = over_maps([[each.single] for each in maps], sure=False)
+        adjusted = over_maps([[each.adjusted] for each in maps], sure=False, comparisons=pairs)
     return ValueGain(mean=single.mean, ci95=single.ci95, ci95_adjusted=adjusted.ci95,
                      distinguishable=adjusted.excludes_zero)
 
 
 class _Trials:
-    """Figures of the variants of one map, from the shards of its trials."""
+    """Figures of maps and variants, from the shards of their trials."""
 
     def __init__(self, grid: Grid, folder: Path, done: frozenset[str] | set[str]) -> None:
         self._grid, self._folder, self._done = grid, folder, done
-        self._points = {point.variant: point for point in grid.points}
+        self._points = {(point.world.name, point.variant): point for point in grid.points}
+        held = 2 * max(grid.unit_trials, 1) * max(len(point.world.scenarios) for point in grid.points)
+        self._note = lru_cache(maxsize=1000)(self._read_note)
+        self._totals = lru_cache(maxsize=max(2, _MOST_HELD // held))(self._read_totals)
 
-    def at(self, scenario: str, variant: str) -> tuple[Estimate, Estimate]:
-        """The executed value of the stochastic plan and the executed VSS of a variant."""
-        value, vss = self._over_ranges(variant, lambda note, *_: (
+    def at(self, scenario: str, world: str, variant: str) -> tuple[Estimate, Estimate]:
+        """The executed value of the stochastic plan and the executed VSS of a variant on a map."""
+        value, vss = self._over_ranges(self._points[world, variant], lambda note, *_: (
             note.tallies[scenario].plans["stochastic"].total, note.tallies[scenario].difference))
         return estimate(value), estimate(vss)
 
-    def gains(self, scenario: str, variant: str, other: str, pairs: int) -> list[ValueGain | None]:
-        """How much more the two are in one variant than in another, trial by trial."""
-        point = self._points[other]
+    def gains(self, scenario: str, world: str, variant: str, other: str, pairs: int) -> tuple[_MapGain, ...]:
+        """How much more the two are in one variant than in another, trial by trial; none where no unit has both."""
+        here, there = self._points[world, variant], self._points[world, other]
 
         def differences(note: Note, seed: int, first: int) -> tuple[Figure, Figure] | None:
-            if self._grid.unit_name(point, seed, first) not in self._done:
+            if self._grid.unit_name(there, seed, first) not in self._done:
                 return None
-            before = self._note(point, seed, first)
-            here, there = (self._totals(which, seed, first, scenario) for which in (self._points[variant], point))
-            mine, its = note.tallies[scenario], before.tallies[scenario]
-            return (less(mine.plans["stochastic"].total, its.plans["stochastic"].total,
-                         here["stochastic"] - there["stochastic"]),
-                    less(mine.difference, its.difference, here["stochastic"] - here["deterministic"]
-                         - there["stochastic"] + there["deterministic"]))
+            mine, its = note.tallies[scenario], self._note(world, other, seed, first).tallies[scenario]
+            s, d = (self._totals(world, variant, seed, first)[scenario, plan]
+                    - self._totals(world, other, seed, first)[scenario, plan] for plan in _COMPARED)
+            return (less(mine.plans["stochastic"].total, its.plans["stochastic"].total, s),
+                    less(mine.difference, its.difference, s - d))
 
-        found = self._over_ranges(variant, differences)
-        return [_gain(estimate(figure), estimate(figure, comparisons=pairs)) for figure in found] or [None, None]
+        return tuple(_MapGain(single=estimate(figure), adjusted=estimate(figure, comparisons=pairs))
+                     for figure in self._over_ranges(here, differences))
 
-    def _over_ranges(self, variant: str, read: Callable[[Note, int, int], tuple[Figure, ...] | None]
+    def _over_ranges(self, point: Point, read: Callable[[Note, int, int], tuple[Figure, ...] | None]
                      ) -> tuple[Figure, ...]:
         """Figures of each range of trials, joined over ranges and pooled over seeds."""
-        point, seeds = self._points[variant], []
+        seeds = []
         for seed in self._grid.seeds:
-            ranges = [found for first in self._ranges(point, seed)
-                      if (found := read(self._note(point, seed, first), seed, first)) is not None]
+            ranges = [found for first in self._ranges(point, seed) if (found := read(
+                self._note(point.world.name, point.variant, seed, first), seed, first)) is not None]
             if ranges:
                 seeds.append(_folded(joined, ranges))
         return _folded(pooled, seeds) if seeds else ()
@@ -263,26 +272,27 @@ class _Trials:
             if self._grid.unit_name(point, seed, first) in self._done:
                 yield first
 
-    def _note(self, point: Point, seed: int, first: int) -> Note:
+    def _read_note(self, world: str, variant: str, seed: int, first: int) -> Note:
+        point = self._points[world, variant]
         unit = unit_of(self._grid, point, seed, first)
         return read_note(shard_path(self._folder, self._grid.unit_name(point, seed, first)), unit)
 
-    def _totals(self, point: Point, seed: int, first: int, scenario: str) -> dict[str, FloatArray]:
-        """Value of the team in each trial of a range, by plan.
+    def _read_totals(self, world: str, variant: str, seed: int, first: int) -> dict[tuple[str, str], FloatArray]:
+        """Value of the team in each trial of a range, by scenario and plan.
 
         Raises:
             BadFile: If a shard is no table of ours, or cut off.
         """
-        trials = dict(self._grid.ranges())[first]
-        found = {plan: np.zeros(trials) for plan in ("stochastic", "deterministic")}
+        point, trials = self._points[world, variant], dict(self._grid.ranges())[first]
+        found = {(scenario.name, plan): np.zeros(trials) for scenario in point.world.scenarios for plan in _COMPARED}
         path = shard_path(self._folder, self._grid.unit_name(point, seed, first))
         columns = pa.schema([SHARDS.field(name) for name in ("scenario", "planner", "trial", "value")])
         for piece in pieces_of(path, columns):
-            words = {name: piece[name].combine_chunks() for name in ("scenario", "planner")}
+            scenarios, planners = (piece[name].combine_chunks() for name in ("scenario", "planner"))
             at, value = piece["trial"].to_numpy() - first, piece["value"].to_numpy()
-            of_scenario = _equal(words["scenario"], scenario)
-            for plan, total in found.items():
-                rows = of_scenario & _equal(words["planner"], plan) & (at >= 0) & (at < trials)
+            within = (at >= 0) & (at < trials)
+            for (scenario, plan), total in found.items():
+                rows = within & _equal(scenarios, scenario) & _equal(planners, plan)
                 total += np.bincount(at[rows], weights=value[rows], minlength=trials)
         return found
 

@@ -264,11 +264,12 @@ def over_few_maps(rows: Sequence[OverMaps]) -> str:
 
 
 def same_draws(summary: BatchSummary) -> str:
-    """That maps of one seed share their draws of failures; nothing where there are more seeds, or one map."""
-    if len(summary.seeds) != 1 or all(row.maps < 2 for row in summary.aggregate):
+    """That maps share draws which no interval allows for; nothing where all intervals do, or where there is one map."""
+    if all(row.maps < 2 for row in summary.aggregate) or all(
+            s.vss.executed.ci95 is not None for unit in summary.units for s in unit.scenarios):
         return ""
-    return "All maps were run with one seed, and so met the very same draws of failures: an interval over maps " \
-        "leaves out what chance did to all of them alike, which more trials (--trials) or seeds (--seed) make smaller."
+    return "One trial, or one noise draw, does not tell what chance did to all maps alike, and the interval over " \
+        "maps leaves that out: give more --trials and --rollouts, or more seeds (--seed)."
 
 
 def assumption_rows(scenarios: Sequence[ScenarioSummary]) -> list[list[str]]:

@@ -118,6 +118,7 @@ def test_what_may_go_wrong_is_divided_among_looks_without_end() -> None:
     assert Precision(pct=1.0, max_trials=10, look=7).comparisons == 1
 
 
+@pytest.mark.long
 def test_a_run_that_stops_at_any_time_says_by_which_intervals(tmp_path: Path) -> None:
     (tmp_path / "w.yaml").write_text(SMALL)
     done = sva_bench("run", "w.yaml", "--trials", 20, "--rollouts", 4, "--fidelity", "kinematic", "--precision", "12%",

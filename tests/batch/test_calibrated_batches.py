@@ -42,6 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.long
 def test_a_unit_has_the_calibrated_plan_of_a_run(folder: Path) -> None:
     run = sb.run(folder / "world.yaml", trials=30, rollouts=3, fidelity="kinematic", calibrate=5, workers=1)
     alone = {scenario["name"]: scenario for scenario in run.as_dict()["scenarios"]}

@@ -133,6 +133,7 @@ def test_plans_by_hand_are_executed_and_compared(tmp_path: Path) -> None:
     assert pair["mean"] == pytest.approx(difference)
 
 
+@pytest.mark.long
 def test_a_plan_that_breaks_its_fuel_is_refused_or_seen_running_dry(tmp_path: Path) -> None:
     world = world_file(tmp_path, SMALL.replace("fuel_capacity_s: 60", "fuel_capacity_s: 20"))
     dry = plan_file(tmp_path, "dry.json", {"uv1": ["base", "p1", "p4", "p3", "p2", "base"]})
@@ -165,7 +166,8 @@ def test_a_plan_that_cannot_be_driven_is_refused_even_if_infeasible_ones_are_all
     assert not (tmp_path / "runs").exists()
 
 
-@pytest.mark.parametrize("process", [pytest.param("mission", marks=pytest.mark.long), "per_leg"])
+@pytest.mark.long
+@pytest.mark.parametrize("process", ["mission", "per_leg"])
 def test_physics_trial_by_trial_is_what_composed_rollouts_cut_off_come_to(process: str, tmp_path: Path) -> None:
     tables = []
     for fidelity in ("rollout", "physics"):

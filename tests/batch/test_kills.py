@@ -66,7 +66,8 @@ def shards(out: Path) -> int:
     return len(list(out.glob("outcomes-*.parquet")))
 
 
-@pytest.mark.parametrize("kills", [1, *(pytest.param(kills, marks=pytest.mark.long) for kills in (3, 56))])
+@pytest.mark.long
+@pytest.mark.parametrize("kills", [1, 3, 56])
 def test_killing_parent_and_workers_at_random_moments_changes_no_row(
     kills: int, undisturbed: tuple[Path, pa.Table]
 ) -> None:

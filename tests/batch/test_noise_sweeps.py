@@ -68,6 +68,7 @@ def test_a_bad_value_is_refused_by_the_option(tmp_path: Path, key: str, value: A
         grid_of(Sweep(worlds=(world(tmp_path),), vary={key: [value]}))
 
 
+@pytest.mark.long
 def test_points_that_differ_in_tanks_and_doors_alone_share_their_drives_and_not_their_outcomes(tmp_path: Path) -> None:
     tight = world(tmp_path)
     tight.write_text(tight.read_text().replace("fuel_capacity_s: 60", "fuel_capacity_s: 48"), encoding="utf-8")

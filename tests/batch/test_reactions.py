@@ -189,6 +189,7 @@ def test_how_far_a_batch_is_says_what_reacting_is_worth_so_far(
     assert "Reactions over maps" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_a_batch_that_is_taken_up_again_reacts_as_before(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder / "done", tmp_path / "done")
     (tmp_path / "done" / "outcomes-one-seed0-t00000000.parquet").unlink()
@@ -196,6 +197,7 @@ def test_a_batch_that_is_taken_up_again_reacts_as_before(folder: Path, tmp_path:
     assert content_of(tmp_path / "done") == content_of(folder / "done")
 
 
+@pytest.mark.long
 def test_how_a_world_reacts_is_varied_as_any_key(folder: Path, tmp_path: Path) -> None:
     words = ["batch", str(folder / "one.yaml"), *QUICK, "--cache", str(folder / "cache"), "--scenario", "half",
              "--out", str(tmp_path / "out")]

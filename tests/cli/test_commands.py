@@ -132,6 +132,7 @@ def test_the_same_command_gives_the_same_rows_on_any_number_of_workers(
         assert pq.read_table(again / table).equals(pq.read_table(run / table))
 
 
+@pytest.mark.long
 def test_another_seed_gives_other_failures_and_the_same_plans(
     finished: tuple[Path, dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -148,6 +149,7 @@ def test_another_seed_gives_other_failures_and_the_same_plans(
     assert failures[0] != failures[1]
 
 
+@pytest.mark.long
 def test_without_noise_the_closed_form_is_met_and_nobody_fails_but_by_draw(tmp_path: Path) -> None:
     done = sva_bench("run", world_file(tmp_path, QUIET), "--trials", 400, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

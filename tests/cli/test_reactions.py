@@ -113,6 +113,7 @@ def test_a_run_keeps_what_was_asked_for_and_is_named_as_ever_where_nothing_was(f
     assert kept["anticipate"]
 
 
+@pytest.mark.long
 def test_what_comes_to_the_same_reactions_is_the_same_run(folder: Path) -> None:
     found = []
     for number, words in enumerate((["--policy", "resolve"], ["--policy", "none,resolve"],

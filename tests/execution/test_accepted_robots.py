@@ -94,6 +94,7 @@ def strays_of(model: RobotModel, rng: np.random.Generator, steps: float = 2.0) -
             for k in np.flatnonzero(bad)]
 
 
+@pytest.mark.long
 def test_every_accepted_robot_takes_the_twins_time_within_one_per_cent() -> None:
     assert not [line for number in range(16) for line in strays(12, number)]
 

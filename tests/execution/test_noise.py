@@ -131,6 +131,7 @@ def test_sources_have_the_spread_that_is_asked_for() -> None:
     assert np.std([d.capacity for d in draws]) == pytest.approx(np.hypot(0.03 * 0.9, 0.2 / 12**0.5), rel=0.06)
 
 
+@pytest.mark.long
 def test_however_unlikely_a_draw_is_a_robot_has_wheels_and_a_tank() -> None:
     wild = replace(LOUD, wheel_gain_sd=0.2, speed_gain_sd=0.2, track_gain_sd=0.2, capacity_sd=0.2,
                    capacity_fade=(0.95, 0.95))

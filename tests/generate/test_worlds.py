@@ -183,6 +183,7 @@ def earned(text: str) -> np.ndarray:
     return np.array([[robot.incentives.get(poi.name, 0.0) for poi in world.pois] for robot in world.robots])
 
 
+@pytest.mark.long
 def test_worlds_of_one_seed_are_independent_samples() -> None:
     # Families, sizes, densities and numbers of sites that used to draw the very same incentives from a seed.
     texts = [text_of(family, 5) for family in FAMILIES]

@@ -57,6 +57,7 @@ def test_the_simulation_is_executed_as_in_the_paper_and_as_planned(tmp_path: Pat
     assert page.count("| small | half |") == 2
 
 
+@pytest.mark.long
 def test_reactions_are_measured_under_every_process_and_kind_of_news(tmp_path: Path) -> None:
     world = world_of(tmp_path, SMALL.replace("limit_s: 120", "limit_s: 30"))
     rows = reaction([world], replace(SETTINGS, rollouts=2), None, lambda *_: None)

@@ -12,7 +12,7 @@ from sva_bench.report.response_chart import vss_responses
 from sva_bench.report.variant_names import VariantNames
 from sva_bench.report.vss_over_maps import headline_over_maps, verdicts_of
 from sva_bench.report.wording import same_draws
-from tests.results_for_tests import over_maps
+from tests.results_for_tests import over_maps, unit, vss
 
 PAYS, LOSES, EVEN, NONE = (1.0, 3.0), (-3.0, -1.0), (-1.0, 3.0), (0.0, 0.0)
 
@@ -67,12 +67,16 @@ def test_maps_that_all_show_none_have_no_difference_though_they_have_no_interval
     assert verdicts_of([replace(here, maps=1)], str) == "no interval for any variant"
 
 
-def test_batches_of_one_seed_say_that_their_maps_share_the_draws_of_failures() -> None:
-    summary = BatchSummary(trials=1, fidelity="kinematic", worlds=("a", "b"), seeds=(0,), units=(), maps=(), failed=(),
-                           aggregate=(row("S1", "", PAYS),), variants=("",))
-    assert "met the very same draws of failures" in same_draws(summary)
-    assert same_draws(replace(summary, seeds=(0, 1))) == ""
+def test_batches_of_one_trial_or_noise_draw_say_what_their_intervals_leave_out() -> None:
+    units = unit("a", 1.0), unit("b", 2.0)  # without intervals of their own
+    summary = BatchSummary(trials=1, fidelity="kinematic", worlds=("a", "b"), seeds=(0,), units=units, maps=(),
+                           failed=(), aggregate=(row("S1", "", PAYS),), variants=("",))
+    assert "what chance did to all maps alike" in same_draws(summary)
     assert same_draws(replace(summary, aggregate=(row("S1", "", PAYS, maps=1),))) == ""
+    known = [replace(each, scenarios=tuple(replace(s, vss=vss(s.vss.executed.mean, (0.0, 3.0)))
+                                           for s in each.scenarios)) for each in units]
+    assert same_draws(replace(summary, units=tuple(known))) == ""
+
 
 
 def responses(*settings: dict[str, str]) -> list[str]:

@@ -68,6 +68,7 @@ def test_the_trial_that_the_manifest_names_is_found_by_its_number(run: Path) -> 
     assert [path.stem for path in found] == ["S+compare", "S-stochastic", "S-deterministic"]
 
 
+@pytest.mark.long
 def test_a_trial_that_was_not_recorded_is_played_again_to_be_seen(run: Path, tmp_path: Path) -> None:
     assert recordings_for(run, None, "stochastic", choice_of("median")) == ()
     video = tmp_path / "median.gif"

@@ -100,6 +100,7 @@ def test_a_result_is_read_as_it_was_written(at_most: Mapping[str, Calibrated]) -
         assert from_dict(type(found.result), as_dict(found.result)) == found.result
 
 
+@pytest.mark.long
 def test_any_number_of_workers_calibrates_alike(
     noisy: World, costs: Mapping[str, FuelCosts], planned: Mapping[str, Planned], at_most: Mapping[str, Calibrated]
 ) -> None:
@@ -109,6 +110,7 @@ def test_any_number_of_workers_calibrates_alike(
         assert again[name].plan.routes == found.plan.routes
 
 
+@pytest.mark.long
 def test_best_is_worth_most_of_the_curve(
     noisy: World, costs: Mapping[str, FuelCosts], planned: Mapping[str, Planned]
 ) -> None:

@@ -238,6 +238,7 @@ def test_missions_are_judged_alike_by_any_number_of_workers_and_again() -> None:
         assert_array_equal(value, judged[1][1][:len(value)], err_msg=str(number))
 
 
+@pytest.mark.long
 def test_calibrated_costs_rise_until_nobody_is_late_by_waiting() -> None:
     # Of S3's plan both robots come to one station at once, and the second has less time to spare than the first stands.
     shipped = load_world(WORLDS / "warehouse.yaml")

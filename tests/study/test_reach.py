@@ -138,6 +138,7 @@ def test_many_pois_are_counted_not_listed() -> None:
                     "be sent there."]
 
 
+@pytest.mark.long
 def test_a_map_of_a_batch_where_nothing_is_reached_is_named(tmp_path: Path) -> None:
     (tmp_path / "dry.yaml").write_text(DRY.replace("name: small", "name: dry"))
     quick = ("--trials", 20, "--rollouts", 2, "--fidelity", "kinematic", "--workers", 1, "--cache", tmp_path / "cache")

@@ -294,6 +294,7 @@ def test_what_does_not_fit_is_an_error_of_its_line(
         assert says in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("text", "error"), [
     (SHARED.replace("slots: 2", "slots: 20"), sb.NoRoomForSlots), (FULL.replace(", slots: 2", ""), sb.NoRoomForBerths)])
 def test_what_does_not_fit_has_an_error_of_its_own_in_python(

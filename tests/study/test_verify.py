@@ -33,6 +33,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run
 
 
+@pytest.mark.long
 def test_a_run_with_other_failure_processes_holds(tmp_path: Path) -> None:
     # Its instances say mean times to failure, which the world's own process has no use for.
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")

@@ -205,6 +205,7 @@ def test_a_site_that_nobody_reaches_is_told_before_berths_that_find_no_room() ->
         place_berths(world)
 
 
+@pytest.mark.long
 def test_a_site_that_nobody_reaches_is_told_before_slots_that_find_no_room() -> None:
     # The station is in a cell of its own, 1 m wide.
     obstacles = rooms((9, 4.6, 0.6, 0.1), (9, 3.4, 0.6, 0.1), (9.6, 4, 0.1, 0.7), (8.4, 4, 0.1, 0.7))

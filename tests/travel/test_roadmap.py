@@ -56,6 +56,7 @@ def ratios(seed: int, sites: int) -> FloatArray:
     return np.array(found)
 
 
+@pytest.mark.long
 def test_paths_are_near_the_optimum_on_random_worlds() -> None:
     found = np.concatenate([ratios(seed, 10) for seed in (2, 3, 5, 13)])
     assert found.mean() <= MEAN_RATIO

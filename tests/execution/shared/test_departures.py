@@ -59,6 +59,7 @@ def entered(order: Order, departs: tuple[float, ...]) -> np.ndarray:
     return enter_s
 
 
+@pytest.mark.long
 def test_nobody_is_planned_to_be_later_at_a_stop_and_no_other_robot_anywhere() -> None:
     later = 0
     for name, order in orders_planned():

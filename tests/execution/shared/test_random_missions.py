@@ -40,6 +40,7 @@ def broken_in(seeds: Iterable[int], each: int, *, physics: bool = False) -> tupl
     return count, found
 
 
+@pytest.mark.long
 def test_no_shared_mission_breaks_a_rule() -> None:
     count, found = broken_in(FEW, 4)
     assert not found

@@ -203,6 +203,7 @@ def test_a_mission_is_not_cut_off_where_a_robot_asked_after_the_failure() -> Non
     pytest.fail("nothing to cut off")
 
 
+@pytest.mark.long
 def test_whole_missions_wait_less_with_an_order_that_may_switch_and_keep_all_laws() -> None:
     waited_s, switched = {False: 0.0, True: 0.0}, 0
     for seed in (4, 9, 11, 19):
