@@ -53,10 +53,10 @@ METHODS: Mapping[Method, str] = {
     "auto": "chooses by the instance",
     "expected": "the collapsed model by branch and cut, a column for each leg",
     "dep": "the paper's deterministic equivalent",
-    "relaxed": "the same with the recourse relaxed",
+    "relaxed": "that of dep with the recourse relaxed",
     "lshaped": "the paper's L-shaped method",
     "undirected": "the collapsed model with a column for each edge, for symmetric costs without refuelling",
-    "edge-mip": "the same with HiGHS's own branch and bound",
+    "edge-mip": "the model of undirected, by HiGHS's own branch and bound",
     "branch-and-price": "routes as columns",
 }
 """How a plan is proved, in a few words each."""

@@ -173,6 +173,8 @@ def _vehicle(
     limit_s = math.inf if file.mission_limit_s is None else file.mission_limit_s
     if availability is None:
         if file.mtbf_s is None:
+            if "availability" in file.model_fields_set:
+                raise document.error((*loc, "availability"), "expected a probability, found null")
             raise document.error(loc, "the key 'availability' is missing; add it")
         availability = availability_by(file.mtbf_s, limit_s)
     vehicle = Vehicle(

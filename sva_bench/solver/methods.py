@@ -19,7 +19,7 @@ from sva_bench.solver.flow.branch_and_cut import prove_by_cuts
 from sva_bench.solver.flow.expected import DirectedModel
 from sva_bench.solver.flow.lshaped import prove_by_lshaped
 from sva_bench.solver.flow.recourse import EquivalentModel
-from sva_bench.solver.flow.undirected import UndirectedModel, serves
+from sva_bench.solver.flow.undirected import UndirectedModel, lacking, serves
 from sva_bench.solver.problem import Problem
 from sva_bench.solver.routes.long_routes import guided
 
@@ -37,7 +37,7 @@ class SolutionMethod:
         second_stage: Whether it keeps the second stage explicitly, as in the paper.
         discounts: Whether it supports rewards that depend on the order of visits or on driving times.
         risk: Whether it supports measures of risk.
-        serves: Whether it supports an instance, whatever the goal.
+        lacking: What it requires and an instance lacks, whatever the goal.
     """
 
     name: Method
@@ -45,17 +45,20 @@ class SolutionMethod:
     second_stage: bool = False
     discounts: bool = False
     risk: bool = False
-    serves: Callable[[Problem], bool] = lambda problem: True  # noqa: ARG005
+    lacking: Callable[[Problem], str] = lambda problem: ""  # noqa: ARG005
 
     @property
     def description(self) -> str:
         """What it is, in a few words."""
         return choices.METHODS[self.name]
 
-    def accepts(self, problem: Problem) -> bool:
-        """Whether it supports this problem."""
-        return ((self.discounts or problem.goal.discounts is None) and (self.risk or problem.goal.risk is None)
-                and self.serves(problem))
+    def refused(self, problem: Problem) -> str:
+        """Why it doesn't support this problem; nothing where it does."""
+        if problem.goal.discounts is not None and not self.discounts:
+            return "failures may come along the route"
+        if problem.goal.risk is not None and not self.risk:
+            return "a measure of risk is asked for"
+        return self.lacking(problem)
 
 
 def _directed(problem: Problem) -> None:
@@ -89,8 +92,8 @@ def _relaxed(problem: Problem) -> None:
     _equivalent(problem, relaxed=True)
 
 
-def _is_undirected(problem: Problem) -> bool:
-    return serves(problem.instance, problem.scopes)
+def _lacking_edges(problem: Problem) -> str:
+    return lacking(problem.instance, problem.scopes)
 
 
 _ALL = (
@@ -98,8 +101,8 @@ _ALL = (
     SolutionMethod(name="dep", prove=_equivalent, second_stage=True),
     SolutionMethod(name="relaxed", prove=_relaxed, second_stage=True),
     SolutionMethod(name="lshaped", prove=prove_by_lshaped, second_stage=True),
-    SolutionMethod(name="undirected", prove=_undirected, serves=_is_undirected),
-    SolutionMethod(name="edge-mip", prove=_edge_mip, serves=_is_undirected),
+    SolutionMethod(name="undirected", prove=_undirected, lacking=_lacking_edges),
+    SolutionMethod(name="edge-mip", prove=_edge_mip, lacking=_lacking_edges),
     SolutionMethod(name="branch-and-price", prove=prove_by_columns, discounts=True, risk=True),
 )
 METHODS: Mapping[Method, SolutionMethod] = {method.name: method for method in _ALL}
@@ -124,9 +127,9 @@ def method_for(name: Method, problem: Problem) -> SolutionMethod:
         BadInput: If it doesn't support the problem.
     """
     method = METHODS[name if name in METHODS else choice(problem)]
-    if not method.accepts(problem):
+    if why := method.refused(problem):
         raise BadInput(f"instance {problem.instance.name}: the method {method.name} ({method.description}) doesn't "
-                       "support it; take the method auto")
+                       f"support it, for {why}; take the method auto")
     return method
 
 

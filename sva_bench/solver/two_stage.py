@@ -69,6 +69,7 @@ class DeterministicPlans:
         least: Least expected value among the plans with that sum of incentives.
         most: Greatest expected value among them.
         worst: A plan of the least expected value; ``None`` where that is ``plan``'s.
+        proved: Whether all of these are proved; the plan's own status is by the sum of incentives alone.
     """
 
     plan: Plan
@@ -76,6 +77,7 @@ class DeterministicPlans:
     least: float
     most: float
     worst: Plan | None
+    proved: bool
 
 
 def plan_stochastic(
@@ -196,9 +198,10 @@ def plan_deterministic(
         route_over(own_legs, order) for own_legs, order in zip(known.legs_by_vehicle, orders, strict=True))
     expected, total = expected_of(instance, orders), sum_of(incentives_of(instance), orders)
     solutions = [s for s in (most, least, quickest) if s is not None]
+    in_all = worst_of([nominal.status or "feasible", *(s.status for s in solutions)])
     plan = finished(
         instance, "deterministic", routes, value=total, bound=nominal.bound or total,
-        status=worst_of([nominal.status or "feasible", *(s.status for s in solutions)]), solutions=solutions,
+        status=in_all if in_all == "interrupted" else nominal.status or "feasible", solutions=solutions,
         runtime_s=clock.used_s())
     if stochastic.value is not None and expected >= stochastic.value - TIE * abs(stochastic.value):
         stochastic = certified(instance, replace(
@@ -211,7 +214,8 @@ def plan_deterministic(
         worst = finished(instance, "deterministic", least.routes, value=total,
                          bound=plan.bound or total, status=plan.status or "feasible", solutions=[least],
                         runtime_s=clock.used_s())
-    return DeterministicPlans(plan=plan, stochastic=stochastic, most=expected, least=lowest, worst=worst)
+    return DeterministicPlans(plan=plan, stochastic=stochastic, most=expected, least=lowest, worst=worst,
+                              proved=in_all == "optimal")
 
 
 def wait_and_see(

@@ -86,6 +86,7 @@ class Planned:
         stochastic, deterministic: The plans.
         vss_range: Least and greatest modelled VSS over all deterministic plans that tie, under ``mission``.
         worst: The deterministic plan that ties and has that greatest VSS; ``None`` where no tie makes a difference.
+        ties_proved: Whether the choice of the deterministic plan among those that tie, and that range, are proved.
         ws: Wait-and-see value under ``mission``; ``None`` if it wasn't computed.
         evpi: Expected value of perfect information.
         value_of_process: Greatest value under another failure process, the one executed if it is another, less that of
@@ -100,6 +101,7 @@ class Planned:
     deterministic: Plan
     vss_range: tuple[float, float]
     worst: Plan | None
+    ties_proved: bool
     ws: float | None
     evpi: float | None
     value_of_process: float | None
@@ -155,7 +157,7 @@ def plan_scenarios(
             pair = replace(pair, stochastic=by_process.stochastic[world.plan_failure])
         planned[scenario.name] = Planned(
             instance=replace(instance, failure=world.plan_failure), stochastic=pair.stochastic, deterministic=pair.plan,
-            vss_range=(rp - pair.most, rp - pair.least), worst=pair.worst,
+            vss_range=(rp - pair.most, rp - pair.least), worst=pair.worst, ties_proved=pair.proved,
             ws=None if foresight is None else max(foresight, rp),
             evpi=None if foresight is None else max(foresight - rp, 0.0), value_of_process=process,
             informed=plan_informed(instance, options.limits, known, force=options.evpi) if options.informed else None,

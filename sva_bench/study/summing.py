@@ -78,9 +78,9 @@ def facts_of(world: World, scenario: Scenario, plans: Planned) -> ScenarioFacts:
 
 
 def proved(planned: Mapping[str, Planned]) -> bool:
-    """Whether all plans are proved optimal."""
+    """Whether all plans are proved optimal, and choices among deterministic plans that tie too."""
     return all(plan.status == "optimal" for p in planned.values() for plan in p.all_plans()) and all(
-        p.calibrated is None or p.calibrated.proved for p in planned.values())
+        p.ties_proved and (p.calibrated is None or p.calibrated.proved) for p in planned.values())
 
 
 def head_of(world: World, settings: Settings, costs: Mapping[str, FuelCosts], *, reproducible: bool) -> Head:

@@ -88,6 +88,7 @@ def test_an_instance_comes_back_from_its_file_as_it_was(tmp_path: Path, shared: 
     (lambda d: d["vehicles"].append(d["vehicles"][0]), "vehicles[1]", "is a duplicate"),
     (lambda d: d["vehicles"][0].update(availability=1.5), "vehicles[0].availability", "1"),
     (lambda d: d["vehicles"][0].pop("availability"), "vehicles[0]", "'availability' is missing"),
+    (lambda d: d["vehicles"][0].update(availability=None), "vehicles[0].availability", "a probability, found null"),
     (lambda d: d["vehicles"][0].update(mtbf_s=-1), "vehicles[0].mtbf_s", "at least 0"),
     (lambda d: d["vehicles"][0].update(loss_cost=-1), "vehicles[0].loss_cost", "at least 0"),
     (lambda d: (d.update(failure="hazard"), d["vehicles"][0].update(availability=0.5, mission_limit_s=None)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -50,9 +51,17 @@ def test_failures_along_the_route_go_to_the_methods_that_serve_them(
             plan_stochastic(instance, method=method)
 
 
-def test_the_edge_model_refuses_robots_that_refuel() -> None:
-    with pytest.raises(BadInput, match=r"the method undirected \(.*\) doesn't support it; take the method auto"):
-        plan_stochastic(REFUELLING, method="undirected")
+@pytest.mark.parametrize("method", ["undirected", "edge-mip"])
+@pytest.mark.parametrize(("instance", "why"), [
+    (REFUELLING, "fuel may run short, or a vehicle refuel"),
+    (random_instance("A", pois=5, vehicles=2, availability=0.5, seed=0, directed=True), "time than the way back"),
+    (replace(OPEN_FIELD, vehicles=tuple(replace(v, mission_limit_s=math.inf) for v in OPEN_FIELD.vehicles)),
+     "a vehicle has no mission limit")], ids=["refuelling", "directed", "no limit"])
+def test_the_edge_model_refuses_what_it_does_not_serve_and_says_why(
+    method: Method, instance: Instance, why: str,
+) -> None:
+    with pytest.raises(BadInput, match=rf"the method {method} \(.*\) doesn't support it, for .*{why}; take the "):
+        plan_stochastic(instance, method=method)
 
 
 @pytest.mark.parametrize("instance", [OPEN_FIELD, REFUELLING, replace(OPEN_FIELD, failure="per_leg")],

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from sva_bench.generate.instances import random_instance
-from sva_bench.solver.two_stage import SolveLimits
+from sva_bench.solver.two_stage import SolveLimits, plan_deterministic, plan_nominal, plan_stochastic
 from sva_bench.study.one_plan import make_plan
 from sva_bench.study.plan_request import PlanRequest
 
@@ -26,3 +26,12 @@ def test_the_time_limit_is_for_all_solves_of_a_deterministic_plan() -> None:
     assert plan.status == "time_limit"
     assert took_s < 1.7 * limit_s  # each solve had the limit to itself: twice as long
     assert plan.runtime_s == pytest.approx(took_s, abs=0.1)
+
+
+def test_a_sum_that_is_proved_is_optimal_though_ties_are_open() -> None:
+    instance = random_instance("A", pois=12, vehicles=2, availability=0.75, seed=0)
+    stochastic, nominal = plan_stochastic(instance), plan_nominal(instance)
+    proved = plan_deterministic(instance, stochastic, nominal=nominal)
+    assert (proved.plan.status, proved.proved) == ("optimal", True)
+    cut_off = plan_deterministic(instance, stochastic, SolveLimits(time_limit_s=0.0), nominal=nominal)
+    assert (cut_off.plan.status, cut_off.proved) == ("optimal", False)

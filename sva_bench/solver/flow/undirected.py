@@ -147,11 +147,21 @@ class UndirectedModel:
 
 def serves(instance: Instance, scopes: Sequence[Scope]) -> bool:
     """Whether times are symmetric for all vehicles and none can refuel: what the edge model requires."""
+    return not lacking(instance, scopes)
+
+
+def lacking(instance: Instance, scopes: Sequence[Scope]) -> str:
+    """What the edge model requires and an instance lacks; nothing where it serves."""
     stations = list(instance.stations)
-    return all(
-        np.isfinite(scope.limit_s) and not np.isfinite(scope.capacity_s) and not scope.legs[stations].any()
-        and np.array_equal(scope.legs, scope.legs.T)
-        and np.array_equal(scope.leg_time_s[scope.legs], scope.leg_time_s.T[scope.legs]) for scope in scopes)
+    for scope in scopes:
+        if not np.isfinite(scope.limit_s):
+            return "a vehicle has no mission limit"
+        if np.isfinite(scope.capacity_s) or scope.legs[stations].any():
+            return "fuel may run short, or a vehicle refuel"
+        if not (np.array_equal(scope.legs, scope.legs.T)
+                and np.array_equal(scope.leg_time_s[scope.legs], scope.leg_time_s.T[scope.legs])):
+            return "a leg takes another time than the way back"
+    return ""
 
 
 def _positive(columns: IntArray) -> IntArray:
