@@ -1,4 +1,4 @@
-"""Times code in seconds of an idle machine of the usual speed, whatever else this one does meanwhile."""
+"""Times code by processor time, less what slows this machine beside one on which known work takes its usual time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 _USUAL_S = 0.03
-"""What ``_work`` takes on the machine that figures in the documentation were measured on [s]."""
+"""What ``_work`` took on an idle machine of two cores that share much [s]."""
 
 
 def idle_seconds(call: Callable[[], object], repeats: int = 3) -> float:

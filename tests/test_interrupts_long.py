@@ -174,10 +174,10 @@ class Undisturbed:
     seconds: float
 
 
-def undisturbed(command: Command, folder: Path, *, warm: bool) -> Undisturbed:
-    """What the command writes when it is left alone, and how long it takes: warm, when all is compiled already."""
+def undisturbed(command: Command, folder: Path) -> Undisturbed:
+    """What the command writes when it is left alone, and how long it takes the second time, when all is compiled."""
     prepared(folder)
-    for _ in range(1 + warm):
+    for _ in range(2):
         again(folder)
         before = time.monotonic()
         process = start(command, folder)
@@ -186,21 +186,21 @@ def undisturbed(command: Command, folder: Path, *, warm: bool) -> Undisturbed:
     return Undisturbed(folder=folder, seconds=time.monotonic() - before)
 
 
-def moments(draw: random.Random, count: int, whole_s: float) -> list[float]:
-    soon = max(1, count // 4)
-    return [draw.uniform(0, SOON_S) for _ in range(soon)] + [draw.uniform(0, whole_s) for _ in range(count - soon)]
+def moments(draw: random.Random, whole_s: float) -> list[float]:
+    soon = MOMENTS // 4
+    return [draw.uniform(0, SOON_S) for _ in range(soon)] + [draw.uniform(0, whole_s) for _ in range(MOMENTS - soon)]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "count"), [(name, MOMENTS) for name in COMMANDS])
+@pytest.mark.parametrize("name", COMMANDS)
 def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
-    name: str, count: int, tmp_path: Path
+    name: str, tmp_path: Path
 ) -> None:
     command, draw = COMMANDS[name], random.Random(f"ctrl-c {name}")
-    alone = undisturbed(command, tmp_path / "alone", warm=count == MOMENTS)
+    alone = undisturbed(command, tmp_path / "alone")
     folder = prepared(tmp_path / "disturbed")
     there = False  # whether there is a result that must not be lost
-    for number, moment in enumerate(moments(draw, count, alone.seconds)):
+    for number, moment in enumerate(moments(draw, alone.seconds)):
         process = start(command, folder)
         await_moment(process, moment)
         began = listening(process.pid)
@@ -227,14 +227,14 @@ def test_ctrl_c_at_any_moment_ends_with_130_and_leaves_nothing_half_written(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "count"), [(name, MOMENTS) for name in COMMANDS])
+@pytest.mark.parametrize("name", COMMANDS)
 def test_a_kill_at_any_moment_leaves_a_complete_result_or_none_and_no_lock(
-    name: str, count: int, tmp_path: Path
+    name: str, tmp_path: Path
 ) -> None:
     command, draw = COMMANDS[name], random.Random(f"kill {name}")
-    alone = undisturbed(command, tmp_path / "alone", warm=count == MOMENTS)
+    alone = undisturbed(command, tmp_path / "alone")
     folder = prepared(tmp_path / "disturbed")
-    for number, moment in enumerate(moments(draw, count, alone.seconds)):
+    for number, moment in enumerate(moments(draw, alone.seconds)):
         process = start(command, folder)
         await_moment(process, moment)
         os.kill(process.pid, signal.SIGKILL)  # not by Popen, which would look whether it has ended, and wait for it

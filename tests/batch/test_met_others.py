@@ -63,7 +63,6 @@ def shard(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Unit]:
                       reactions=())
 
 
-@pytest.mark.long
 def test_a_shard_keeps_them_and_the_results_of_its_unit_say_them(shard: tuple[Path, Unit]) -> None:
     note = read_note(*shard)
     for facts in note.facts.scenarios:

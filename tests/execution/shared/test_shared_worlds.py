@@ -61,5 +61,5 @@ def test_four_robots_of_five_minutes_are_planned_in_a_fraction_of_a_second() -> 
     order = plan_order(crowd, gap_of(world))  # compiled
     assert order is not None
     assert order.ends_s.min() > 250
-    # 0.2 s where it was written, 0.4 s on a machine whose cores share more.
+    # Below 0.3 s where it was written; 0.4 s on a machine whose cores share more.
     assert idle_seconds(lambda: plan_order(crowd, gap_of(world))) < 0.8
