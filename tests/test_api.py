@@ -506,6 +506,7 @@ def test_a_script_without_a_guard_of_its_main_module_has_workers(small: Path, tm
     assert len(done.stdout.splitlines()) == 2
 
 
+@pytest.mark.long
 def test_an_interactive_session_has_workers(small: Path, tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-i", "-", small], input=SCRIPT, capture_output=True, text=True,
                           timeout=300, cwd=tmp_path, check=False)

@@ -17,7 +17,7 @@ from sva_bench.mission.certify import certify
 from sva_bench.mission.instance_file import read_instance
 from sva_bench.mission.plan_file import read_plan
 from sva_bench.solver.risk import RiskMeasure
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.solver.oracle import risk_optimum
 
 CASES = Path(__file__).parents[1] / "../shared/cases"

@@ -128,7 +128,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sva_bench.report.charts.legs_driven", lambda *_: "")
 
 
-COUNTS = [30, pytest.param(3000, marks=pytest.mark.long)]
+COUNTS = [12, pytest.param(3000, marks=pytest.mark.long)]
 
 
 @pytest.mark.parametrize("count", COUNTS)
@@ -146,7 +146,7 @@ def test_a_run_folder_with_anything_anywhere_gives_its_report_or_one_error(
         tried(folder, name, at, value, work, ["report", str(work)], capsys)
 
 
-@pytest.mark.parametrize("count", [25, pytest.param(1500, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [8, pytest.param(1500, marks=pytest.mark.long)])
 def test_charts_hold_with_every_figure_that_a_summary_may_have(
     count: int, folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -248,7 +248,7 @@ def test_outcomes_of_runs_and_batches_have_the_same_columns_types_and_units(fold
 
 
 @pytest.mark.parametrize("table", ["outcomes", "legs", "paths"])
-@pytest.mark.parametrize("count", [40, pytest.param(10_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [12, pytest.param(10_000, marks=pytest.mark.long)])
 @pytest.mark.usefixtures("undrawn")
 def test_a_run_folder_with_any_column_spoilt_gives_its_report_or_one_error(
     table: str, count: int, folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -266,7 +266,7 @@ def test_a_run_folder_with_any_column_spoilt_gives_its_report_or_one_error(
     assert refused > 0.7 * min(count, 80)
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(10_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [8, pytest.param(10_000, marks=pytest.mark.long)])
 def test_a_batch_folder_with_any_column_spoilt_gives_its_status_or_one_error(
     count: int, folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

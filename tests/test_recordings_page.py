@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from rerun.chunk import RrdReader
 
 from sva_bench.choices import RobotState
+from tests.commands_for_tests import sva_bench
 from tests.worlds_for_tests import SMALL
 
 PAGE = (Path(__file__).parents[1] / "docs" / "recordings.md").read_text(encoding="utf-8")
-
-
-def sva_bench(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "sva_bench", *arguments], cwd=cwd, capture_output=True, text=True,
-                          check=False)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +51,8 @@ def test_the_entities_that_are_listed_are_there_and_no_others(run: Path) -> None
 
 
 @pytest.mark.parametrize("command", [
-    pytest.param(command, marks=[pytest.mark.long] * command.endswith(".mp4")) for command in re.findall(
+    pytest.param(command, marks=[pytest.mark.long] * any(
+        slow in command for slow in (".mp4", ".gif", "--screenshot", "--trial median"))) for command in re.findall(
         r"^\$ sva-bench ((?:view|replay|export) .*?)(?: +#.*)?$", PAGE, re.MULTILINE)])
 def test_its_commands_are_understood(command: str, run: Path, tmp_path: Path) -> None:
     here = {"S3": "half", "runs/recorded/four-rooms-*": str(run)}

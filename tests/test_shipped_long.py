@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from sva_bench.world.load import load_world
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.test_shipped import OF_THE_TUTORIAL
 
 WORLDS = sorted(path for path in (Path(__file__).parents[1] / "worlds").glob("*.yaml") if path.stem != OF_THE_TUTORIAL)

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 
 ROOT = Path(__file__).parents[1]
 STORED = json.loads((ROOT / "tests" / "stored" / "kinematic.json").read_text(encoding="utf-8"))

@@ -13,8 +13,9 @@ import numpy as np
 from sva_bench.analysis.calibration_table import CALIBRATION_COLUMNS, calibration_rows
 from sva_bench.analysis.compared_values import other_settings, shown_value, variant_of
 from sva_bench.analysis.over_maps import BatchSummary
-from sva_bench.analysis.statistics import sample_mean
+from sva_bench.analysis.results import Estimate
 from sva_bench.batch.folder import write
+from sva_bench.batch.map_samples import over_maps
 from sva_bench.batch.reactions_over_maps import vss_of
 
 GainT = TypeVar("GainT")
@@ -47,7 +48,7 @@ def write_tables(folder: Path, summary: BatchSummary) -> None:
     keys, means = _keys_of(summary), _means_of(summary)
     settings = summary.settings
     maps = [[row.world, row.variant, row.scenario, row.seeds, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct,
-             *means[row.variant, row.scenario][row.world], *_values(settings.get(row.variant, {}), keys)]
+             *_plain(means[row.variant, row.scenario][row.world]), *_values(settings.get(row.variant, {}), keys)]
             for row in summary.maps]
     over = [[row.variant, row.scenario, row.maps, row.vss.mean, *_ends(row.vss.ci95), row.vss_pct.mean,
              *_ends(row.vss_pct.ci95), *_over(means[row.variant, row.scenario].values()),
@@ -77,20 +78,29 @@ def _values(settings: Mapping[str, str], keys: Sequence[str]) -> list[str]:
     return [shown_value(settings[key]) if key in settings else "" for key in keys]
 
 
-def _means_of(summary: BatchSummary) -> dict[tuple[str, str], dict[str, tuple[float, float]]]:
-    """What the two plans collected on each map, on average over its seeds, by variant and scenario."""
-    seeds: dict[tuple[str, str], dict[str, list[tuple[float, float]]]] = {}
+_Means = list[tuple[Estimate, Estimate]]
+"""What the stochastic and the deterministic plan collected on a map, seed by seed."""
+
+
+def _means_of(summary: BatchSummary) -> dict[tuple[str, str], dict[str, _Means]]:
+    """What the two plans collected on each map, by variant and scenario."""
+    found: dict[tuple[str, str], dict[str, _Means]] = {}
     for unit in summary.units:
         for scenario in unit.scenarios:
-            seeds.setdefault((unit.variant, scenario.name), {}).setdefault(unit.world, []).append(
-                (scenario.stochastic.executed.mean, scenario.deterministic.executed.mean))
-    return {key: {world: (float(np.mean([s for s, _ in pairs])), float(np.mean([d for _, d in pairs])))
-                  for world, pairs in by_map.items()} for key, by_map in seeds.items()}
+            found.setdefault((unit.variant, scenario.name), {}).setdefault(unit.world, []).append(
+                (scenario.stochastic.executed, scenario.deterministic.executed))
+    return found
 
 
-def _over(means: Iterable[tuple[float, float]]) -> list[float | None]:
+def _plain(means: _Means) -> list[float]:
+    """Each plan's mean over seeds."""
+    return [float(np.mean([each.mean for each in plan])) for plan in zip(*means, strict=True)]
+
+
+def _over(means: Iterable[_Means]) -> list[float | None]:
     """The mean over maps of what each plan collected, with its interval."""
-    return [cell for column in zip(*means, strict=True) for found in [sample_mean(column)]
+    maps = [tuple(zip(*seeds, strict=True)) for seeds in means]
+    return [cell for plan in zip(*maps, strict=True) for found in [over_maps(plan, sure=False)]
             for cell in (found.mean, *_ends(found.ci95))]
 
 

@@ -9,13 +9,15 @@ from typing import get_args
 
 from sva_bench.analysis.reaction_results import ReactionResult
 from sva_bench.analysis.reactions import reaction_result
-from sva_bench.analysis.statistics import sample_mean
+from sva_bench.analysis.results import Estimate
+from sva_bench.batch.map_samples import percentage_over_maps
 from sva_bench.choices import NEWS, FailureProcess, News
 from sva_bench.execution.case import Case, Settings
 from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import with_interval
+from sva_bench.report.reaction_shares import in_per_cent, recourse_pct, vss_pct
+from sva_bench.report.wording import percentage, with_interval
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import own_cases, plan_scenarios
@@ -82,7 +84,12 @@ def _with_availabilities(world: World) -> World:
         for p in AVAILABILITIES))
 
 
-_Figure = Callable[[ReactionResult], float | None]
+_Figure = Callable[[ReactionResult], Estimate | None]
+
+
+def _of_best(result: ReactionResult, gain: Estimate) -> Estimate | None:
+    """A difference in per cent of the best plan's value."""
+    return in_per_cent(gain, result.plans[result.best.plan].executed.mean)
 
 
 def reaction_page(rows: Sequence[ReactedWorld], settings: Settings) -> str:
@@ -98,22 +105,22 @@ def reaction_page(rows: Sequence[ReactedWorld], settings: Settings) -> str:
         _meaning(rows), "",
         "## VSS against news", "",
         "How much more the stochastic plan is worth than the deterministic one under the same reaction, in per cent of "
-        "the stochastic plan: the mean over worlds, and its 95 % interval with the worlds as the sample. `never` is "
-        "without reaction.", "",
-        *_table(rows, lambda result: result.vss.executed_pct), "",
+        "the stochastic plan: the mean over worlds, and its 95 % interval with the worlds as the sample, which allows "
+        "for the noise draws that all worlds share. `never` is without reaction.", "",
+        *_table(rows, vss_pct), "",
         "## What reacting adds", "",
         "Value of recourse: what the same plan is worth more if the team reacts, in per cent of its value if nobody "
         "does.", "",
         "Deterministic plan:", "",
-        *_table(rows, lambda result: result.value_of_recourse["deterministic"].pct), "",
+        *_table(rows, lambda result: recourse_pct(result, "deterministic")), "",
         "Stochastic plan:", "",
-        *_table(rows, lambda result: result.value_of_recourse["stochastic"].pct), "",
+        *_table(rows, lambda result: recourse_pct(result, "stochastic")), "",
         "## The best plan for the reaction", "",
         "VSS with recourse: the best plan for the reaction less the deterministic one, in per cent of the best. It is "
         "one of the stochastic, the deterministic and the anticipative plan, which is chosen by simulating it.", "",
-        *_table(rows, lambda result: result.vss_with_recourse.pct), "",
+        *_table(rows, lambda result: _of_best(result, result.vss_with_recourse)), "",
         "Anticipation: the best plan less the stochastic one.", "",
-        *_table(rows, lambda result: result.anticipation.pct), "",
+        *_table(rows, lambda result: _of_best(result, result.anticipation)), "",
         "## World by world", "",
         "VSS in per cent by news, with the 95 % interval over noise draws (failures are enumerated, so they add no "
         "sampling error).", "",
@@ -151,13 +158,13 @@ def _meaning(rows: Sequence[ReactedWorld]) -> str:
     """What is left of the value of planning for failures, at the least availability."""
     least = min(row.availability for row in rows)
 
-    def mean(process: FailureProcess, news: News, figure: _Figure = lambda result: result.vss.executed_pct) -> str:
+    def mean(process: FailureProcess, news: News, figure: _Figure = vss_pct) -> str:
         found = [figure(row.by_news[news]) for row in rows
                  if (row.process, row.availability) == (process, least) and news in row.by_news]
         return f"{_mean(found)} %"
 
     missed, known = mean("mission", "report"), mean("mission", "instant")
-    best = mean("mission", "report", lambda result: result.vss_with_recourse.pct)
+    best = mean("mission", "report", lambda result: _of_best(result, result.vss_with_recourse))
     return (
         "The paper plans for failures because a vehicle that fails takes its incentives along; its introduction speaks "
         "of recourse, and its model has none in flight. Without a reaction the hedge is worth "
@@ -182,9 +189,8 @@ def _table(rows: Sequence[ReactedWorld], figure: _Figure) -> list[str]:
     return lines
 
 
-def _mean(shares: Sequence[float | None]) -> str:
-    known = [share for share in shares if share is not None]
-    return with_interval(sample_mean(known)) if known else ""
+def _mean(shares: Sequence[Estimate | None]) -> str:
+    return percentage(percentage_over_maps([[share] for share in shares], sure=False))
 
 
 def _by_world(rows: Sequence[ReactedWorld]) -> list[str]:
@@ -192,7 +198,7 @@ def _by_world(rows: Sequence[ReactedWorld]) -> list[str]:
     lines = [f"| world | process | availability | {' | '.join(heard)} | best plan on report | anticipation on report |",
              f"| --- | --- | ---: |{' ---: |' * len(heard)} --- | ---: |"]
     for row in rows:
-        cells = [_in_per_cent(row.by_news[news]) if news in row.by_news else "" for news in heard]
+        cells = [_vss(row.by_news[news]) if news in row.by_news else "" for news in heard]
         report = row.by_news["report"]
         share = "" if report.anticipation.pct is None else f"{report.anticipation.pct:.1f}"
         lines.append(f"| {row.world} | {row.process} | {100 * row.availability:.0f} % | {' | '.join(cells)} | "
@@ -200,14 +206,7 @@ def _by_world(rows: Sequence[ReactedWorld]) -> list[str]:
     return lines
 
 
-def _in_per_cent(result: ReactionResult) -> str:
+def _vss(result: ReactionResult) -> str:
     """The VSS in per cent of the stochastic plan's mean, with its interval."""
-    whole, vss = result.plans["stochastic"].executed.mean, result.vss
-    if vss.same_plan:
-        return "the same plan"
-    if whole == 0 or vss.executed_pct is None:
-        return ""
-    if vss.executed.ci95 is None:
-        return f"{vss.executed_pct:.1f}"
-    low, high = (100 * end / whole for end in vss.executed.ci95)
-    return f"{vss.executed_pct:.1f} [{low:.1f}, {high:.1f}]"
+    share = vss_pct(result)
+    return "the same plan" if result.vss.same_plan else "" if share is None else with_interval(share)

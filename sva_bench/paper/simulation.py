@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from sva_bench.analysis.figures import difference_figure
 from sva_bench.analysis.over_trials import totals
 from sva_bench.analysis.results import Estimate
-from sva_bench.analysis.statistics import estimate, sample_mean
+from sva_bench.analysis.statistics import estimate
+from sva_bench.batch.map_samples import in_per_cent, percentage_over_maps
 from sva_bench.choices import FailureProcess
 from sva_bench.errors import BadInput
 from sva_bench.execution.case import Settings
@@ -17,7 +18,7 @@ from sva_bench.execution.drives import Drives
 from sva_bench.execution.execute import execute
 from sva_bench.execution.executed import Executed
 from sva_bench.files.printable import counted
-from sva_bench.report.wording import verdict, with_interval
+from sva_bench.report.wording import percentage, verdict
 from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import own_cases, plan_scenarios
@@ -103,10 +104,11 @@ def simulation_page(rows: Sequence[SimulatedScenario], settings: Settings) -> st
              "Plans are made for `mission` failures. The paper executes them under `per_leg` failures; beside it they "
              "are executed under those they were made for.", "",
              "## Over maps", "",
+             "The 95 % intervals take the maps as the sample, and allow for the draws that all maps share.", "",
              "| scenario | VSS % per_leg, mean over maps | VSS % mission, mean over maps | the paper |",
              "| --- | ---: | ---: | --- |"]
     for scenario in scenarios:
-        cells = [_over_maps([row.under[process].vss_pct for row in rows if row.scenario == scenario])
+        cells = [_over_maps([row.under[process] for row in rows if row.scenario == scenario])
                  for process in _PROCESSES]
         lines.append(f"| {scenario} | {cells[0]} | {cells[1]} | {_PAPER_VSS.get(scenario, '')} |")
     titles: dict[FailureProcess, str] = {"per_leg": "Executed under per_leg, as in the paper",
@@ -131,6 +133,6 @@ def simulation_page(rows: Sequence[SimulatedScenario], settings: Settings) -> st
     return "\n".join(lines)
 
 
-def _over_maps(shares: Sequence[float | None]) -> str:
-    known = [share for share in shares if share is not None]
-    return with_interval(sample_mean(known)) if known else ""
+def _over_maps(found: Sequence[Simulated]) -> str:
+    return percentage(percentage_over_maps([[in_per_cent(each.vss, each.vss_pct, each.stochastic)] for each in found],
+                                           sure=False))

@@ -13,7 +13,7 @@ from sva_bench.analysis.moments import Figure, figure_of
 from sva_bench.analysis.precision import Precision, half_width_pct, precision_of
 from sva_bench.analysis.statistics import estimate
 from sva_bench.errors import BadInput
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.results_for_tests import Interval, summary
 from tests.worlds_for_tests import SMALL
 

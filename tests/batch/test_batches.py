@@ -24,7 +24,7 @@ from sva_bench.errors import BadFile, BadInput
 from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.options import Options
 from tests.batch.test_commands import rows_of
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL, world_of
 

@@ -13,7 +13,8 @@ import pytest
 from sva_bench.analysis.over_maps import Percentage
 from sva_bench.batch.aggregates import aggregate
 from sva_bench.files.records import as_dict
-from tests.cli.test_commands import sva_bench, world_file
+from tests.cli.test_commands import world_file
+from tests.commands_for_tests import sva_bench
 from tests.results_for_tests import unit
 from tests.worlds_for_tests import SMALL
 
@@ -68,7 +69,7 @@ def test_a_batch_gives_the_same_rows_on_one_worker_and_on_two_and_resumes(tmp_pa
     assert "options.trials" in differs.stderr
 
 
-@pytest.mark.parametrize("fidelity", [pytest.param("kinematic", marks=pytest.mark.long), "rollout"])
+@pytest.mark.parametrize("fidelity", ["kinematic", pytest.param("rollout", marks=pytest.mark.long)])
 def test_a_batch_has_the_rows_of_a_run_and_its_columns(tmp_path: Path, fidelity: str) -> None:
     told = (world_file(tmp_path), "--seed", 3, "--trials", 50, "--rollouts", 3, "--fidelity", fidelity)
     run = sva_bench("run", *told, "--out", "run", "--workers", 1, cwd=tmp_path)

@@ -26,11 +26,13 @@ from sva_bench.analysis.compared_values import (
     variant_of,
 )
 from sva_bench.analysis.over_maps import BatchSummary
+from sva_bench.analysis.results import Estimate
 from sva_bench.analysis.statistics import sample_mean
 from sva_bench.batch.compared import values_of
 from sva_bench.batch.folder import refuse_other_settings, settings_in
 from sva_bench.batch.grid import Grid, Point
 from sva_bench.batch.grid import grid_of as grid_from
+from sva_bench.batch.map_samples import over_maps
 from sva_bench.batch.schema import PointEntry
 from sva_bench.batch.sweep import Sweep, grid_of
 from sva_bench.files.records import as_dict, from_dict
@@ -128,6 +130,7 @@ def test_a_finished_batch_answers_without_running_anything_again(batch: Path) ->
     assert run_command_line(["report", str(batch), "--compare", KEY]) == 0
 
 
+@pytest.mark.long
 def test_a_sweep_file_compares_like_the_option_which_comes_before_it(batch: Path, tmp_path: Path) -> None:
     world(tmp_path, "one")
     (tmp_path / "sweep.yaml").write_text(
@@ -190,7 +193,7 @@ def test_over_maps_the_maps_are_the_sample_and_other_settings_stay_apart(tmp_pat
     assert run_command_line([
         "batch", *map(str, worlds), "--trials", "40", "--fidelity", "kinematic", "--scenario", "half", "--set",
         f"{KEY}=20,60", "--set", "robots.uv1.fuel_capacity_s=30,60", "--compare", KEY, "--out", str(tmp_path / "out"),
-        "--cache", str(tmp_path / "cache"), "--workers", "1", "--json"]) == 0
+        "--cache", str(tmp_path / "cache"), "--workers", "1", "--csv", "--json"]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     found = compared(tmp_path / "out")
     assert found["sample"] == "maps"
@@ -206,6 +209,20 @@ def test_over_maps_the_maps_are_the_sample_and_other_settings_stay_apart(tmp_pat
         if single.ci95 is not None and both.ci95 is not None:
             assert row["gain"]["ci95"] == pytest.approx(list(single.ci95))
             assert row["gain"]["ci95_adjusted"] == pytest.approx(list(both.ci95))
+    # The maps share their draws, which the interval of what a plan collected over them allows for.
+    own: dict[str, list[list[Estimate]]] = {unit["variant"]: [] for unit in summary["units"]}
+    for unit in summary["units"]:
+        executed = unit["scenarios"][0]["plans"]["stochastic"]["executed"]
+        own[unit["variant"]].append([Estimate(mean=executed["mean"], ci95=tuple(executed["ci95"]))])
+    with (tmp_path / "out" / "aggregate.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        whole, between = over_maps(own[row["variant"]], sure=False), sample_mean(
+            [seeds[0].mean for seeds in own[row["variant"]]])
+        ends = tuple(float(end) for end in (row["stochastic_low"], row["stochastic_high"]) if end)
+        assert ends == (whole.ci95 or ())
+        assert whole.ci95 is None or between.ci95 is None or whole.ci95[0] < between.ci95[0]
+    assert any(row["stochastic_low"] for row in rows)
 
 
 def test_an_interval_that_holds_with_others_is_wider_by_the_number_of_them() -> None:

@@ -12,7 +12,7 @@ import pytest
 from sva_bench.batch.sweep import Sweep, grid_of, varied
 from sva_bench.errors import BadInput
 from sva_bench.world.noise import REALISTIC, Noise
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.worlds_for_tests import SMALL
 
 DOOR = "passages:\n  gap: {at_m: [[3.0, 2.6], [3.0, 6.0]], blocked: 0.0, wait_s: 20}\n"

@@ -76,6 +76,7 @@ def test_a_unit_has_the_reactions_of_a_run(folder: Path) -> None:
         assert json.loads(json.dumps([as_dict(reaction) for reaction in scenario.reactions])) == own["reactions"]
 
 
+@pytest.mark.long
 def test_any_number_of_workers_and_any_interruption_give_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     done = content_of(folder / "done")
     batch(folder, *REACT, "--out", str(tmp_path / "again"), "--workers", "1", "--csv", "--cache", str(tmp_path))

@@ -17,7 +17,7 @@ from sva_bench.batch.sweep import Sweep, grid_of, planners_of, seeds_of, sweep_o
 from sva_bench.choices import INTERACTIONS, Interaction, News, PathPlanner, PolicyName
 from sva_bench.errors import BadFile, BadInput
 from sva_bench.files.records import as_dict
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.worlds_for_tests import SMALL
 
 SWEEP = """\

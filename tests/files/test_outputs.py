@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
@@ -30,17 +31,22 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
                           capture_output=True, timeout=300, check=False)
 
 
-@pytest.mark.parametrize(("line", "said"), [
+def some_of(*cases: Any, first: int) -> list[Any]:
+    """Cases of one kind, of which all but the first are for long: each loads a program of its own."""
+    return [case if k < first else pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
+            for k, case in enumerate(cases)]
+
+
+@pytest.mark.parametrize(("line", "said"), some_of(
+    ("sva-bench world schema | head -1", ""),  # more than a pipe holds
+    ("sva-bench plan tiny.json | true", "optimal"),
+    ("sva-bench instance random --pois 3 -o made.json >&- 2>&- <&-", ""),
     ("sva-bench --help | head -1", ""),
     ("sva-bench --help | true", ""),
-    ("sva-bench world schema | head -1", ""),  # more than a pipe holds
     ("sva-bench certify tiny.json plan.json | true", ""),
-    ("sva-bench plan tiny.json | true", "optimal"),
     ("sva-bench --help >&-", ""),
     ("sva-bench instance random --pois 3 -o made.json >&-", ""),
-    ("sva-bench instance random --pois 3 -o made.json 2>&-", ""),
-    ("sva-bench instance random --pois 3 -o made.json >&- 2>&- <&-", ""),
-])
+    ("sva-bench instance random --pois 3 -o made.json 2>&-", ""), first=3))
 def test_a_closed_pipe_neither_ends_the_command_nor_gives_a_message(line: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY.replace('"fuel_capacity_s": 10', '"fuel_capacity_s": 11'))
     (tmp_path / "plan.json").write_text('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}')
@@ -59,8 +65,8 @@ def test_a_run_into_a_closed_pipe_still_prints_its_folder(tmp_path: Path) -> Non
     assert "written to runs/small-seed0-" in done.stderr
 
 
-@pytest.mark.parametrize("line", ["sva-bench --help", "sva-bench world schema",
-                                  "sva-bench certify tiny.json plan.json"])
+@pytest.mark.parametrize("line", some_of("sva-bench certify tiny.json plan.json", "sva-bench --help",
+                                         "sva-bench world schema", first=1))
 def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY.replace('"fuel_capacity_s": 10', '"fuel_capacity_s": 11'))
     (tmp_path / "plan.json").write_text('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}')
@@ -70,12 +76,11 @@ def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Pat
     assert "standard output cannot be written to (No space left on device)" in done.stderr
 
 
-@pytest.mark.parametrize("line", [
-    "plan tiny.json", "plan tiny.json -o -", "times small.yaml", "instance random", "world random",
-    "world schema", "reproduce rewards", "certify tiny.json plan.json --json", "certify tiny.json plan.json",
-    "world check small.yaml", "world example --list", "batch status .", "batch small.yaml --dry-run",
-    "run small.yaml --json",
-    "batch small.yaml --json"])
+@pytest.mark.parametrize("line", some_of(
+    "plan tiny.json", "run small.yaml --json", "batch small.yaml --dry-run",
+    "plan tiny.json -o -", "times small.yaml", "instance random", "world random", "world schema", "reproduce rewards",
+    "certify tiny.json plan.json --json", "certify tiny.json plan.json", "world check small.yaml",
+    "world example --list", "batch status .", "batch small.yaml --json", first=3))
 def test_a_result_that_a_closed_output_would_lose_is_refused_before_any_work(line: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY)
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
@@ -155,7 +160,8 @@ def test_a_place_that_is_fine_is_left_as_it_was(tmp_path: Path) -> None:
         check_output(tmp_path / "loop" / "x")
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(("number", "code"), some_of(
+    (signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130), first=1))
 def test_a_terminated_run_removes_its_drafts(number: signal.Signals, code: int, tmp_path: Path) -> None:
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     process = subprocess.Popen(

@@ -13,7 +13,7 @@ from sva_bench.study.costs import plan_costs
 from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.load import load_world
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.world.maps_for_tests import SHARED, shared_map, write_ros_map
 
 ROOMS = """\

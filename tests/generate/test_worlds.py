@@ -27,7 +27,7 @@ from sva_bench.study.options import Options
 from sva_bench.study.planning import plan_scenarios
 from sva_bench.world.load import world_of
 from sva_bench.world.model import Site, World
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 
 FAMILIES: tuple[WorldFamily, ...] = get_args(WorldFamily)
 

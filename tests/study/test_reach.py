@@ -18,7 +18,8 @@ from sva_bench.study.options import Options
 from sva_bench.study.planning import check_plans
 from sva_bench.study.publish import Run
 from sva_bench.study.run import run
-from tests.cli.test_commands import sva_bench, world_file
+from tests.cli.test_commands import world_file
+from tests.commands_for_tests import sva_bench
 from tests.worlds_for_tests import SMALL, world_of
 
 QUICK = Options(trials=20, rollouts=2, fidelity="kinematic")

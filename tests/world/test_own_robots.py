@@ -23,7 +23,7 @@ from sva_bench.solver.two_stage import SolveLimits
 from sva_bench.study.options import Options
 from sva_bench.world.load import load_world, world_as_dict
 from sva_bench.world.model import World
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench
 from tests.robot.urdfs_for_tests import SAMPLE, inertial
 from tests.worlds_for_tests import SMALL, world_of
 
