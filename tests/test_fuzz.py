@@ -372,6 +372,7 @@ def test_a_spoilt_plan_is_certified_or_complained_of(folder: Path, instance: byt
     check_certificate(folder, instance, plan)
 
 
+@pytest.mark.long
 @examples(80)
 @given(instance=st.one_of(good_instances, instances), plan=plans, as_json=st.booleans())
 def test_the_command_certify_ends_in_one_of_its_codes(folder: Path, instance: bytes, plan: bytes, as_json: bool

@@ -53,6 +53,7 @@ def test_a_unit_has_the_calibrated_plan_of_a_run(folder: Path) -> None:
         assert executed == pytest.approx(alone[scenario["name"]]["plans"]["calibrated"]["executed"]["mean"])
 
 
+@pytest.mark.long
 def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     units = summary_in(folder / "done")["units"]
     assert [s["calibration"] for s in units[0]["scenarios"]] == [s["calibration"] for s in units[1]["scenarios"]]
@@ -70,6 +71,7 @@ def test_seeds_share_the_plan_and_the_cache_has_it(folder: Path, capsys: pytest.
     assert (folder / "again" / "summary.json").read_bytes() == (folder / "done" / "summary.json").read_bytes()
 
 
+@pytest.mark.long
 def test_table_and_page_show_it(folder: Path) -> None:
     with (folder / "done" / "calibration.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -78,6 +80,7 @@ def test_table_and_page_show_it(folder: Path) -> None:
     assert "Calibrated plans" in (folder / "done" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_a_sweep_file_says_it_as_the_option_does(folder: Path) -> None:
     sweep = folder / "sweep.yaml"
     lines = f"format: sva-bench/sweep@1\nworlds: [{folder / 'world.yaml'}]\n"
@@ -89,6 +92,7 @@ def test_a_sweep_file_says_it_as_the_option_does(folder: Path) -> None:
         sweep_of([sweep], Sweep())
 
 
+@pytest.mark.long
 def test_an_option_that_is_no_share_ends_with_2(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for command in ("run", "batch"):
         assert run_command_line([command, str(folder / "world.yaml"), "--calibrate", "1"]) == 2

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench_alone
 from tests.worlds_for_tests import SMALL
 
 
@@ -23,9 +23,9 @@ def test_estimates_are_near_what_a_batch_takes_with_caches_cold_and_warm(tmp_pat
     batch = ("batch", "w.yaml", "--trials", 500, "--seed", "0-1", "--set", "robots.uv2.fuel_capacity_s=40,60",
              "--cache", "cache")
     for folder in ("cold", "warm"):
-        told = sva_bench(*batch, "--dry-run", "--json", cwd=tmp_path)
+        told = sva_bench_alone(*batch, "--dry-run", "--json", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         before = processor_s()
-        assert sva_bench(*batch, "--out", folder, "--workers", 1, "--json", cwd=tmp_path).returncode == 0
+        assert sva_bench_alone(*batch, "--out", folder, "--workers", 1, "--json", cwd=tmp_path).returncode == 0
         taken = processor_s() - before
         assert taken / 3 <= json.loads(told.stdout)["processor_s"] <= 3 * taken, folder

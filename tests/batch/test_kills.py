@@ -17,7 +17,7 @@ import pytest
 
 from tests.batch.test_batches import posted, started, wait_for
 from tests.batch.test_commands import rows_of
-from tests.cli.test_commands import sva_bench
+from tests.commands_for_tests import sva_bench_alone
 
 TRIALS = ("--trials", 1200, "--unit-trials", 10, "--rollouts", 2, "--fidelity", "kinematic")
 UNITS = 2 * 120
@@ -29,8 +29,8 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pa.Tabl
     folder = tmp_path_factory.mktemp("kills")
     for name in ("small", "other"):
         posted(folder, name, 1)
-    done = sva_bench("batch", "small.yaml", "other.yaml", *TRIALS, "--unit-trials", 1200, "--workers", 1, "--cache",
-                     "cache", "--out", "whole", cwd=folder)
+    done = sva_bench_alone("batch", "small.yaml", "other.yaml", *TRIALS, "--unit-trials", 1200, "--workers", 1,
+                           "--cache", "cache", "--out", "whole", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, rows_of(folder / "whole")
 
@@ -155,7 +155,7 @@ def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(
 @pytest.mark.long  # it waits for one
 def test_a_missing_dask_scheduler_is_an_error(tmp_path: Path) -> None:
     world = posted(tmp_path, "small", 1)
-    done = sva_bench("batch", world, *TRIALS, "--dask", "tcp://127.0.0.1:9", "--out", "out", "--cache", "cache",
+    done = sva_bench_alone("batch", world, *TRIALS, "--dask", "tcp://127.0.0.1:9", "--out", "out", "--cache", "cache",
                      cwd=tmp_path)
     assert done.returncode == 2
     assert "no Dask scheduler answers there" in done.stderr

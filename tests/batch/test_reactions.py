@@ -210,6 +210,7 @@ def test_how_a_world_reacts_is_varied_as_any_key(folder: Path, tmp_path: Path) -
     assert reacts["scenarios"] == still["scenarios"]
 
 
+@pytest.mark.long
 def test_a_sweep_file_names_reactions_as_options_do(folder: Path, tmp_path: Path) -> None:
     sweep = tmp_path / "sweep.yaml"
     sweep.write_text(f"format: sva-bench/sweep@1\nworlds: [{folder}/one.yaml, {folder}/two.yaml]\ntrials: 30\n"

@@ -18,15 +18,10 @@ import pytest
 from sva_bench.__main__ import run_command_line
 from sva_bench.cli.terminal import set_up_logging
 from sva_bench.study import costs
+from tests.commands_for_tests import sva_bench, sva_bench_alone
 from tests.worlds_for_tests import SMALL
 
 QUIET = SMALL.replace("wheel_gain_sd: 0.01", "wheel_gain_sd: 0.0")
-
-
-def sva_bench(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run a command in a process of its own."""
-    return subprocess.run([sys.executable, "-m", "sva_bench", *map(str, arguments)], cwd=cwd, text=True,
-                          capture_output=True, timeout=300, check=False)
 
 
 def world_file(folder: Path, text: str = SMALL) -> Path:
@@ -39,7 +34,7 @@ def world_file(folder: Path, text: str = SMALL) -> Path:
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """The folder and the printed summary of one run in physics."""
     folder = tmp_path_factory.mktemp("run")
-    done = sva_bench("run", world_file(folder), "--trials", 40, "--rollouts", 2, "--json", cwd=folder)
+    done = sva_bench_alone("run", world_file(folder), "--trials", 40, "--rollouts", 2, "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     (run,) = (folder / "runs").iterdir()
     return run, json.loads(done.stdout)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
 
+from tests.commands_for_tests import sva_bench
 from tests.worlds_for_tests import SMALL
 
 
 def expect(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "sva_bench", "expect", *map(str, arguments)], text=True,
-                          capture_output=True, check=False)
+    return sva_bench("expect", *arguments, cwd=Path.cwd())
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +23,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("run")
     (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
     for command in (["run", "small.yaml"], ["batch", "small.yaml", "--out", "b"]):
-        done = subprocess.run([sys.executable, "-m", "sva_bench", *command, "--trials", "20", "--rollouts", "1",
-                               "--fidelity", "kinematic", "--workers", "1"], cwd=folder, capture_output=True, text=True,
-                              check=False)
+        done = sva_bench(*command, "--trials", 20, "--rollouts", 1, "--fidelity", "kinematic", "--workers", 1,
+                         cwd=folder)
         assert done.returncode == 0, done.stderr
     (run,) = (folder / "runs").iterdir()
     return run, folder / "b"
@@ -53,6 +51,7 @@ def test_a_batch_is_judged_by_its_figures_over_maps(folders: tuple[Path, Path]) 
     assert json.loads(done.stdout)["met"]
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(("arguments", "said"), [
     (["half.vss.executed.mea > 0"], "did you mean 'mean'?"),
     (["half.vss"], "expected PATH OPERATOR VALUE"),

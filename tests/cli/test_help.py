@@ -133,6 +133,7 @@ def least_s(*words: str) -> float:
     return min(times)
 
 
+@pytest.mark.long
 def test_help_takes_at_most_three_times_that_of_the_library_that_prints_it() -> None:
     assert least_s("-m", "sva_bench", "batch", "--help") < 3 * least_s("-m", "typer", "--help")  # 2.3 measured
 

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from PIL import Image
@@ -17,7 +16,8 @@ from PIL import Image
 from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
 from sva_bench.files.outputs import check_folder, check_output
-from tests.cli.test_commands import TINY, sva_bench
+from tests.cli.test_commands import TINY
+from tests.commands_for_tests import sva_bench
 from tests.world.test_map_worlds import two_rooms
 from tests.worlds_for_tests import SMALL
 
@@ -31,13 +31,8 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
                           capture_output=True, timeout=300, check=False)
 
 
-def some_of(*cases: Any, first: int) -> list[Any]:
-    """Cases of one kind, of which all but the first are for long: each loads a program of its own."""
-    return [case if k < first else pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
-            for k, case in enumerate(cases)]
-
-
-@pytest.mark.parametrize(("line", "said"), some_of(
+@pytest.mark.first(3)
+@pytest.mark.parametrize(("line", "said"), [
     ("sva-bench world schema | head -1", ""),  # more than a pipe holds
     ("sva-bench plan tiny.json | true", "optimal"),
     ("sva-bench instance random --pois 3 -o made.json >&- 2>&- <&-", ""),
@@ -46,7 +41,7 @@ def some_of(*cases: Any, first: int) -> list[Any]:
     ("sva-bench certify tiny.json plan.json | true", ""),
     ("sva-bench --help >&-", ""),
     ("sva-bench instance random --pois 3 -o made.json >&-", ""),
-    ("sva-bench instance random --pois 3 -o made.json 2>&-", ""), first=3))
+    ("sva-bench instance random --pois 3 -o made.json 2>&-", "")])
 def test_a_closed_pipe_neither_ends_the_command_nor_gives_a_message(line: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY.replace('"fuel_capacity_s": 10', '"fuel_capacity_s": 11'))
     (tmp_path / "plan.json").write_text('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}')
@@ -58,6 +53,7 @@ def test_a_closed_pipe_neither_ends_the_command_nor_gives_a_message(line: str, s
         assert json.loads((tmp_path / "made.json").read_text())["format"] == "sva-bench/instance@1"
 
 
+@pytest.mark.long
 def test_a_run_into_a_closed_pipe_still_prints_its_folder(tmp_path: Path) -> None:
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     done = shell("sva-bench run small.yaml --trials 5 --fidelity kinematic --workers 1 | true", tmp_path)
@@ -65,8 +61,9 @@ def test_a_run_into_a_closed_pipe_still_prints_its_folder(tmp_path: Path) -> Non
     assert "written to runs/small-seed0-" in done.stderr
 
 
-@pytest.mark.parametrize("line", some_of("sva-bench certify tiny.json plan.json", "sva-bench --help",
-                                         "sva-bench world schema", first=1))
+@pytest.mark.first(1)
+@pytest.mark.parametrize("line", ["sva-bench certify tiny.json plan.json", "sva-bench --help",
+                                         "sva-bench world schema"])
 def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY.replace('"fuel_capacity_s": 10', '"fuel_capacity_s": 11'))
     (tmp_path / "plan.json").write_text('{"format": "sva-bench/plan@1", "routes": {"uv1": ["base", "p1", "base"]}}')
@@ -76,11 +73,12 @@ def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Pat
     assert "standard output cannot be written to (No space left on device)" in done.stderr
 
 
-@pytest.mark.parametrize("line", some_of(
+@pytest.mark.first(3)
+@pytest.mark.parametrize("line", [
     "plan tiny.json", "run small.yaml --json", "batch small.yaml --dry-run",
     "plan tiny.json -o -", "times small.yaml", "instance random", "world random", "world schema", "reproduce rewards",
     "certify tiny.json plan.json --json", "certify tiny.json plan.json", "world check small.yaml",
-    "world example --list", "batch status .", "batch small.yaml --json", first=3))
+    "world example --list", "batch status .", "batch small.yaml --json"])
 def test_a_result_that_a_closed_output_would_lose_is_refused_before_any_work(line: str, tmp_path: Path) -> None:
     (tmp_path / "tiny.json").write_text(TINY)
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
@@ -115,6 +113,7 @@ COMMANDS = [
 ]
 
 
+@pytest.mark.first(10)
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("place", ["/proc/x.png", "small.yaml/x.png", "missing/x.png", "folder", "/sys/x.png"])
 def test_files_that_cannot_be_written_are_refused_before_any_work(
@@ -160,8 +159,9 @@ def test_a_place_that_is_fine_is_left_as_it_was(tmp_path: Path) -> None:
         check_output(tmp_path / "loop" / "x")
 
 
-@pytest.mark.parametrize(("number", "code"), some_of(
-    (signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130), first=1))
+@pytest.mark.first(1)
+@pytest.mark.parametrize(("number", "code"), [
+    (signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
 def test_a_terminated_run_removes_its_drafts(number: signal.Signals, code: int, tmp_path: Path) -> None:
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     process = subprocess.Popen(
@@ -198,6 +198,7 @@ def test_ctrl_c_is_heard_while_libraries_are_loaded(tmp_path: Path) -> None:
     assert (process.returncode, said) == (130, "interrupted\n")
 
 
+@pytest.mark.long
 def test_a_picture_is_not_drawn_over_the_map_that_it_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -89,6 +89,7 @@ def test_a_robot_is_drawn_where_it_is_and_crossed_out_once_it_is_lost(tour: Path
         frames.at(3.0)
 
 
+@pytest.mark.long
 def test_a_gif_shows_the_whole_mission_and_is_the_same_each_time(pair: Path) -> None:
     content = video_of(pair, ".gif", quiet)
     assert content == video_of(pair, ".gif", quiet)

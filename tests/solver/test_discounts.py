@@ -63,6 +63,7 @@ def no_heuristic(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
+@pytest.mark.first(15)
 @pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("costs", [False, True], ids=["free", "costly"])
 @pytest.mark.parametrize("failure", PROCESSES)
@@ -117,6 +118,7 @@ def reduced(graph: Graph, route: tuple[int, ...], vehicle: Vehicle, reward: np.n
     return value + discount.home * discount.survival**visits * math.exp(-discount.rate * driven)
 
 
+@pytest.mark.first(30)
 @pytest.mark.parametrize("seed", range(150))
 def test_the_best_discounted_route_is_the_one_that_listing_finds(seed: int) -> None:
     instance, rng = random_instance(100 + seed), np.random.default_rng(seed)

@@ -181,6 +181,7 @@ FEW = [(k, what) for k, what in enumerate(KINDS)]
 MANY = [(1000 + n, what) for n in range(130) for what in KINDS]
 
 
+@pytest.mark.first(6)
 @pytest.mark.parametrize(("seed", "what"), [*FEW, (1006, "excess")])  # a target that is off by rounding in other units
 def test_the_unit_of_incentives_changes_nothing(seed: int, what: str) -> None:
     check_scaling(seed, what)

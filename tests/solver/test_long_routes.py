@@ -232,6 +232,7 @@ def test_few_sites_take_few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(ends) == 1 + long_routes.ROUNDS * 12 // 60
 
 
+@pytest.mark.long
 def test_crossing_the_plans_of_the_starts_never_loses_value_and_pays_on_most_large_instances(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -211,6 +211,7 @@ def test_a_plan_made_for_a_reaction_that_was_not_the_one_driven_is_refused(folde
         read_content(folder)
 
 
+@pytest.mark.first(1)
 def test_every_trial_and_history_replayed_gives_its_rows_to_the_bit(folder: Path) -> None:
     rows = outcomes_of(folder)
     keys = dict.fromkeys((row["scenario"], row["policy"], row["news"]) for row in rows)
@@ -316,6 +317,7 @@ def test_no_two_recordings_of_a_folder_share_a_name(foreign: bool, planners: lis
     assert len(set(stems)) == len(stems)
 
 
+@pytest.mark.first(1)
 def test_a_run_is_the_same_whether_it_reacts_beside_or_not(finished: Run, tmp_path: Path) -> None:
     options = Options(trials=40, rollouts=2, fidelity="kinematic")
     alone = run(world_of(tmp_path, TEXT), options, tmp_path / "runs", None, lambda *_: None)

@@ -14,6 +14,7 @@ from sva_bench.__main__ import run_command_line
 from sva_bench.errors import BadInput
 from sva_bench.storage.recordings import most_telling, recordings_for
 from sva_bench.storage.trial_choice import choice_of, nearest_to_median
+from tests.commands_for_tests import sva_bench
 from tests.worlds_for_tests import SMALL
 
 WORLD = SMALL.replace("half: {uv2: 0.5}", "S: {uv2: 0.5}").replace("safe: {uv2: 1.0}", "S-stochastic: {uv2: 1.0}")
@@ -23,9 +24,8 @@ WORLD = SMALL.replace("half: {uv2: 0.5}", "S: {uv2: 0.5}").replace("safe: {uv2: 
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     (folder / "small.yaml").write_text(WORLD, encoding="utf-8")
-    done = subprocess.run([sys.executable, "-m", "sva_bench", "run", "small.yaml", "--trials", "10", "--rollouts", "1",
-                           "--fidelity", "kinematic", "--workers", "1"], cwd=folder, capture_output=True, text=True,
-                          check=False)
+    done = sva_bench("run", "small.yaml", "--trials", 10, "--rollouts", 1, "--fidelity", "kinematic", "--workers", 1,
+                     cwd=folder)
     assert done.returncode == 0, done.stderr
     (found,) = (folder / "runs").iterdir()
     (found / "recordings" / "S-stochastic+trial7.rrd").write_bytes(b"")  # as replay names what it records

@@ -146,6 +146,7 @@ def test_a_door_that_is_always_shut_makes_the_plan_reckon_with_it(
     assert (found.bad.share, found.reached, found.draws) == (0.0, True, 1)
 
 
+@pytest.mark.long
 def test_where_no_costs_help_that_is_said(
     calm: World, costs: Mapping[str, FuelCosts], planned: Mapping[str, Planned]
 ) -> None:
@@ -204,6 +205,7 @@ def test_sets_of_draws_differ_from_each_other_and_from_those_of_runs() -> None:
     assert min(seeds) > 10**9  # nobody asks for such a seed by accident
 
 
+@pytest.mark.long
 def test_calibration_stands_in_the_folder(tmp_path: Path, noisy: World) -> None:
     from sva_bench.mission.instance_file import read_instance
     from sva_bench.mission.plan_file import read_plan

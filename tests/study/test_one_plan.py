@@ -14,6 +14,7 @@ from sva_bench.study.plan_request import PlanRequest
 DETERMINISTIC = PlanRequest(objective="deterministic")
 
 
+@pytest.mark.long
 def test_the_time_limit_is_for_all_solves_of_a_deterministic_plan() -> None:
     instance = random_instance("A", pois=60, vehicles=2, availability=0.75, seed=1, directed=True)
     limit_s = 3.0

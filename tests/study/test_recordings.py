@@ -41,6 +41,7 @@ def of_kind(folder: Path, interaction: Interaction) -> World:
     return world_of(folder, text)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("interaction", "fidelity"), [
     pytest.param(interaction, fidelity,
                  marks=[pytest.mark.long] * (fidelity == "physics" or interaction == "uncoordinated"))

@@ -71,6 +71,7 @@ def test_reacting_is_measured_on_the_trials_of_the_run(ours: sb.Result[Summary])
             assert plan.reacted > 0
 
 
+@pytest.mark.long
 def test_they_are_the_same_on_any_number_of_workers(world: sb.World, ours: sb.Result[Summary]) -> None:
     two = sb.run(world, anticipate=True, **{**QUICK, "workers": 2})
     assert as_dict(two.summary) == as_dict(ours.summary)

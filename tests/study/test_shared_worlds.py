@@ -143,6 +143,7 @@ def test_costs_given_in_python_are_those_of_each_robot(tmp_path: Path) -> None:
 # Names of runs, and ways to ask
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("interaction", ["independent", "uncoordinated", "shared"])
 def test_an_option_gives_the_run_of_a_world_that_says_so_itself(interaction: Interaction, tmp_path: Path) -> None:
     told = world_of(tmp_path, f"{SMALL}interaction: {interaction}\n")
@@ -279,7 +280,8 @@ FULL = SHARED.replace("scenarios:", "".join(
 
 @pytest.mark.parametrize(("text", "key", "piece", "says"), [
     (SHARED.replace("slots: 2", "slots: 20"), "sites.stations.r1", "    r1:", "no room for 20 slots"),
-    (FULL.replace(", slots: 2", ""), "sites.base", "  base:", "no room for 8 berths")])
+    pytest.param(FULL.replace(", slots: 2", ""), "sites.base", "  base:", "no room for 8 berths",
+                 marks=pytest.mark.long)])
 def test_what_does_not_fit_is_an_error_of_its_line(
     text: str, key: str, piece: str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -308,6 +310,7 @@ def test_what_does_not_fit_has_an_error_of_its_own_in_python(
             function(tmp_path / "world.yaml")
 
 
+@pytest.mark.long
 def test_a_run_in_which_robots_touched_is_read_back_with_whom_they_touched(tmp_path: Path) -> None:
     # In four-rooms both robots touch soon after they left, if nobody coordinates them; physics drives such missions.
     world = Path(__file__).parents[2] / "worlds" / "four-rooms.yaml"

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ import pytest
 from sva_bench.errors import BadInput
 from sva_bench.storage.tables import write_table
 from sva_bench.study.verify import verify
+from tests.commands_for_tests import sva_bench
 from tests.worlds_for_tests import SMALL
 
 
@@ -25,9 +24,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run with a reaction, driven by the twin under noise."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
-    done = subprocess.run([sys.executable, "-m", "sva_bench", "run", "small.yaml", "--trials", "40", "--rollouts", "2",
-                           "--fidelity", "kinematic", "--policy", "none,resolve", "--workers", "1"], cwd=folder,
-                          capture_output=True, text=True, check=False)
+    done = sva_bench("run", "small.yaml", "--trials", 40, "--rollouts", 2, "--fidelity", "kinematic", "--policy",
+                     "none,resolve", "--workers", 1, cwd=folder)
     assert done.returncode == 0, done.stderr
     (run,) = (folder / "runs").iterdir()
     return run
@@ -37,9 +35,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_run_with_other_failure_processes_holds(tmp_path: Path) -> None:
     # Its instances say mean times to failure, which the world's own process has no use for.
     (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
-    done = subprocess.run([sys.executable, "-m", "sva_bench", "run", "small.yaml", "--trials", "20", "--rollouts", "2",
-                           "--fidelity", "kinematic", "--assumptions", "--workers", "1"], cwd=tmp_path,
-                          capture_output=True, text=True, check=False)
+    done = sva_bench("run", "small.yaml", "--trials", 20, "--rollouts", 2, "--fidelity", "kinematic", "--assumptions",
+                     "--workers", 1, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     (run,) = (tmp_path / "runs").iterdir()
     assert "mtbf_s" in (run / "instance-half.json").read_text()
@@ -121,8 +118,7 @@ def test_the_command_exits_with_5_and_names_the_difference(finished: Path, tmp_p
     shutil.copytree(finished, run)
     CHANGES["end_time_s"](run)
     for folder, code in ((finished, 0), (run, 5)):
-        done = subprocess.run([sys.executable, "-m", "sva_bench", "verify", str(folder), "--json", "--workers", "1"],
-                              capture_output=True, text=True, check=False)
+        done = sva_bench("verify", folder, "--json", "--workers", 1, cwd=tmp_path)
         assert done.returncode == code, done.stderr
         assert json.loads(done.stdout)["holds"] == (code == 0)
     assert "trial 0, uv1: end_time_s is" in json.loads(done.stdout)["difference"]

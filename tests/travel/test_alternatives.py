@@ -82,6 +82,7 @@ def test_a_corridor_has_no_other_way() -> None:
     assert len(alternatives(ways_among(obstacles, path, CLEARANCE_M), path)) == 1
 
 
+@pytest.mark.long
 def test_other_ways_are_the_same_in_every_process() -> None:
     # OMPL's own roadmap differs by single edges.
     code = ("import hashlib, numpy as np\n"
@@ -177,6 +178,7 @@ def test_a_gap_that_is_just_wide_enough_is_driven_through(free_m: float) -> None
     assert distance(path, (5.0, beside_a_post(free_m)[0, 1])) >= 0.177 + CLEARANCE_M - 1e-6
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("clearance_m", [0.1, 0.297, 0.6])
 def test_places_that_a_path_joins_are_never_proved_apart(clearance_m: float) -> None:
     joined = apart = 0

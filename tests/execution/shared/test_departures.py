@@ -84,6 +84,7 @@ def test_who_waits_for_nobody_leaves_at_once() -> None:
     assert staggered(planned(apart, 1.0)) == (0.0, 0.0)
 
 
+@pytest.mark.long
 def test_a_wait_shorter_than_what_is_kept_in_hand_delays_nobody() -> None:
     for _, order in orders_planned():
         for robot, depart in enumerate(staggered(order)):
@@ -92,6 +93,7 @@ def test_a_wait_shorter_than_what_is_kept_in_hand_delays_nobody() -> None:
             assert depart <= max(waits - EARLY_S, 0.0)
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("seed", FEW)
 def test_no_mission_that_is_staggered_breaks_a_rule(seed: int) -> None:
     ready = drawn(seed)
@@ -107,6 +109,7 @@ def test_no_mission_that_is_staggered_breaks_a_rule(seed: int) -> None:
                 assert settle(own, driven).end_time_s == pytest.approx(outcome.end_time_s, abs=1e-9)
 
 
+@pytest.mark.long
 def test_a_mission_cut_off_at_a_failure_is_the_mission_played_with_it() -> None:
     cut = 0
     for seed in FEW:

@@ -119,6 +119,7 @@ def test_however_late_robots_are_switches_let_nobody_touch_and_everybody_end(
     assert [len(legs) for legs in mission.legs.values()] == [len(lane.cuts) for lane in ORDERS[name].lanes]
 
 
+@pytest.mark.long
 def test_in_physics_switches_let_nobody_touch_and_everybody_end() -> None:
     switched = 0
     for seed in range(9):
