@@ -167,6 +167,7 @@ def test_a_run_has_the_same_summary_and_tables_as_the_command(
     assert result.legs.equals(pq.read_table(typed / "legs.parquet"))
 
 
+@pytest.mark.long
 def test_executed_plans_have_the_same_summary_as_the_command(small: Path, tmp_path: Path) -> None:
     paths = []
     for name, poi in (("a", "p1"), ("b", "p2")):
@@ -497,6 +498,7 @@ print(result.summary.scenario("half").vss.executed.mean)
 """
 
 
+@pytest.mark.long
 def test_a_script_without_a_guard_of_its_main_module_has_workers(small: Path, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(SCRIPT, encoding="utf-8")

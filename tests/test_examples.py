@@ -35,6 +35,7 @@ def test_every_script_is_run() -> None:
     assert {path.name for path in EXAMPLES.glob("*.py")} == set(SAID)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("script", [
     pytest.param(script, marks=[pytest.mark.long] * (script != "own_plan.py")) for script in sorted(SAID)])
 def test_a_script_runs_and_says_what_it_should(script: str, folder: Path) -> None:

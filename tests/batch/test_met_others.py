@@ -97,6 +97,7 @@ robots:
 """
 
 
+@pytest.mark.long
 def test_a_world_without_room_for_berths_is_given_up_and_the_others_go_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

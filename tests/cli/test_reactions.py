@@ -95,6 +95,7 @@ def test_execute_refuses_a_plan_by_the_name_of_the_one_that_it_makes(
     assert "give that another name" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_run_keeps_what_was_asked_for_and_is_named_as_ever_where_nothing_was(folder: Path) -> None:
     def options_of(*words: str) -> tuple[str, dict[str, object]]:
         assert run_command_line([*words, *QUICK, "--out", f"out{len(list(folder.iterdir()))}"]) == 0
@@ -139,6 +140,7 @@ def test_a_batch_takes_them_and_its_folder_keeps_them(folder: Path) -> None:
     assert run_command_line([*words, "--resume"]) == 0
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("folder")
 def test_a_batch_is_not_gone_on_with_under_another_reaction(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["batch", "w.yaml", *QUICK, "--cache", "cache", "--policy", "resolve", "--out", "b", "--resume"]

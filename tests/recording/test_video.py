@@ -144,6 +144,7 @@ def test_the_legend_fits_whatever_the_width(tour: Path) -> None:
     assert red[-100:].any(), "the cross of lost robots is in the legend"
 
 
+@pytest.mark.long
 def test_a_gif_has_the_colours_that_mean_something_however_small_what_they_paint_is(tmp_path: Path) -> None:
     solids = replace(WORLD.obstacles, bounds_m=np.array([-200.0, -200.0, 200.0, 200.0]))
     path = tmp_path / "large.rrd"

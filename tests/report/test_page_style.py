@@ -197,6 +197,7 @@ def test_nothing_overlaps_or_is_cut_in_print(page: Path, tmp_path: Path) -> None
     assert min(found["maps"]) > 300
 
 
+@pytest.mark.long
 @pytest.mark.skipif(BROWSER is None, reason="no browser here")
 def test_print_holds_what_is_folded_away(page: Path, tmp_path: Path) -> None:
     def pages_of(text: str) -> int:

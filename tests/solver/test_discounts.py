@@ -75,6 +75,7 @@ def test_plans_for_failures_along_the_route_are_those_that_enumeration_finds(
         check(seed, failure, costs=costs)
 
 
+@pytest.mark.first(20)
 @pytest.mark.parametrize("failure", PROCESSES)
 @pytest.mark.parametrize("seed", range(8000, 8030))
 def test_with_the_heuristic_they_are_the_same(seed: int, failure: FailureProcess) -> None:

@@ -156,7 +156,7 @@ def long_routes(pois: int = 25, vehicles: int = 2, seed: int = 0) -> tuple[Insta
     return instance, Goal(weights=incentives_of(instance) * availability_of(instance)[:, None])
 
 
-@pytest.mark.first(1)
+@pytest.mark.long
 @pytest.mark.parametrize("iterations", [1, 3])
 def test_a_probe_that_is_stopped_early_proves_nothing(iterations: int, monkeypatch: pytest.MonkeyPatch) -> None:
     instance, goal = long_routes()

@@ -106,7 +106,7 @@ def test_so_are_those_for_failures_along_the_route(process: FailureProcess) -> N
         check_failing(seed, process)
 
 
-@pytest.mark.first(1)
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["auto", "expected"])
 def test_so_are_ties_foresight_and_plans_under_a_measure_of_risk(method: Method) -> None:
     for seed in range(12):

@@ -193,6 +193,7 @@ def test_the_unit_of_incentives_changes_nothing_on_many_instances(seed: int, wha
     check_scaling(seed, what)
 
 
+@pytest.mark.first(8)
 @pytest.mark.parametrize(("seed", "what"), FEW)
 def test_names_and_order_change_nothing(seed: int, what: str) -> None:
     check_names_and_order(seed, what)
@@ -229,6 +230,7 @@ def test_the_method_alone_finds_them_over_many_joint_distributions(seed: int) ->
     check_joint_risk(seed)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("most", [1e-8, 1e-12])
 def test_plans_are_the_best_however_seldom_anybody_is_available(most: float) -> None:
     # What a plan is worth is next to nothing beside an incentive, but all that there is.

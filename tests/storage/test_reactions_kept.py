@@ -146,6 +146,7 @@ def test_a_folder_holds_a_recording_of_each_plan_that_reacts_and_no_other(finish
     assert (content.lacking, set(content.reaction_stems.values())) == ((), told)
 
 
+@pytest.mark.first(2)
 def test_the_page_is_written_again_from_the_tables(folder: Path) -> None:
     before = (folder / "report.html").read_bytes()
     assert report_again(folder).read_bytes() == before
@@ -247,6 +248,7 @@ def test_what_the_run_does_not_hold_is_not_replayed(wanted: Wanted, said: str, f
     assert said in str(refused.value)
 
 
+@pytest.mark.first(2)
 def test_the_command_prints_the_rows_of_each_plan(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["replay", str(folder), "--scenario", "half", "--trial", "1", "--policy", "resolve", "--news", "report"]
     assert run_command_line([*words, "--json", "--workers", "1"]) == 0

@@ -65,6 +65,7 @@ def at_most(noisy: World, costs: Mapping[str, FuelCosts], planned: Mapping[str, 
     return calibrated(noisy, costs, planned, 0.02)
 
 
+@pytest.mark.long
 def test_a_plan_goes_wrong_no_oftener_than_asked_for_on_draws_of_nobody(
     noisy: World, costs: Mapping[str, FuelCosts], at_most: Mapping[str, Calibrated]
 ) -> None:
@@ -79,6 +80,7 @@ def test_a_plan_goes_wrong_no_oftener_than_asked_for_on_draws_of_nobody(
         assert bad.mean() <= 0.02 + 3 * np.sqrt(0.02 * 0.98 / 1000)
 
 
+@pytest.mark.long
 def test_the_plan_keeps_the_costs_that_it_was_made_for(at_most: Mapping[str, Calibrated]) -> None:
     for found in at_most.values():
         certificate = certify(found.instance, found.plan)

@@ -83,6 +83,7 @@ def test_nothing_is_said_of_physics_that_did_not_fail(tmp_path: Path) -> None:
     assert failed_physics(summary) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fidelity", ["rollout", pytest.param("physics", marks=pytest.mark.long)])
 def test_a_batch_gives_up_worlds_in_which_physics_fails_at_once_and_goes_on(
         fidelity: Fidelity, tmp_path: Path) -> None:

@@ -115,6 +115,7 @@ def test_where_all_pois_are_reachable_there_is_no_warning(tmp_path: Path) -> Non
     assert beyond_reach(done.summary.reach) == []
 
 
+@pytest.mark.long
 def test_pois_at_which_a_robot_would_earn_nothing_are_not_missed(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # Nobody reaches any of the two; uv1 would earn something at p1 alone, and uv2 nowhere.

@@ -67,6 +67,7 @@ def test_a_trial_that_is_replayed_gives_its_rows_again(interaction: Interaction,
                 assert told(one.recording)["trial"] == trial
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("policy", "news"), [("none", "never"), ("resolve", "report")])
 def test_the_worst_and_the_median_trial_of_a_plan_are_those_of_its_rows(policy: PolicyName, news: News, tmp_path: Path
                                                                         ) -> None:

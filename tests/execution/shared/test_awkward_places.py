@@ -102,6 +102,7 @@ def test_all_come_home_when_nobody_fails(name: str) -> None:
         assert not mission.replanned
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("name", PLACES)
 def test_coordinated_robots_are_home_sooner_than_one_after_the_other(name: str) -> None:
     mission = sound(name)
