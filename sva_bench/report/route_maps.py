@@ -97,6 +97,8 @@ def route_maps(content: Content) -> list[str]:
         for s in scenarios if s.name in drawn]
     left = len(scenarios) - len(drawn)
     more = [note(f"{counted(left, 'more scenario')}: their routes stand in the list of routes.")] if left else []
+    if any("informed" in scenario.plans for scenario in scenarios):
+        more.append(note("The informed planner has no map: its routes are others for each set of available robots."))
     return [heading("The plans on the map"), *folded, *more, note(maps.legend())]
 
 

@@ -297,3 +297,13 @@ def test_rows_in_another_order_have_no_values_rather_than_wrong_ones(folders: Ma
 def test_every_robot_of_the_palette_has_its_line_on_the_page() -> None:
     for k, colour in enumerate(ROBOTS):
         assert f".leg.r{k} path{{stroke:{hex_of(colour)}" in STYLE
+
+
+def test_that_the_informed_planner_has_no_map_is_said(folders: Mapping[str, Path]) -> None:
+    content = read_content(folders["failures of missions"])
+    assert not any("informed planner" in part for part in route_maps(content))
+    assert isinstance(content.summary, Summary)
+    first = content.summary.scenarios[0]
+    knowing = replace(first, plans={**first.plans, "informed": first.plans["stochastic"]})
+    said = route_maps(replace(content, summary=replace(content.summary, scenarios=(knowing,))))
+    assert any("The informed planner has no map: its routes are others" in part for part in said)
