@@ -51,6 +51,10 @@ def printed(arguments: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch,
             ) -> str:
     monkeypatch.chdir(folder)
     monkeypatch.delenv("COLUMNS", raising=False)
+    for needed, is_read, (command, _) in (("run", any("RUN" in word for word in arguments), COMMANDS[0]),
+                                          ("batch", "batch" in arguments[1:3], COMMANDS[3])):
+        if is_read and not (folder / needed).exists():  # the case that makes it may not have been chosen
+            assert run_command_line(command) == 0
     run = next((folder / "run").glob("*"), folder)
     capsys.readouterr()
     assert run_command_line([word.replace("RUN", str(run)) for word in arguments]) == 0
