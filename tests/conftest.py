@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-from collections import Counter
 
 import pytest
 from hypothesis import settings
@@ -20,12 +19,14 @@ def pytest_configure() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test that is marked ``first(n)``, leave the cases behind the first n to ``make test-long``."""
-    seen: Counter[str] = Counter()
+    """Of a test that is marked ``spread(n)``, leave all but n cases to ``make test-long``: those kept lie far apart."""
+    cases: dict[str, list[pytest.Item]] = {}
     for item in items:
-        mark = item.get_closest_marker("first")
-        if mark is not None:
-            test = item.nodeid.split("[")[0]
-            seen[test] += 1
-            if seen[test] > mark.args[0]:
+        if item.get_closest_marker("spread") is not None:
+            cases.setdefault(item.nodeid.split("[")[0], []).append(item)
+    for those in cases.values():
+        mark = those[0].get_closest_marker("spread")
+        kept = {k * len(those) // mark.args[0] for k in range(mark.args[0])} if mark else set()
+        for k, item in enumerate(those):
+            if k not in kept:
                 item.add_marker(pytest.mark.long)

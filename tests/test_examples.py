@@ -36,8 +36,7 @@ def test_every_script_is_run() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("script", [
-    pytest.param(script, marks=[pytest.mark.long] * (script != "own_plan.py")) for script in sorted(SAID)])
+@pytest.mark.parametrize("script", sorted(SAID))
 def test_a_script_runs_and_says_what_it_should(script: str, folder: Path) -> None:
     done = subprocess.run([sys.executable, f"examples/{script}"], cwd=folder, text=True, capture_output=True,
                           timeout=600, check=False)

@@ -330,7 +330,7 @@ def test_several_run_folders_on_one_line_are_answered_with_a_hint(
     assert "call it once for each" in said
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("kind", ["run", "execution"])
 def test_a_plan_with_another_route_than_was_driven_is_refused_by_its_file(
@@ -399,7 +399,7 @@ def files_of(folder: Path) -> list[str]:
                   if path.is_file() and path.suffix in (".json", ".parquet"))
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("kind", ["run", "execution"])
 def test_a_run_folder_without_any_of_its_files_is_called_incomplete(

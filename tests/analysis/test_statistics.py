@@ -160,7 +160,7 @@ def coverage(probability: float, draws: int, trials: int, availability: float, r
     return held / rounds
 
 
-@pytest.mark.first(8)
+@pytest.mark.spread(8)
 @pytest.mark.parametrize("probability", [0.0, 1 / 20, 1 / 8, 0.5])
 @pytest.mark.parametrize(("draws", "trials"), [(4, 100), (8, 1000), (32, 1000)])
 @pytest.mark.parametrize("availability", [0.25, 1.0])

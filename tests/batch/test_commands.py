@@ -69,7 +69,6 @@ def test_a_batch_gives_the_same_rows_on_one_worker_and_on_two_and_resumes(tmp_pa
     assert "options.trials" in differs.stderr
 
 
-@pytest.mark.first(1)
 @pytest.mark.parametrize("fidelity", ["kinematic", pytest.param("rollout", marks=pytest.mark.long)])
 def test_a_batch_has_the_rows_of_a_run_and_its_columns(tmp_path: Path, fidelity: str) -> None:
     told = (world_file(tmp_path), "--seed", 3, "--trials", 50, "--rollouts", 3, "--fidelity", fidelity)

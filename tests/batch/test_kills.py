@@ -156,7 +156,7 @@ def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(
 def test_a_missing_dask_scheduler_is_an_error(tmp_path: Path) -> None:
     world = posted(tmp_path, "small", 1)
     done = sva_bench_alone("batch", world, *TRIALS, "--dask", "tcp://127.0.0.1:9", "--out", "out", "--cache", "cache",
-                     cwd=tmp_path)
+                           cwd=tmp_path)
     assert done.returncode == 2
     assert "no Dask scheduler answers there" in done.stderr
     assert "Traceback" not in done.stderr

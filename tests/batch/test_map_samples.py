@@ -66,7 +66,7 @@ def trials_of(shares: FloatArray, trials: int, rng: np.random.Generator) -> Floa
     return drawn
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("trials", [40, 400])
 def test_intervals_over_maps_hold_the_truth_though_all_maps_meet_the_same_draws(trials: int) -> None:
     rng, rounds, maps = np.random.default_rng(trials), 300, 12

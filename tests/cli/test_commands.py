@@ -280,7 +280,7 @@ def test_help_says_what_each_command_does(tmp_path: Path) -> None:
         assert "Usage" in page.stdout
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("after_s", [2.5, 5.0])
 def test_ctrl_c_ends_a_run_with_130_and_leaves_nothing_half_written(after_s: float, tmp_path: Path) -> None:
     process = subprocess.Popen(

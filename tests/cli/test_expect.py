@@ -51,7 +51,7 @@ def test_a_batch_is_judged_by_its_figures_over_maps(folders: tuple[Path, Path]) 
     assert json.loads(done.stdout)["met"]
 
 
-@pytest.mark.first(2)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize(("arguments", "said"), [
     (["half.vss.executed.mea > 0"], "did you mean 'mean'?"),
     (["half.vss"], "expected PATH OPERATOR VALUE"),

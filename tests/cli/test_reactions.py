@@ -209,7 +209,7 @@ def test_execute_with_reactions_prints_json_writes_csv_with_ranks_and_a_page(
         assert all(said in page for said in (answer.condition, *answer.sentences))
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("words", [["run"], ["execute", "p.json"], ["execute", "p.json", "both.json"]])
 @pytest.mark.parametrize("anticipate", [False, True])
 def test_what_a_command_wrote_is_read_reported_and_replayed(

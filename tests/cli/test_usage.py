@@ -169,7 +169,7 @@ OPTIONS = [(words, parameter) for words, command in commands() for parameter in 
            if parameter.param_type_name == "option" and not parameter.is_flag and parameter.name != "help"]
 
 
-@pytest.mark.first(40)
+@pytest.mark.spread(40)
 @pytest.mark.parametrize(("words", "option"), [(words, max(p.opts, key=len)) for words, p in OPTIONS])
 def test_an_empty_value_is_refused_by_the_name_of_its_option(
     words: tuple[str, ...], option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,

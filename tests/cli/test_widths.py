@@ -87,7 +87,7 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize(("arguments", "names"), COMMANDS, ids=[" ".join(words[:2]) for words, _ in COMMANDS])
 def test_every_line_fits_eighty_columns_and_no_name_is_cut(
     arguments: list[str], names: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch,

@@ -99,7 +99,7 @@ def test_every_accepted_robot_takes_the_twins_time_within_one_per_cent() -> None
     assert not [line for number in range(16) for line in strays(12, number)]
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("figures", [
     # Wheels that turn at hundreds of rad/s, where physics holds joints at 100 unless told otherwise.
     {"radius_m": 5, "wheel_radius_m": 0.0144, "track_m": 9.83, "mass_kg": 1170, "max_speed_m_s": 1.62,

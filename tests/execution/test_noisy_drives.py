@@ -79,7 +79,7 @@ ALONE: Mapping[NoiseName, Noise] = {
     "payload": Noise(payload_kg=(5.0, 5.0))}
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", [*ALONE, "realistic"])
 def test_twin_and_physics_agree_on_clear_floor_under_each_source(name: NoiseName) -> None:
     # docs/noise.md: where nothing is touched legs differ by 0.2 to 0.5 %, routes by a tenth, one leg in a hundred by

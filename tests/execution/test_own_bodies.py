@@ -39,7 +39,7 @@ def test_every_built_in_robot_takes_the_twins_time_within_one_per_cent(name: str
     assert not strays_of(BUILT_IN[name], np.random.default_rng(3))
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_robot_with_a_body_of_its_own_takes_the_twins_time_within_one_per_cent(shape: str) -> None:
     assert not strays_of(model_of_text(SHAPES[shape].text()), np.random.default_rng(3))

@@ -136,7 +136,7 @@ def shown(robots: list[Here], process: FailureProcess, news: News) -> tuple[Here
                  for robot in robots)
 
 
-@pytest.mark.first(80)
+@pytest.mark.spread(80)
 @over_processes
 @pytest.mark.parametrize("seed", range(100))
 def test_a_team_that_plans_again_earns_what_the_dynamic_program_says(seed: int, process: FailureProcess) -> None:
@@ -168,7 +168,7 @@ def check_order(seed: int, process: FailureProcess) -> None:
         assert reached[news].best() <= foresight + slack
 
 
-@pytest.mark.first(25)
+@pytest.mark.spread(25)
 @over_processes
 @pytest.mark.parametrize("seed", range(40))
 def test_no_policy_beats_the_best_and_the_best_does_not_beat_foresight(seed: int, process: FailureProcess) -> None:
@@ -275,7 +275,7 @@ def check_answer(state: TeamState, heard: Heard, ground: Ground) -> None:
     assert heard.policy(later) == given == resolve(ground.instance)(later)
 
 
-@pytest.mark.first(30)
+@pytest.mark.spread(30)
 @over_solved
 @pytest.mark.parametrize("seed", range(40))
 def test_orders_after_news_are_the_best_of_the_rest(seed: int, process: FailureProcess) -> None:
@@ -322,7 +322,7 @@ def here_of(ground: Ground, vehicle: Afield) -> Here:
                 tuple(sites.index(site) for site in vehicle.orders))
 
 
-@pytest.mark.first(100)
+@pytest.mark.spread(100)
 @over_processes
 @pytest.mark.parametrize("seed", range(150))
 def test_the_rest_that_is_planned_leaves_out_what_others_claim_and_counts_on_what_is_known(
@@ -348,7 +348,7 @@ def check_foresight(seed: int) -> None:
     assert value == pytest.approx(wait_and_see(instance, known=known), rel=SOLVED, abs=SOLVED)
 
 
-@pytest.mark.first(10)
+@pytest.mark.spread(10)
 @pytest.mark.parametrize("seed", range(30))
 def test_who_hears_of_whole_missions_before_anybody_leaves_earns_what_foresight_earns(seed: int) -> None:
     check_foresight(seed)

@@ -31,7 +31,7 @@ def shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
                           capture_output=True, timeout=300, check=False)
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize(("line", "said"), [
     ("sva-bench world schema | head -1", ""),  # more than a pipe holds
     ("sva-bench plan tiny.json | true", "optimal"),
@@ -61,7 +61,7 @@ def test_a_run_into_a_closed_pipe_still_prints_its_folder(tmp_path: Path) -> Non
     assert "written to runs/small-seed0-" in done.stderr
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("line", ["sva-bench certify tiny.json plan.json", "sva-bench --help",
                                          "sva-bench world schema"])
 def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_results_lost_to_a_full_disk_exit_with_code_two(line: str, tmp_path: Pat
     assert "standard output cannot be written to (No space left on device)" in done.stderr
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("line", [
     "plan tiny.json", "run small.yaml --json", "batch small.yaml --dry-run",
     "plan tiny.json -o -", "times small.yaml", "instance random", "world random", "world schema", "reproduce rewards",
@@ -113,7 +113,7 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.first(10)
+@pytest.mark.spread(10)
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("place", ["/proc/x.png", "small.yaml/x.png", "missing/x.png", "folder", "/sys/x.png"])
 def test_files_that_cannot_be_written_are_refused_before_any_work(
@@ -159,7 +159,7 @@ def test_a_place_that_is_fine_is_left_as_it_was(tmp_path: Path) -> None:
         check_output(tmp_path / "loop" / "x")
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("number", "code"), [
     (signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
 def test_a_terminated_run_removes_its_drafts(number: signal.Signals, code: int, tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_what_is_installed_beside_the_code_comes_before_a_checkout(
         example_names()
 
 
-@pytest.mark.first(2)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("name", example_names())
 def test_an_example_is_the_shipped_world_and_may_be_copied_again_until_it_is_edited(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],

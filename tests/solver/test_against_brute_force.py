@@ -116,14 +116,14 @@ def test_plans_under_a_measure_of_risk_are_those_that_enumeration_finds_on_many_
     check_risk(seed)
 
 
-@pytest.mark.first(12)
+@pytest.mark.spread(12)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(12))
 def test_plans_are_those_that_enumeration_finds(seed: int, method: Method) -> None:
     check(seed, method)
 
 
-@pytest.mark.first(18)
+@pytest.mark.spread(18)
 @pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(100, 118))

@@ -80,7 +80,7 @@ def by(method: Method) -> Callable[[Instance], Plan]:
     return lambda instance: plan_stochastic(instance, method=method)
 
 
-@pytest.mark.first(6)
+@pytest.mark.spread(6)
 @pytest.mark.parametrize(("where", "name", "instance", "solve"), [
     (heuristic, "run_rounds", hard("B", 150), by("auto")),
     (long_routes, "anneal", hard(pois=150), by("auto")),

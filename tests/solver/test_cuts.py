@@ -45,7 +45,7 @@ def small(seed: int) -> Instance:
     raise AssertionError("no instance will do")
 
 
-@pytest.mark.first(10)
+@pytest.mark.spread(10)
 @pytest.mark.parametrize("seed", range(25))
 def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> None:
     instance, rng = small(seed), np.random.default_rng(seed)
@@ -84,7 +84,7 @@ def test_the_best_route_under_cuts_is_the_one_that_listing_finds(seed: int) -> N
             assert worth[quick.routes[0]] == pytest.approx(quick.best, abs=1e-9)
 
 
-@pytest.mark.first(10)
+@pytest.mark.spread(10)
 @pytest.mark.parametrize("seed", range(25))
 def test_enumeration_finds_every_set_of_pois_above_the_threshold(seed: int) -> None:
     instance, rng = small(seed), np.random.default_rng(seed)

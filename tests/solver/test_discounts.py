@@ -63,7 +63,7 @@ def no_heuristic(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "search", lambda *given, **_: Found(orders=given[3], routes=()))
 
 
-@pytest.mark.first(15)
+@pytest.mark.spread(15)
 @pytest.mark.usefixtures("no_heuristic")
 @pytest.mark.parametrize("costs", [False, True], ids=["free", "costly"])
 @pytest.mark.parametrize("failure", PROCESSES)
@@ -75,7 +75,7 @@ def test_plans_for_failures_along_the_route_are_those_that_enumeration_finds(
         check(seed, failure, costs=costs)
 
 
-@pytest.mark.first(20)
+@pytest.mark.spread(20)
 @pytest.mark.parametrize("failure", PROCESSES)
 @pytest.mark.parametrize("seed", range(8000, 8030))
 def test_with_the_heuristic_they_are_the_same(seed: int, failure: FailureProcess) -> None:
@@ -119,7 +119,7 @@ def reduced(graph: Graph, route: tuple[int, ...], vehicle: Vehicle, reward: np.n
     return value + discount.home * discount.survival**visits * math.exp(-discount.rate * driven)
 
 
-@pytest.mark.first(30)
+@pytest.mark.spread(30)
 @pytest.mark.parametrize("seed", range(150))
 def test_the_best_discounted_route_is_the_one_that_listing_finds(seed: int) -> None:
     instance, rng = random_instance(100 + seed), np.random.default_rng(seed)

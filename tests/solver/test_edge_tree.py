@@ -138,7 +138,7 @@ def _without_one(orders: VisitOrders) -> Iterator[VisitOrders]:
             yield (*orders[:m], tuple(j for j in order if j != poi), *orders[m + 1:])
 
 
-@pytest.mark.first(8)
+@pytest.mark.spread(8)
 @pytest.mark.parametrize("seed", range(24))
 def test_no_pruned_node_holds_the_optimum_and_the_tree_finds_it(seed: int) -> None:
     check_all_goals(small(seed, most=10), driving=(0.05, 0.3, 1.0)[seed % 3])
@@ -165,7 +165,7 @@ def test_a_probe_that_is_stopped_early_proves_nothing(iterations: int, monkeypat
     assert searched(instance, goal, None, by_mip).value == pytest.approx(by_mip.value, rel=2e-6)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_purges_at_every_node_leave_the_optimum(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     # Bases of nodes are then of other programs than the one at hand.
@@ -205,7 +205,7 @@ def test_where_highs_never_gets_clear_every_point_is_looked_at(monkeypatch: pyte
     assert searched(instance, goal, None, by_mip).value == by_mip.value > 0
 
 
-@pytest.mark.first(10)
+@pytest.mark.spread(10)
 @pytest.mark.parametrize("seed", range(40))
 def test_the_tree_ends_at_the_optimum_of_brute_force(seed: int) -> None:
     instance = small(seed, most=6, vehicles=2)

@@ -90,7 +90,7 @@ def check_ties(seed: int, method: Method) -> None:
         assert certify(instance, averse).reasons == ()
 
 
-@pytest.mark.first(8)
+@pytest.mark.spread(8)
 @pytest.mark.usefixtures("heuristic")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("block", range(2))
@@ -156,7 +156,7 @@ def test_charging_without_end_no_idling_and_the_fuel_as_a_clock_are_as_without_t
         assert plan_stochastic(fast(plain), EXACT).value == pytest.approx(plan.value, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("factor", [0.25, 60.0])
 def test_another_unit_of_time_changes_no_value(factor: float) -> None:
     for seed in range(12):

@@ -181,7 +181,7 @@ FEW = [(k, what) for k, what in enumerate(KINDS)]
 MANY = [(1000 + n, what) for n in range(130) for what in KINDS]
 
 
-@pytest.mark.first(6)
+@pytest.mark.spread(6)
 @pytest.mark.parametrize(("seed", "what"), [*FEW, (1006, "excess")])  # a target that is off by rounding in other units
 def test_the_unit_of_incentives_changes_nothing(seed: int, what: str) -> None:
     check_scaling(seed, what)
@@ -193,7 +193,7 @@ def test_the_unit_of_incentives_changes_nothing_on_many_instances(seed: int, wha
     check_scaling(seed, what)
 
 
-@pytest.mark.first(8)
+@pytest.mark.spread(8)
 @pytest.mark.parametrize(("seed", "what"), FEW)
 def test_names_and_order_change_nothing(seed: int, what: str) -> None:
     check_names_and_order(seed, what)
@@ -230,7 +230,7 @@ def test_the_method_alone_finds_them_over_many_joint_distributions(seed: int) ->
     check_joint_risk(seed)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("most", [1e-8, 1e-12])
 def test_plans_are_the_best_however_seldom_anybody_is_available(most: float) -> None:
     # What a plan is worth is next to nothing beside an incentive, but all that there is.

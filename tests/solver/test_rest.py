@@ -83,7 +83,7 @@ def check(rest: Rest) -> Counter[str]:
                    burnt=any(here[name].burnt > 0 for name in safe), kept=bool(kept & rest.open_pois))
 
 
-@pytest.mark.first(80)
+@pytest.mark.spread(80)
 @over_solved
 @pytest.mark.parametrize("seed", range(120))
 def test_the_rest_is_planned_as_well_as_enumeration_does(seed: int, process: FailureProcess) -> None:

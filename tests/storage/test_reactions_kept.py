@@ -146,7 +146,7 @@ def test_a_folder_holds_a_recording_of_each_plan_that_reacts_and_no_other(finish
     assert (content.lacking, set(content.reaction_stems.values())) == ((), told)
 
 
-@pytest.mark.first(2)
+@pytest.mark.spread(2)
 def test_the_page_is_written_again_from_the_tables(folder: Path) -> None:
     before = (folder / "report.html").read_bytes()
     assert report_again(folder).read_bytes() == before
@@ -212,7 +212,7 @@ def test_a_plan_made_for_a_reaction_that_was_not_the_one_driven_is_refused(folde
         read_content(folder)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 def test_every_trial_and_history_replayed_gives_its_rows_to_the_bit(folder: Path) -> None:
     rows = outcomes_of(folder)
     keys = dict.fromkeys((row["scenario"], row["policy"], row["news"]) for row in rows)
@@ -248,7 +248,7 @@ def test_what_the_run_does_not_hold_is_not_replayed(wanted: Wanted, said: str, f
     assert said in str(refused.value)
 
 
-@pytest.mark.first(2)
+@pytest.mark.spread(2)
 def test_the_command_prints_the_rows_of_each_plan(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["replay", str(folder), "--scenario", "half", "--trial", "1", "--policy", "resolve", "--news", "report"]
     assert run_command_line([*words, "--json", "--workers", "1"]) == 0
@@ -319,7 +319,7 @@ def test_no_two_recordings_of_a_folder_share_a_name(foreign: bool, planners: lis
     assert len(set(stems)) == len(stems)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 def test_a_run_is_the_same_whether_it_reacts_beside_or_not(finished: Run, tmp_path: Path) -> None:
     options = Options(trials=40, rollouts=2, fidelity="kinematic")
     alone = run(world_of(tmp_path, TEXT), options, tmp_path / "runs", None, lambda *_: None)

@@ -41,7 +41,7 @@ def of_kind(folder: Path, interaction: Interaction) -> World:
     return world_of(folder, text)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("interaction", "fidelity"), [
     pytest.param(interaction, fidelity,
                  marks=[pytest.mark.long] * (fidelity == "physics" or interaction == "uncoordinated"))
@@ -67,7 +67,7 @@ def test_a_trial_that_is_replayed_gives_its_rows_again(interaction: Interaction,
                 assert told(one.recording)["trial"] == trial
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize(("policy", "news"), [("none", "never"), ("resolve", "report")])
 def test_the_worst_and_the_median_trial_of_a_plan_are_those_of_its_rows(policy: PolicyName, news: News, tmp_path: Path
                                                                         ) -> None:

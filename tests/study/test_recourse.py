@@ -97,7 +97,7 @@ def test_every_robot_of_an_infeasible_plan_that_has_no_safe_way_on_keeps_its_ord
     assert reaction.value_of_recourse["plan"].mean == pytest.approx(0.0)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("fidelity", ["kinematic", "rollout"])
 def test_reactions_are_the_same_on_any_number_of_workers(world: sb.World, fidelity: str) -> None:
     kind = {**QUICK, "fidelity": fidelity, "rollouts": 2, "trials": 10, "scenario": "half"}

@@ -143,7 +143,7 @@ def test_costs_given_in_python_are_those_of_each_robot(tmp_path: Path) -> None:
 # Names of runs, and ways to ask
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("interaction", ["independent", "uncoordinated", "shared"])
 def test_an_option_gives_the_run_of_a_world_that_says_so_itself(interaction: Interaction, tmp_path: Path) -> None:
     told = world_of(tmp_path, f"{SMALL}interaction: {interaction}\n")

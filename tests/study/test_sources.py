@@ -70,7 +70,7 @@ def world_of_everything(noise: Noise) -> World:
         calm.obstacles, floors=np.array([[1.0, 3.0, 0.3, 0.3, 0.0, 0.05]])))
 
 
-@pytest.mark.first(4)
+@pytest.mark.spread(4)
 @pytest.mark.parametrize("source", ALONE)
 def test_of_one_source_alone_everything_is_its_own(calm: World, source: NoiseName) -> None:
     world = replace(calm, noise=ALONE[source], passages=(DOOR,) if source == "passages" else ())

@@ -178,7 +178,7 @@ def test_a_gap_that_is_just_wide_enough_is_driven_through(free_m: float) -> None
     assert distance(path, (5.0, beside_a_post(free_m)[0, 1])) >= 0.177 + CLEARANCE_M - 1e-6
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("clearance_m", [0.1, 0.297, 0.6])
 def test_places_that_a_path_joins_are_never_proved_apart(clearance_m: float) -> None:
     joined = apart = 0

@@ -66,7 +66,7 @@ def rooms(*walls: tuple[float, float, float, float], wide: float = 12.0, high: f
 FOUR = ["turtlebot2"] * 4
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("models", [FOUR, [SMALL, LARGE, "turtlebot2"]], ids=["alike", "of different sizes"])
 @pytest.mark.parametrize("family", ["rooms", "aisles", "field", "maze"])
 def test_berths_are_near_the_base_apart_and_clear_and_all_sites_are_reached(

@@ -87,7 +87,7 @@ def test_the_search_for_tangents_stops_when_the_work_is_done_and_keeps_the_short
     assert longest(some) < longest(every)
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("yaw", [0.0, 0.7])
 def test_lattice_paths_keep_the_clearance_and_find_every_passage(yaw: float) -> None:
     # Squares of 6 cells, shifted from row to row: the gaps between them, of 10 cells, lie askew.

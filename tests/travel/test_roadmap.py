@@ -131,7 +131,7 @@ def digest(planner: PathPlanner) -> str:
     return hashlib.sha256(b"|".join(parts)).hexdigest()
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_planning_again_gives_equal_paths_to_the_bit(planner: PathPlanner) -> None:
     first = digest(planner)

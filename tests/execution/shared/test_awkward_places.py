@@ -93,7 +93,7 @@ def sound(name: str, fates: Mapping[int, RobotFate] | None = None, rollout: int 
     return mission
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", PLACES)
 def test_all_come_home_when_nobody_fails(name: str) -> None:
     for rollout in range(2):
@@ -102,7 +102,7 @@ def test_all_come_home_when_nobody_fails(name: str) -> None:
         assert not mission.replanned
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", PLACES)
 def test_coordinated_robots_are_home_sooner_than_one_after_the_other(name: str) -> None:
     mission = sound(name)
@@ -110,7 +110,7 @@ def test_coordinated_robots_are_home_sooner_than_one_after_the_other(name: str) 
     assert max(ends) < sum(outcome.end_time_s - outcome.waited_s for outcome in mission.robots)
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", PLACES)
 def test_wherever_a_robot_stops_for_good_the_others_end_with_a_reason(name: str) -> None:
     """In a corridor, in each doorway, on the station, at each stop and on the way from it."""
@@ -123,7 +123,7 @@ def test_wherever_a_robot_stops_for_good_the_others_end_with_a_reason(name: str)
             assert outcome.end in ("home", "stuck")
 
 
-@pytest.mark.first(3)
+@pytest.mark.spread(3)
 @pytest.mark.parametrize("name", PLACES)
 def test_several_may_fail_at_once_and_while_others_brake(name: str) -> None:
     whole = sound(name)

@@ -93,7 +93,7 @@ def test_a_wait_shorter_than_what_is_kept_in_hand_delays_nobody() -> None:
             assert depart <= max(waits - EARLY_S, 0.0)
 
 
-@pytest.mark.first(2)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("seed", FEW)
 def test_no_mission_that_is_staggered_breaks_a_rule(seed: int) -> None:
     ready = drawn(seed)

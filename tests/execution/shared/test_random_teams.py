@@ -61,7 +61,7 @@ def test_by_the_twin_robots_keep_apart_and_all_come_home(robots: int, lost: bool
             assert [len(legs) for legs in mission.legs.values()] == [6] * robots
 
 
-@pytest.mark.first(1)
+@pytest.mark.spread(1)
 @pytest.mark.parametrize("robots", [2, 3, 4])
 def test_in_physics_robots_keep_apart_and_all_come_home(robots: int) -> None:
     tours, teams, gap_m = team(7, robots, lost=True, draws=2)

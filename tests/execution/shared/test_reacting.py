@@ -188,7 +188,7 @@ def settings_of(seed: int) -> Settings:
     return Settings(seed=seed, trials=6, rollouts=3, fidelity="kinematic", recorded=True)
 
 
-@pytest.mark.first(2)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("interaction", ["shared", "uncoordinated"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_team_that_keeps_its_orders_fares_as_one_that_does_not_react(seed: int, interaction: str) -> None:
@@ -215,7 +215,7 @@ def resolved(ready: Ready, news: News, settings: Settings) -> Reacted:
     return run
 
 
-@pytest.mark.first(2)
+@pytest.mark.spread(2)
 @pytest.mark.parametrize("news", ["instant", "report"])
 @pytest.mark.parametrize("seed", [1, 7])
 def test_whatever_happens_nobody_touches_and_nobody_waits_for_ever(seed: int, news: News) -> None:
